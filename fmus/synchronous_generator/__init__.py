@@ -1,0 +1,1 @@
+"""Synchronous generator with exciter and governor, as FMUs."""

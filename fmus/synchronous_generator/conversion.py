@@ -1,0 +1,71 @@
+"""Standard machine data (X, X', X'', T'_0, T''_0) to the branches of the equivalent circuit, two ways.
+
+Each axis is a magnetising reactance with two rotor branches beside it: branch 1 slow (field, or first
+q damper), branch 2 fast (damper). Reactances and resistances are per unit on the stator base.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+
+@dataclass(frozen=True)
+class AxisData:
+    """Standard data of one axis; X [pu], T [s], rotor at standstill seen from an open stator."""
+
+    X: ca.SX
+    X1: ca.SX
+    X2: ca.SX
+    X_l: ca.SX
+    T10: ca.SX
+    T20: ca.SX
+
+
+@dataclass(frozen=True)
+class RotorBranches:
+    """Leakage reactance and resistance [pu] of the slow (1) and the fast (2) branch."""
+
+    X_1: ca.SX
+    R_1: ca.SX
+    X_2: ca.SX
+    R_2: ca.SX
+
+
+def classical(a: AxisData, omega_b: ca.SX) -> RotorBranches:
+    """Textbook formulas: the branches are taken as active one after the other."""
+    X_m = a.X - a.X_l
+    X_1 = X_m * (a.X1 - a.X_l) / (X_m - a.X1 + a.X_l)
+    R_1 = (X_m + X_1) / (omega_b * a.T10)
+    X_2 = (a.X2 - a.X_l) * X_m * X_1 / (X_m * X_1 - (X_m + X_1) * (a.X2 - a.X_l))
+    R_2 = (X_2 + X_m * X_1 / (X_m + X_1)) / (omega_b * a.T20)
+    return RotorBranches(X_1, R_1, X_2, R_2)
+
+
+def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
+    """Branches whose operational reactance is exactly X(1+sT')(1+sT'')/((1+sT'_0)(1+sT''_0)).
+
+    With T' = T'_0·X'/X and T'' = T''_0·X''/X'. Taking X_l off and inverting leaves the admittance of
+    X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each.
+    """
+    X_m = a.X - a.X_l
+    T1, T2 = a.T10 * a.X1 / a.X, a.T20 * a.X2 / a.X1
+    # X(s) − X_l = (X_m + n1·s + n2·s²) / ((1 + s·T'_0)(1 + s·T''_0))
+    n1 = a.X * (T1 + T2) - a.X_l * (a.T10 + a.T20)
+    n2 = a.X * T1 * T2 - a.X_l * a.T10 * a.T20
+    root = ca.sqrt(ca.fmax(n1**2 - 4 * n2 * X_m, 1e-12))
+    slow, fast = (-n1 + root) / (2 * n2), (-n1 - root) / (2 * n2)
+    b1 = a.X * (a.T10 + a.T20 - T1 - T2)
+    b2 = a.X * (a.T10 * a.T20 - T1 * T2)
+
+    def branch(pole: ca.SX, other: ca.SX) -> tuple[ca.SX, ca.SX]:
+        X = X_m * n2 * (pole - other) / (b1 + b2 * pole)
+        return X, -pole * X / omega_b
+
+    return RotorBranches(*branch(slow, fast), *branch(fast, slow))
+
+
+def convert(a: AxisData, omega_b: ca.SX, use_exact: ca.SX) -> RotorBranches:
+    """The one or the other, chosen when the FMU is initialised."""
+    e, c = exact(a, omega_b), classical(a, omega_b)
+    pairs = zip((e.X_1, e.R_1, e.X_2, e.R_2), (c.X_1, c.R_1, c.X_2, c.R_2), strict=True)
+    return RotorBranches(*(ca.if_else(use_exact, one, other) for one, other in pairs))

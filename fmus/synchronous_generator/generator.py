@@ -1,0 +1,44 @@
+"""Machine, exciter and governor put together; one model for each excitation system."""
+
+from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
+from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
+from fmus.synchronous_generator.governors import ieeeg1
+from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_voltage
+from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.port import declare_port_outputs, device_port
+
+
+def synchronous_generator_ac4a() -> Model:
+    """Generator with exciter AC4A; defaults of the IEEE 118-bus case."""
+    return _generator("ac4a", ac4a, IEEE118, IEEEG1_STAMP)
+
+
+def synchronous_generator_st1() -> Model:
+    """Generator with exciter ST1; defaults are SG2 of the two-area case."""
+    return _generator("st1", st1, SG2, IEEEG1_NTS631)
+
+
+def synchronous_generator_st4b() -> Model:
+    """Generator with exciter ST4B; defaults are SG1 of the two-area case."""
+    return _generator("st4b", st4b, SG1, IEEEG1_NTS631)
+
+
+def _generator(name: str, exciter: Exciter, data: MachineData, governor: GovernorData) -> Model:
+    m = ModelBuilder(
+        f"synchronous_generator_{name}",
+        f"Synchronous generator with {name.upper()} exciter, IEEEG1 governor and step-up transformer (EMT-type)",
+    )
+    port = device_port(m, data.S_n, data.P_0)
+    machine = declare_machine(m, port, data)
+    E_fd, v_t = exciter(m, machine.start, lambda E: terminal_voltage(machine, port, E), machine.field_current)
+    P_m = ieeeg1(m, machine.w, machine.start.T_e, governor)
+    machine_equations(m, machine, port, E_fd, P_m)
+
+    declare_port_outputs(m, port, machine.current.rotated(machine.delta))
+    m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
+    m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
+    m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")
+    m.output("E_fd", E_fd, "pu", "Field voltage; 1 gives 1 pu on open circuit", base="E_fd")
+    m.output("P_m", P_m, "pu", "Mechanical power", base="S_n")
+    m.output("T_e", machine.torque, "pu", "Electrical torque", base="S_n")
+    return m.build()

@@ -1,0 +1,252 @@
+"""The synchronous machine with its step-up transformer in series, in its own rotor's frame.
+
+Generator signs, per unit on the stator base; f = f_q − j·f_d in the rotor's frame. States are flux
+linkages. Stator and transformer are one inductance, so ψ̃ = ψ − X_t·i is the flux between rotor and
+bus and no snubber is needed:
+
+    ψ̃̇_q/ω_b = v_q + (R_s + R_t)·i_q − w·ψ̃_d        ψ̇_f/ω_b  = (R_f/X_md)·E_fd − R_f·i_f
+    ψ̃̇_d/ω_b = v_d + (R_s + R_t)·i_d + w·ψ̃_q        ψ̇_kd/ω_b = −R_k·i_k for every damper
+    2H·ẇ = P_m/w − (ψ_d·i_q − ψ_q·i_d) − D·(w − 1)     δ̇ = ω_b·(w − 1)
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.synchronous_generator.conversion import AxisData, RotorBranches, convert
+from fmus.synchronous_generator.data import STAMP, MachineData
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.port import DevicePort
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: magnetising and leakage reactance, rotor branches, states and what follows from them.
+
+    ``emf`` is the flux behind the subtransient reactance; stator current and air-gap flux are
+    linear in it and in the stator flux.
+    """
+
+    X_m: ca.SX
+    branches: RotorBranches
+    psi: ca.SX
+    psi_1: ca.SX
+    psi_2: ca.SX
+    X_subtransient: ca.SX
+    X_between: ca.SX
+
+    @property
+    def weight_1(self) -> ca.SX:
+        return self.X_subtransient / self.branches.X_1
+
+    @property
+    def weight_2(self) -> ca.SX:
+        return self.X_subtransient / self.branches.X_2
+
+    @property
+    def i(self) -> ca.SX:
+        emf = self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2
+        return (emf - self.psi) / self.X_between
+
+    @property
+    def psi_airgap(self) -> ca.SX:
+        return self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2 - self.X_subtransient * self.i
+
+    @property
+    def i_1(self) -> ca.SX:
+        return (self.psi_1 - self.psi_airgap) / self.branches.X_1
+
+    @property
+    def i_2(self) -> ca.SX:
+        return (self.psi_2 - self.psi_airgap) / self.branches.X_2
+
+    def current_rate(self, psi_rate: ca.SX, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
+        """di/dt from the rates of the three fluxes."""
+        return (self.weight_1 * psi_1_rate + self.weight_2 * psi_2_rate - psi_rate) / self.X_between
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the exciter and the governor start from: terminal voltage, field voltage and current, torque."""
+
+    v_t: ca.SX
+    E_fd: ca.SX
+    T_e: ca.SX
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Parameters, states and operating point of the machine."""
+
+    R: ca.SX
+    R_t: ca.SX
+    X_t: ca.SX
+    H: ca.SX
+    D: ca.SX
+    d: Axis
+    q: Axis
+    w: ca.SX
+    delta: ca.SX
+    start: Start
+
+    @property
+    def current(self) -> Phasor:
+        """Stator current, rotor frame."""
+        return Phasor(self.q.i, -self.d.i)
+
+    @property
+    def torque(self) -> ca.SX:
+        return self.d.psi * self.q.i - self.q.psi * self.d.i
+
+    @property
+    def field_current(self) -> ca.SX:
+        """X_md·i_f: 1 pu gives 1 pu open-circuit voltage."""
+        return self.d.X_m * self.d.i_1
+
+
+def declare_machine(m: ModelBuilder, port: DevicePort, data: MachineData) -> Machine:
+    """Declare the machine's parameters and states; the power flow gives the operating point."""
+    with m.scope("transformer"):
+        R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
+        X_t = m.parameter("X_t", data.X_t, "pu", "Reactance", base="S_n", minimum=0, source=data.source)
+    with m.scope("machine"):
+        R_s = m.parameter("R_s", 0.0025, "pu", "Stator resistance", base="S_n", minimum=0, source=STAMP)
+        H = m.parameter("H", data.H, "s", "Inertia constant", minimum=0.01, source=data.source)
+        D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_n", minimum=0, source=STAMP)
+        d_data, q_data = _axis_parameters(m, data)
+        use_exact = m.switch("exact_conversion", data.exact_conversion, "Standard data to circuit: exact, not classical")
+        saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
+        start, d, q, delta_0 = _operating_point(
+            m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation
+        )
+        w = m.state("omega", 1.0, "pu", "Rotor speed", base="f_n")
+        delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
+    return Machine(R_s + R_t, R_t, X_t, H, D, d, q, w, delta, start)
+
+
+def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
+    """Give the derivatives of fluxes, speed and angle."""
+    rates = _flux_rates(g, port, E_fd)
+    for psi, rate in zip((g.q.psi, g.d.psi, g.d.psi_1, g.d.psi_2, g.q.psi_1, g.q.psi_2), rates, strict=True):
+        m.derivative(psi, rate)
+    m.derivative(g.w, (P_m / g.w - g.torque - g.D * (g.w - 1)) / (2 * g.H))
+    m.derivative(g.delta, port.omega_b * (g.w - 1))
+
+
+def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
+    """|v_t| at the machine's terminal: the bus voltage plus the transformer's drop, di/dt included."""
+    psi_q, psi_d, psi_f, psi_1d, psi_1q, psi_2q = _flux_rates(g, port, E_fd)
+    rate = Phasor(g.q.current_rate(psi_q, psi_1q, psi_2q), -g.d.current_rate(psi_d, psi_f, psi_1d))
+    drop = Phasor(g.R_t, g.w * g.X_t) * g.current + rate * (g.X_t / port.omega_b)
+    return (port.v.rotated(-g.delta) + drop).magnitude()
+
+
+def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
+    v = port.v.rotated(-g.delta)
+    v_q, v_d = v.re, -v.im
+    field, damper_d = g.d.branches, g.d.branches
+    return (
+        port.omega_b * (v_q + g.R * g.q.i - g.w * g.d.psi),
+        port.omega_b * (v_d + g.R * g.d.i + g.w * g.q.psi),
+        port.omega_b * field.R_1 * (E_fd / g.d.X_m - g.d.i_1),
+        -port.omega_b * damper_d.R_2 * g.d.i_2,
+        -port.omega_b * g.q.branches.R_1 * g.q.i_1,
+        -port.omega_b * g.q.branches.R_2 * g.q.i_2,
+    )
+
+
+def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:
+    def reactance(name: str, value: float, text: str) -> ca.SX:
+        return m.parameter(name, value, "pu", text, base="S_n", minimum=0.001, maximum=20, source=data.source)
+
+    def time(name: str, value: float, text: str) -> ca.SX:
+        return m.parameter(name, value, "s", text, minimum=1e-3, source=data.source)
+
+    X_l = reactance("X_l", data.X_l, "Stator leakage reactance")
+    axes = {}
+    for axis, values in {
+        "d": (data.X_d, data.X_d1, data.X_d2, data.T_d10, data.T_d20),
+        "q": (data.X_q, data.X_q1, data.X_q2, data.T_q10, data.T_q20),
+    }.items():
+        X = reactance(f"X_{axis}", values[0], f"Synchronous reactance, {axis} axis")
+        X1 = reactance(f"X_{axis}1", values[1], f"Transient reactance X'_{axis}")
+        X2 = reactance(f"X_{axis}2", values[2], f"Subtransient reactance X''_{axis}")
+        T10 = time(f"T_{axis}10", values[3], f"Open-circuit transient time constant T'_{axis}0")
+        T20 = time(f"T_{axis}20", values[4], f"Open-circuit subtransient time constant T''_{axis}0")
+        m.require(X - X1, f"machine.X_{axis} must exceed machine.X_{axis}1")
+        m.require(X1 - X2, f"machine.X_{axis}1 must exceed machine.X_{axis}2")
+        m.require(X2 - X_l, f"machine.X_{axis}2 must exceed machine.X_l")
+        axes[axis] = AxisData(X, X1, X2, X_l, T10, T20)
+    return axes["d"], axes["q"]
+
+
+def _saturation_factor(
+    m: ModelBuilder, port: DevicePort, data: MachineData, R_s: ca.SX, R_t: ca.SX, X_t: ca.SX, X_l: ca.SX
+) -> ca.SX:
+    """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
+    on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
+    s_10 = m.parameter("s_10", data.s_10, "1", "Saturation s(1.0) of the open-circuit curve", minimum=1e-6, source=data.source)
+    s_12 = m.parameter("s_12", data.s_12, "1", "Saturation s(1.2) of the open-circuit curve", minimum=1e-6, source=data.source)
+    psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
+    s = s_10 * ca.exp(ca.log(s_12 / s_10) / ca.log(1.2) * ca.log(psi))
+    return m.calculated("saturation_factor", 1 + on * s, "1", "1 + s(ψ) at the operating point")
+
+
+def _operating_point(
+    m: ModelBuilder,
+    port: DevicePort,
+    R_s: ca.SX,
+    R_t: ca.SX,
+    X_t: ca.SX,
+    d_data: AxisData,
+    q_data: AxisData,
+    use_exact: ca.SX,
+    saturation: ca.SX,
+) -> tuple[Start, Axis, Axis, ca.SX]:
+    """Circuit of both axes, rotor angle and every flux of the steady state."""
+    reactances = {}
+    for axis, data in {"d": d_data, "q": q_data}.items():
+        X_m = m.calculated(f"X_m{axis}", (data.X - data.X_l) / saturation, "pu", f"Magnetising reactance, {axis} axis", "S_n")
+        b = convert(data, port.omega_b, use_exact)
+        branches = RotorBranches(
+            *(
+                m.calculated(f"{axis}_{name}", value, "pu", f"Rotor branch of the {axis} axis: {name}", "S_n")
+                for name, value in {"X_1": b.X_1, "R_1": b.R_1, "X_2": b.X_2, "R_2": b.R_2}.items()
+            )
+        )
+        m.require(ca.fmin(branches.X_1, branches.X_2), f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants")
+        X_sub = m.calculated(
+            f"X_m{axis}2", 1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2), "pu", f"Subtransient X''_{axis} − X_l", "S_n"
+        )
+        reactances[axis] = X_m, branches, X_sub, X_sub + data.X_l + X_t
+
+    v_t = port.v_0 + Phasor(R_t, X_t) * port.i_0
+    X_q = q_data.X_l + reactances["q"][0]
+    delta_0 = (v_t + Phasor(R_s, X_q) * port.i_0).angle()
+    i, v = port.i_0.rotated(-delta_0), port.v_0.rotated(-delta_0)
+    i_q, i_d, v_q, v_d = i.re, -i.im, v.re, -v.im
+    psi_d, psi_q = v_q + (R_s + R_t) * i_q, -(v_d + (R_s + R_t) * i_d)
+    X_md, X_mq = reactances["d"][0], reactances["q"][0]
+    E_fd = psi_d + (X_t + d_data.X_l + X_md) * i_d
+    airgap_d, airgap_q = E_fd - X_md * i_d, -X_mq * i_q
+    psi_f = airgap_d + reactances["d"][1].X_1 * E_fd / X_md
+
+    def flux(name: str, value: ca.SX, text: str) -> ca.SX:
+        return m.state(name, value, "pu", text, base="S_n")
+
+    d = Axis(
+        *reactances["d"][:2],
+        flux("psi_d", psi_d, "Flux of stator and transformer, d axis"),
+        flux("psi_f", psi_f, "Field flux"),
+        flux("psi_1d", airgap_d, "Damper flux, d axis"),
+        *reactances["d"][2:],
+    )
+    q = Axis(
+        *reactances["q"][:2],
+        flux("psi_q", psi_q, "Flux of stator and transformer, q axis"),
+        flux("psi_1q", airgap_q, "First damper flux, q axis"),
+        flux("psi_2q", airgap_q, "Second damper flux, q axis"),
+        *reactances["q"][2:],
+    )
+    return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d), d, q, delta_0

@@ -1,0 +1,66 @@
+"""Transfer-function blocks: each gives its equation and its own steady state.
+
+A block declares its state in the builder's current scope and returns its output signal. ``initial``
+is the steady-state value of its input, an expression of parameters. Where a block may be left out
+by a time constant of zero, as the block diagrams of the literature mean it, it passes its input
+through; its state then follows the input with `BYPASS_TIME` and is seen by nobody.
+"""
+
+import casadi as ca
+
+from fmus.toolchain.frames import Scalar
+from fmus.toolchain.model import ModelBuilder
+
+BYPASS_TIME = 0.01
+"""Time constant [s] with which the unused state of a left-out block follows its input."""
+
+
+def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
+    """s·T_W/(1 + s·T_W); its output is 0 in steady state."""
+    x = m.state(name, initial, "pu", "washout, slow part of the signal", base="S_n")
+    m.derivative(x, (u - x) / T_W)
+    return u - x
+
+
+def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
+    """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly."""
+    x = m.state(name, initial, "pu", "first-order lag", base="S_n")
+    m.derivative(x, (u - x) / T)
+    return x
+
+
+def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
+    """1/(1 + s·T); passed through where T = 0."""
+    x = m.state(name, initial, "pu", "first-order lag", base="S_n")
+    left_out = _is_zero(T)
+    m.derivative(x, (u - x) / ca.if_else(left_out, BYPASS_TIME, T))
+    return ca.if_else(left_out, u, x)
+
+
+def lead_lag(
+    m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0
+) -> ca.SX:
+    """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0."""
+    x = m.state(name, initial, "pu", "lead/lag", base="S_n")
+    left_out = _is_zero(T_lag)
+    T = ca.if_else(left_out, BYPASS_TIME, T_lag)
+    m.derivative(x, (u - x) / T)
+    return ca.if_else(left_out, u, x + (T_lead / T) * (u - x))
+
+
+def proportional_integral(
+    m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar
+) -> ca.SX:
+    """K_P + K_I/s; ``initial`` is the steady-state output, carried by the integrator."""
+    x = m.state(name, initial, "pu", "integrator", base="S_n")
+    m.derivative(x, K_I * error)
+    return K_P * error + x
+
+
+def limit(u: ca.SX, magnitude: Scalar) -> ca.SX:
+    """Clamp to ±magnitude."""
+    return ca.fmin(ca.fmax(u, -magnitude), magnitude)
+
+
+def _is_zero(T: Scalar) -> ca.SX:
+    return ca.SX(T) <= 0

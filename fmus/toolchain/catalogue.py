@@ -1,0 +1,47 @@
+"""The catalogue of models: an entry-point group, so that another distribution can add its own."""
+
+import inspect
+from importlib.metadata import entry_points
+from typing import Any
+
+from fmus.toolchain.model import Model
+
+GROUP = "gfor_cosim.models"
+
+
+def model_names() -> tuple[str, ...]:
+    """Names of all models, sorted."""
+    return tuple(sorted(entry_points(group=GROUP).names))
+
+
+def needs_arguments(name: str) -> bool:
+    """Whether a model can only be built for given data, such as a network."""
+    parameters = inspect.signature(_factory(name)).parameters.values()
+    return any(p.default is inspect.Parameter.empty for p in parameters)
+
+
+def build_model(name: str, **arguments: Any) -> Model:
+    """Build one model of the catalogue.
+
+    Raises
+    ------
+    KeyError
+        If no model has that name; the message lists those there are.
+    """
+    model = _factory(name)(**arguments)
+    if not isinstance(model, Model):
+        raise TypeError(f"catalogue entry {name!r} returned {type(model).__name__}, not a Model")
+    return model
+
+
+def network_of(name: str) -> Any | None:
+    """The network that a grid model is built for by default, or None for other models."""
+    parameter = inspect.signature(_factory(name)).parameters.get("network")
+    return None if parameter is None or parameter.default is inspect.Parameter.empty else parameter.default
+
+
+def _factory(name: str) -> Any:
+    found = entry_points(group=GROUP, name=name)
+    if not found:
+        raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
+    return next(iter(found)).load()

@@ -1,0 +1,107 @@
+"""Complex quantities in rotating frames, written as pairs of CasADi scalars.
+
+The network frame turns at ω_b; a device's own frame leads it by an angle θ. A quantity is
+f = f_re + j·f_im in the network frame and f = f_q − j·f_d in a device's frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.model import ModelBuilder
+
+Scalar = ca.SX | float
+
+
+@dataclass(frozen=True)
+class Phasor:
+    """A complex number re + j·im of CasADi expressions."""
+
+    re: Scalar
+    im: Scalar
+
+    def __add__(self, other: Phasor) -> Phasor:
+        return Phasor(self.re + other.re, self.im + other.im)
+
+    def __sub__(self, other: Phasor) -> Phasor:
+        return Phasor(self.re - other.re, self.im - other.im)
+
+    def __neg__(self) -> Phasor:
+        return Phasor(-self.re, -self.im)
+
+    def __mul__(self, other: Phasor | Scalar) -> Phasor:
+        if isinstance(other, Phasor):
+            return Phasor(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
+        return Phasor(self.re * other, self.im * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Phasor | Scalar) -> Phasor:
+        if isinstance(other, Phasor):
+            return self * other.conjugate() * (1 / (other.re**2 + other.im**2))
+        return Phasor(self.re / other, self.im / other)
+
+    def conjugate(self) -> Phasor:
+        return Phasor(self.re, -self.im)
+
+    def times_j(self) -> Phasor:
+        return Phasor(-self.im, self.re)
+
+    def magnitude(self) -> ca.SX:
+        return ca.sqrt(self.re**2 + self.im**2)
+
+    def angle(self) -> ca.SX:
+        return ca.atan2(self.im, self.re)
+
+    def rotated(self, angle: Scalar) -> Phasor:
+        """The quantity times e^{j·angle}."""
+        return self * polar(1.0, angle)
+
+    def clamped(self, limit_re: Scalar, limit_im: Scalar) -> Phasor:
+        """Each part limited to ± its limit."""
+        return Phasor(
+            ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im)
+        )
+
+
+ZERO = Phasor(0.0, 0.0)
+
+
+def polar(magnitude: Scalar, angle: Scalar) -> Phasor:
+    """Magnitude and angle [rad] as a complex quantity."""
+    return Phasor(magnitude * ca.cos(angle), magnitude * ca.sin(angle))
+
+
+def power(voltage: Phasor, current: Phasor) -> Phasor:
+    """P + jQ = v·conj(i), per unit."""
+    return voltage * current.conjugate()
+
+
+def current_of_power(p: Scalar, q: Scalar, voltage: Phasor) -> Phasor:
+    """i = conj((P + jQ)/v), per unit."""
+    return (Phasor(p, q) / voltage).conjugate()
+
+
+@dataclass(frozen=True)
+class QdState:
+    """A complex state of a rotating frame, kept as its q and d components: f = f_q − j·f_d."""
+
+    q: ca.SX
+    d: ca.SX
+
+    @property
+    def value(self) -> Phasor:
+        return Phasor(self.q, -self.d)
+
+    def set_derivative(self, m: ModelBuilder, rate: Phasor) -> None:
+        m.derivative(self.q, rate.re)
+        m.derivative(self.d, -rate.im)
+
+
+def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> QdState:
+    """Declare ``name_q`` and ``name_d`` [pu, S_n]."""
+    q = m.state(f"{name}_q", initial.re, "pu", f"{description}, q component", base="S_n")
+    d = m.state(f"{name}_d", -initial.im, "pu", f"{description}, d component", base="S_n")
+    return QdState(q, d)

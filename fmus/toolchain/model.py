@@ -1,0 +1,258 @@
+"""A model: its variables and its equations ẋ = f(x, u, p), y = g(x, u, p), with the initial state.
+
+`ModelBuilder` is how a model is written: each declaration returns a CasADi symbol, so that a
+quantity is declared where it is used and the equations read like the block diagram.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable, VariableType
+
+
+@dataclass(frozen=True)
+class Model:
+    """Variables and equations of one device or network.
+
+    Attributes
+    ----------
+    name, title
+        Identifier of the FMU, and a line for people.
+    parameters, calculated, inputs, states, outputs
+        Declarations, in the order of the vectors p, c, u, x, y.
+    initialise
+        p → (c, x): set-points and states of the operating point.
+    derivatives, outputs_function
+        (x, u, p, c) → ẋ, and → y.
+    requirements
+        (p, c) → r; the model may run where every r > 0.
+    requirement_texts
+        The rule behind each r, with its remedy.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    calculated: tuple[CalculatedParameter, ...]
+    inputs: tuple[Input, ...]
+    states: tuple[State, ...]
+    outputs: tuple[Output, ...]
+    initialise: ca.Function
+    derivatives: ca.Function
+    outputs_function: ca.Function
+    requirements: ca.Function
+    requirement_texts: tuple[str, ...]
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """Every variable but the derivatives; the position is the FMI value reference."""
+        return (*self.parameters, *self.calculated, *self.inputs, *self.states, *self.outputs)
+
+    @cached_property
+    def value_references(self) -> dict[str, int]:
+        """Name → FMI value reference; ``der(state)`` follows after all others."""
+        names = [v.name for v in self.variables] + [f"der({s.name})" for s in self.states]
+        return {name: index for index, name in enumerate(names)}
+
+    def jacobians(self) -> ca.Function:
+        """Exact (A, B, C, D) of the continuous model as a function of (x, u, p, c)."""
+        x, u, p, c = (ca.SX.sym(s, n) for s, n in zip("xupc", self._sizes, strict=True))
+        f = self.derivatives(x, u, p, c)
+        y = self.outputs_function(x, u, p, c)
+        blocks = [ca.jacobian(e, v) for e in (f, y) for v in (x, u)]
+        return ca.Function("jacobians", [x, u, p, c], blocks)
+
+    @property
+    def _sizes(self) -> tuple[int, int, int, int]:
+        return len(self.states), len(self.inputs), len(self.parameters), len(self.calculated)
+
+
+class ModelBuilder:
+    """Collects declarations and equations of one model.
+
+    Parameters
+    ----------
+    name
+        Identifier of the FMU (letters, digits, underscore).
+    title
+        One line that says what the model is.
+    """
+
+    def __init__(self, name: str, title: str) -> None:
+        self.name = name
+        self.title = title
+        self._prefix: list[str] = []
+        self._declared: dict[str, tuple[Variable, ca.SX]] = {}
+        self._expressions: dict[str, ca.SX] = {}
+        self._derivatives: dict[str, ca.SX] = {}
+        self._requirements: list[tuple[ca.SX, str]] = []
+        self._algebraic: list[tuple[ca.SX, ca.SX]] = []
+        self.internal_step = self.parameter(
+            "internal_step",
+            1e-4,
+            "s",
+            "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
+            minimum=1e-6,
+            maximum=2e-4,
+        )
+
+    # -- names -------------------------------------------------------------------------------
+
+    @contextmanager
+    def scope(self, name: str) -> Iterator[None]:
+        """Put ``name.`` before every name declared inside."""
+        self._prefix.append(name)
+        try:
+            yield
+        finally:
+            self._prefix.pop()
+
+    def _full(self, name: str) -> str:
+        return ".".join([*self._prefix, name])
+
+    def _declare(self, variable: Variable) -> ca.SX:
+        if variable.name in self._declared:
+            raise ValueError(f"model {self.name}: {variable.name!r} is declared twice")
+        symbol = ca.SX.sym(variable.name)
+        self._declared[variable.name] = (variable, symbol)
+        return symbol
+
+    # -- declarations ------------------------------------------------------------------------
+
+    def parameter(
+        self,
+        name: str,
+        start: float,
+        unit: str,
+        description: str,
+        *,
+        base: str = "",
+        minimum: float | None = None,
+        maximum: float | None = None,
+        tunable: bool = False,
+        type: VariableType = "Real",
+        source: str = "",
+    ) -> ca.SX:
+        """Declare a parameter; ``start`` is its default."""
+        return self._declare(
+            Parameter(
+                self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source
+            )
+        )
+
+    def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
+        """Declare a Boolean parameter; in the equations it is 0 or 1."""
+        return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
+
+    def calculated(self, name: str, value: ca.SX, unit: str, description: str, base: str = "") -> ca.SX:
+        """Declare a quantity computed at initialisation from fixed parameters."""
+        full = self._full(name)
+        self._expressions[full] = ca.SX(value)
+        return self._declare(CalculatedParameter(full, unit, description, base))
+
+    def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
+        """Declare an input."""
+        return self._declare(Input(self._full(name), unit, description, base, start))
+
+    def state(self, name: str, initial: ca.SX | float, unit: str, description: str, base: str = "") -> ca.SX:
+        """Declare a continuous state with its initial value, an expression of parameters."""
+        full = self._full(name)
+        self._expressions[full] = ca.SX(initial)
+        return self._declare(State(full, unit, description, base))
+
+    def derivative(self, state: ca.SX, rate: ca.SX) -> None:
+        """Give the time derivative [unit of the state per second] of a declared state."""
+        if state.name() in self._derivatives:
+            raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
+        self._derivatives[state.name()] = ca.SX(rate)
+
+    def output(self, name: str, value: ca.SX, unit: str, description: str, base: str = "") -> None:
+        """Declare an output as a function of states, inputs and parameters."""
+        full = self._full(name)
+        self._expressions[full] = ca.SX(value)
+        self._declare(Output(full, unit, description, base))
+
+    def algebraic(self, name: str) -> ca.SX:
+        """Return a symbol for a signal that is used before it can be written; `close` gives its value."""
+        return ca.SX.sym(self._full(name))
+
+    def close(self, symbol: ca.SX, value: ca.SX) -> None:
+        """Give the value of an `algebraic` signal.
+
+        Raises
+        ------
+        ValueError
+            If the value depends on the signal itself: an algebraic loop.
+        """
+        if ca.depends_on(value, symbol):
+            raise ValueError(f"model {self.name}: signal {symbol.name()!r} depends directly on itself")
+        self._algebraic.append((symbol, value))
+
+    def require(self, positive: ca.SX, rule: str) -> None:
+        """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
+        self._requirements.append((ca.SX(positive), rule))
+
+    # -- the model ---------------------------------------------------------------------------
+
+    def build(self) -> Model:
+        """Return the finished model.
+
+        Raises
+        ------
+        ValueError
+            If a state has no derivative, or a calculated parameter or initial state depends on
+            something other than parameters.
+        """
+        kinds: dict[type, list[tuple[Variable, ca.SX]]] = {
+            kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
+            for kind in (Parameter, CalculatedParameter, Input, State, Output)
+        }
+        p, c, u, x, _ = (ca.vertcat(*[symbol for _, symbol in entries]) for entries in kinds.values())
+        missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
+        if missing:
+            raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
+
+        def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
+            stacked = ca.vertcat(*[values[variable.name] for variable, _ in entries])
+            for symbol, value in self._algebraic:
+                stacked = ca.substitute(stacked, symbol, value)
+            return stacked
+
+        c_value = self._calculate(kinds[CalculatedParameter], c)
+        x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
+        r_value = ca.vertcat(*[value for value, _ in self._requirements])
+        arguments = [x, u, p, c]
+        return Model(
+            name=self.name,
+            title=self.title,
+            parameters=tuple(v for v, _ in kinds[Parameter]),  # type: ignore[misc]
+            calculated=tuple(v for v, _ in kinds[CalculatedParameter]),  # type: ignore[misc]
+            inputs=tuple(v for v, _ in kinds[Input]),  # type: ignore[misc]
+            states=tuple(v for v, _ in kinds[State]),  # type: ignore[misc]
+            outputs=tuple(v for v, _ in kinds[Output]),  # type: ignore[misc]
+            initialise=ca.Function("initialise", [p], [c_value, x_value]),
+            derivatives=ca.Function("derivatives", arguments, [collect(kinds[State], self._derivatives)]),
+            outputs_function=ca.Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
+            requirements=ca.Function("requirements", [p, c], [r_value]),
+            requirement_texts=tuple(text for _, text in self._requirements),
+        )
+
+    def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:
+        """Express every calculated parameter by parameters alone; each may use those declared before it."""
+        tunable = ca.vertcat(
+            *[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable]
+        )
+        values: list[ca.SX] = []
+        for index, (variable, _) in enumerate(entries):
+            value = ca.substitute(self._expressions[variable.name], c[:index], ca.vertcat(*values))
+            if tunable.numel() and ca.depends_on(value, tunable):
+                raise ValueError(
+                    f"model {self.name}: {variable.name!r} is computed once, at initialisation, "
+                    "and must not depend on a tunable parameter"
+                )
+            values.append(value)
+        return ca.vertcat(*values)

@@ -1,0 +1,147 @@
+"""Export of a model as a Python-backed FMU (FMI 2.0 co-simulation) with pythonfmu's binaries.
+
+The archive is written here and not by pythonfmu's own builder, because equal models must give equal
+files, every bundled module needs a name of its own (all Python-backed FMUs of a process share
+``sys.modules``), and the model description needs units, bounds and dependencies.
+"""
+
+import hashlib
+import json
+import sys
+import uuid
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pythonfmu
+
+from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.description import model_description
+from fmus.toolchain.kernel import COMPILER_FLAGS, TARGETS, c_source, compile_kernel, python_source
+from fmus.toolchain.model import Model
+
+_NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
+_TIMESTAMP = (2020, 1, 1, 0, 0, 0)
+_SLAVE = Path(__file__).with_name("slave.py")
+
+
+def host_platform() -> str | None:
+    """FMI name of this machine's platform, where a kernel can be compiled for it."""
+    names = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
+    return names.get(sys.platform)
+
+
+def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = None) -> Path:
+    """Write ``<model name>.fmu`` into a folder.
+
+    Parameters
+    ----------
+    model
+        What to export.
+    destination
+        Folder; it is created where missing.
+    platforms
+        FMI platforms to compile the kernel for; by default this machine's. Elsewhere the FMU
+        evaluates the same equations in pure Python.
+
+    Returns
+    -------
+    pathlib.Path
+        The FMU.
+
+    Raises
+    ------
+    ValueError, RuntimeError
+        As `compile_kernel`.
+    """
+    if platforms is None:
+        host = host_platform()
+        platforms = (host,) if host else ()
+    destination.mkdir(parents=True, exist_ok=True)
+    target = destination / f"{model.name}.fmu"
+    partial = target.with_suffix(f".{uuid.uuid4().hex}.part")
+    _write(model, partial, platforms)
+    partial.replace(target)
+    return target
+
+
+def cached(model: Model) -> Path:
+    """Return this machine's FMU of a model, building it only if it was not built before."""
+    sources = _Sources(model)
+    folder = cache_directory("fmus") / sources.digest[:32]
+    target = folder / f"{model.name}.fmu"
+    return target if target.exists() else export(model, folder)
+
+
+class _Sources:
+    """Everything an FMU is made from, with one hash over all of it."""
+
+    def __init__(self, model: Model) -> None:
+        self.c = c_source(model)
+        self.python = python_source(model)
+        self.slave = _SLAVE.read_text(encoding="utf-8")
+        self.tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
+        self.kernel_digest = _digest(self.c, *COMPILER_FLAGS)
+        description = model_description(model, "", model.name, self.tool).decode()
+        self.digest = _digest(self.c, self.python, self.slave, description, *COMPILER_FLAGS)
+        self.guid = "{" + str(uuid.uuid5(_NAMESPACE, self.digest)) + "}"
+
+
+def _digest(*texts: str) -> str:
+    hasher = hashlib.sha256()
+    for text in texts:
+        hasher.update(text.encode())
+        hasher.update(b"\0")
+    return hasher.hexdigest()
+
+
+def _write(model: Model, target: Path, platforms: tuple[str, ...]) -> None:
+    sources = _Sources(model)
+    tag = sources.digest[:16]
+    kernel_module = f"gfor_cosim_kernel_{tag}"
+    slave_module = f"gfor_cosim_slave_{tag}"
+    contents: dict[str, bytes] = {
+        "modelDescription.xml": model_description(model, sources.guid, model.name, sources.tool),
+        "resources/slavemodule.txt": slave_module.encode(),
+        f"resources/{slave_module}.py": sources.slave.encode(),
+        f"resources/{kernel_module}.py": sources.python.encode(),
+        "resources/model.json": _slave_data(model, sources, kernel_module),
+    }
+    for platform in platforms:
+        library = compile_kernel(sources.c, platform, sources.kernel_digest[:32])
+        contents[f"resources/kernel/{platform}/{TARGETS[platform][1]}"] = library.read_bytes()
+    package = Path(pythonfmu.__file__).parent
+    for file in sorted(package.glob("*.py")):
+        contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
+    for binary in sorted((package / "resources" / "binaries").rglob("*.*")):
+        contents[f"binaries/{binary.parent.name}/{model.name}{binary.suffix}"] = binary.read_bytes()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _TIMESTAMP)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)
+
+
+def _slave_data(model: Model, sources: _Sources, kernel_module: str) -> bytes:
+    first_input = len(model.parameters) + len(model.calculated)
+    start = {index: p.start for index, p in enumerate(model.parameters)}
+    start |= {first_input + index: i.start for index, i in enumerate(model.inputs)}
+    data = {
+        "name": model.name,
+        "hash": sources.digest,
+        "kernel_module": kernel_module,
+        "names": list(model.value_references),
+        "counts": {
+            "parameters": len(model.parameters),
+            "calculated": len(model.calculated),
+            "inputs": len(model.inputs),
+            "states": len(model.states),
+            "outputs": len(model.outputs),
+        },
+        "parameters": [[p.type, p.minimum, p.maximum, p.tunable] for p in model.parameters],
+        "start": start,
+        "requirements": list(model.requirement_texts),
+        "internal_step": model.value_references["internal_step"],
+    }
+    return json.dumps(data, ensure_ascii=False).encode()

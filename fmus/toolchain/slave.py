@@ -1,0 +1,275 @@
+"""The slave inside every Python-backed FMU: a thin pythonfmu class around one kernel.
+
+This file is not imported by the toolchain. It is copied into the FMU's resources under a name that
+carries the FMU's own hash, because all Python-backed FMUs of a process share one interpreter. It
+needs a Python and nothing else.
+
+pythonfmu's wrapper crashes the process on the second exception of an instance, so no callback may
+raise: a problem is logged and remembered, and every later step is discarded with its text. The one
+exception is the constructor: there a failure must make fmi2Instantiate return NULL.
+"""
+
+import ctypes
+import importlib
+import json
+import math
+import os
+import platform
+import sys
+from pathlib import Path
+
+from pythonfmu import Fmi2Slave
+from pythonfmu.enums import Fmi2Status
+
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
+LIBRARIES = {
+    ("linux", "x86_64"): "linux64/kernel.so",
+    ("win32", "amd64"): "win64/kernel.dll",
+    ("darwin", "x86_64"): "darwin64/kernel.dylib",
+}
+
+
+class Slave(Fmi2Slave):
+    """All variables of the instance lie in one vector, indexed by value reference: [p | c | u | x | y | der(x)]."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        resources = Path(kwargs["resources"])
+        model = json.loads((resources / "model.json").read_text(encoding="utf-8"))
+        self.modelName = model["name"]
+        self._names = model["names"]
+        self._parameters = model["parameters"]  # per parameter: [type, minimum, maximum, tunable]
+        self._rules = model["requirements"]
+        counts = model["counts"]
+        self._first_calculated = counts["parameters"]
+        self._first_input = self._first_calculated + counts["calculated"]
+        self._first_state = self._first_input + counts["inputs"]
+        self._first_output = self._first_state + counts["states"]
+        self._first_derivative = self._first_output + counts["outputs"]
+        self._z = (ctypes.c_double * len(self._names))()
+        for reference, value in model["start"].items():
+            self._z[int(reference)] = value
+        self._margins = (ctypes.c_double * max(1, len(self._rules)))()
+        self._identity = bytes.fromhex(model["hash"])[:16]
+        self._internal_step = model["internal_step"]
+        self._phase = INSTANTIATED
+        self._failure = None
+        self._outputs_stale = True
+        self._parameters_changed = True
+        self._step_size, self._parts = 0.0, 1
+        self._load_kernel(resources, model["kernel_module"])
+
+    def _load_kernel(self, resources, python_kernel):
+        """Take the compiled kernel where one fits the platform, else evaluate in Python."""
+        library = resources / "kernel" / LIBRARIES.get((sys.platform, platform.machine().lower()), "none")
+        if library.exists() and os.environ.get("GFOR_COSIM_KERNEL") != "python":
+            try:
+                kernel = ctypes.PyDLL(str(library))
+                kernel.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int]
+                for function in (kernel.initialise, kernel.outputs, kernel.derivatives):
+                    function.argtypes, function.restype = [ctypes.c_void_p], None
+                kernel.requirements.argtypes, kernel.requirements.restype = [ctypes.c_void_p] * 2, None
+            except OSError as error:
+                self.log(f"compiled kernel not usable ({error}); evaluating in Python", Fmi2Status.warning)
+            else:
+                # The address, not the array: a plain integer argument is the cheapest call.
+                self._kernel, self._address = kernel, ctypes.addressof(self._z)
+                self._margins_address = ctypes.addressof(self._margins)
+                self._advance = kernel.advance
+                return
+        self._kernel, self._address = importlib.import_module(python_kernel), self._z
+        self._margins_address = self._margins
+        self._advance = self._kernel.advance
+
+    # -- reports ---------------------------------------------------------------------------------
+
+    def _report(self, text):
+        self.log(f"{self.instance_name}: {text}", Fmi2Status.error)
+
+    def _fail(self, text):
+        """Report a problem after which no step may succeed."""
+        if self._failure is None:
+            self._failure = text
+        self._report(text)
+
+    def _check_requirements(self):
+        self._kernel.requirements(self._address, self._margins_address)
+        broken = [rule for rule, margin in zip(self._rules, self._margins, strict=False) if not margin > 0.0]
+        if broken:
+            self._fail("parameters cannot be used: " + "; ".join(broken))
+
+    # -- life cycle ------------------------------------------------------------------------------
+
+    def enter_initialization_mode(self):
+        self._phase = INITIALISING
+
+    def exit_initialization_mode(self):
+        try:
+            self._refresh()
+            self._check_requirements()
+            worst = [n for n, v in zip(self._names, self._z, strict=True) if not math.isfinite(v)]
+            if worst:
+                self._fail(f"initialisation gives no finite value for {', '.join(worst[:5])}; check the parameters")
+        except Exception as error:
+            self._fail(f"initialisation failed: {error!r}")
+        self._parameters_changed = False
+        self._phase = STEPPING
+
+    def do_step(self, current_time, step_size):
+        try:
+            if self._failure is not None:
+                self._report(self._failure)
+                return False
+            if self._phase != STEPPING:
+                self._report("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
+                return False
+            if step_size != self._step_size:
+                if not (step_size > 0.0 and math.isfinite(step_size)):
+                    self._report(f"communication step size {step_size!r} s; it must exceed 0")
+                    return False
+                self._step_size = step_size
+                self._parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
+            if self._parameters_changed:
+                self._check_requirements()
+                self._parameters_changed = False
+                if self._failure is not None:
+                    return False
+            status = self._advance(self._address, step_size / self._parts, self._parts)
+            self._outputs_stale = False
+            if status:
+                self._fail(self._describe_divergence(status - 1, current_time))
+                return False
+            return True
+        except Exception as error:
+            self._fail(f"step from {current_time} s failed: {error!r}")
+            return False
+
+    def terminate(self):
+        self._phase = TERMINATED
+
+    def _describe_divergence(self, state, time):
+        inputs = range(self._first_input, self._first_state)
+        bad = [self._names[i] for i in inputs if not math.isfinite(self._z[i])]
+        cause = f"input {', '.join(bad)} is not a finite number" if bad else "the solution diverges"
+        return f"state {self._names[self._first_state + state]} is no longer finite after t = {time:.6g} s: {cause}"
+
+    def _refresh(self):
+        if self._phase < STEPPING and self._parameters_changed:
+            self._kernel.initialise(self._address)
+            self._parameters_changed = False
+        self._kernel.outputs(self._address)
+        self._outputs_stale = False
+
+    # -- values ----------------------------------------------------------------------------------
+
+    def get_real(self, vrs):
+        try:
+            if self._outputs_stale:
+                self._refresh()
+            if max(vrs, default=0) >= self._first_derivative:
+                self._kernel.derivatives(self._address)
+            z = self._z
+            return [z[reference] for reference in vrs]
+        except Exception as error:
+            self._fail(f"reading value references {list(vrs)} failed: {error!r}")
+            return [math.nan] * len(vrs)
+
+    def set_real(self, vrs, values):
+        try:
+            z, first, end = self._z, self._first_input, self._first_state
+            for reference, value in zip(vrs, values):
+                if first <= reference < end:
+                    z[reference] = value
+                else:
+                    self._set_guarded(reference, value, "Real")
+            self._outputs_stale = True
+        except Exception as error:
+            self._fail(f"setting value references {list(vrs)} failed: {error!r}")
+
+    def get_integer(self, vrs):
+        return [int(value) for value in self._get_discrete(vrs)]
+
+    def get_boolean(self, vrs):
+        return [value != 0.0 for value in self._get_discrete(vrs)]
+
+    def _get_discrete(self, vrs):
+        if all(0 <= reference < self._first_calculated for reference in vrs):
+            return [self._z[reference] for reference in vrs]
+        self._fail(f"value references {list(vrs)}: there is no Integer or Boolean variable among them")
+        return [0.0] * len(vrs)
+
+    def set_integer(self, vrs, values):
+        self._set_discrete(vrs, values, "Integer")
+
+    def set_boolean(self, vrs, values):
+        self._set_discrete(vrs, values, "Boolean")
+
+    def _set_discrete(self, vrs, values, kind):
+        try:
+            for reference, value in zip(vrs, values):
+                self._set_guarded(reference, float(value), kind)
+            self._outputs_stale = True
+        except Exception as error:
+            self._fail(f"setting value references {list(vrs)} failed: {error!r}")
+
+    def get_string(self, vrs):
+        self._fail("this FMU has no String variables")
+        return [""] * len(vrs)
+
+    def set_string(self, vrs, values):
+        self._fail("this FMU has no String variables")
+
+    def _set_guarded(self, reference, value, kind):
+        """Set a parameter within its bounds, or a state of a running instance (our extension of FMI)."""
+        if 0 <= reference < self._first_calculated:
+            self._set_parameter(reference, value, kind)
+        elif self._first_state <= reference < self._first_output and kind == "Real":
+            if self._phase != STEPPING:
+                self._fail(f"state {self._names[reference]} can be set only after initialisation, which computes it")
+            self._z[reference] = value
+        elif 0 <= reference < len(self._names):
+            self._fail(f"{self._names[reference]} is computed by the FMU and cannot be set")
+        else:
+            self._fail(f"there is no variable with value reference {reference}")
+
+    def _set_parameter(self, reference, value, kind):
+        name = self._names[reference]
+        declared, minimum, maximum, tunable = self._parameters[reference]
+        if kind != declared:
+            self._fail(f"parameter {name} is of type {declared}, not {kind}")
+        elif self._phase >= STEPPING and not tunable:
+            self._fail(f"parameter {name} is fixed; it can be set only before the end of initialisation")
+        elif not math.isfinite(value):
+            self._fail(f"parameter {name} = {value}; it must be a finite number")
+        elif minimum is not None and value < minimum:
+            self._fail(f"parameter {name} = {value:g}; it must be at least {minimum:g}")
+        elif maximum is not None and value > maximum:
+            self._fail(f"parameter {name} = {value:g}; it must be at most {maximum:g}")
+        else:
+            self._z[reference] = value
+            self._parameters_changed = True
+            self._step_size = 0.0  # internal_step may be what changed
+
+    # -- state -----------------------------------------------------------------------------------
+
+    def _get_fmu_state(self):
+        """Everything that this instance is, as bytes: identity, phase, variables."""
+        if self._outputs_stale and self._phase < STEPPING:
+            self.get_real([])
+        return self._identity + bytes((self._phase, self._parameters_changed)) + bytes(self._z)
+
+    def _set_fmu_state(self, state):
+        if len(state) != 18 + ctypes.sizeof(self._z) or state[:16] != self._identity:
+            self._fail("the FMU state to restore was not saved by this FMU")
+            return
+        self._phase, self._parameters_changed = state[16], bool(state[17])
+        ctypes.memmove(self._z, state[18:], ctypes.sizeof(self._z))
+        self._outputs_stale, self._step_size, self._failure = True, 0.0, None
+
+    @staticmethod
+    def _fmu_state_to_bytes(state):
+        return state
+
+    @staticmethod
+    def _fmu_state_from_bytes(state):
+        return bytes(state)

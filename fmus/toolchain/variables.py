@@ -1,0 +1,95 @@
+"""What a model tells the world about each of its quantities: declared once, used everywhere.
+
+A declaration becomes a line of the modelDescription, a row of the README's table, the bounds that
+the slave enforces and the unit that a case file is checked against.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+VariableType = Literal["Real", "Integer", "Boolean"]
+
+UNITS: dict[str, dict[str, float]] = {
+    # unit -> exponents of SI base units, with the factor to them (FMI 2.0, section 2.2.2)
+    "1": {},
+    "pu": {},
+    "pu/s": {"s": -1},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "s": {"s": 1},
+    "1/s": {"s": -1},
+    "Hz": {"s": -1},
+    "MVA": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
+    "MW": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
+    "Mvar": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A named quantity with its unit.
+
+    Parameters
+    ----------
+    name
+        Dotted name, as the FMU shows it.
+    unit
+        One of `UNITS`.
+    description
+        One sentence; for per-unit quantities it is followed by the base.
+    base
+        What 1 pu is, for the unit ``pu``: ``"S_n"`` (the device's rating) or ``"100 MVA"``.
+    """
+
+    name: str
+    unit: str
+    description: str
+    base: str = ""
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS:
+            raise ValueError(
+                f"variable {self.name!r} has the unit {self.unit!r}, which is not declared; "
+                f"use one of {', '.join(sorted(UNITS))} or add it to UNITS"
+            )
+        if self.unit == "pu" and not self.base:
+            raise ValueError(f"variable {self.name!r} is in pu and names no base; add base='S_n' or '100 MVA'")
+
+    @property
+    def text(self) -> str:
+        """The description with its base."""
+        return f"{self.description} [pu, base {self.base}]" if self.base else self.description
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Variable):
+    """A quantity that the user sets: before initialisation, or (``tunable``) at any communication point."""
+
+    start: float = 0.0
+    minimum: float | None = None
+    maximum: float | None = None
+    tunable: bool = False
+    type: VariableType = "Real"
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CalculatedParameter(Variable):
+    """A quantity computed from fixed parameters at initialisation, such as a set-point of the operating point."""
+
+
+@dataclass(frozen=True, slots=True)
+class Input(Variable):
+    """A quantity that the master sets at communication points and that is held in between."""
+
+    start: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class State(Variable):
+    """A continuous state; its initial value is computed from the parameters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Output(Variable):
+    """A function of states and inputs, evaluated when it is read."""

@@ -1,0 +1,92 @@
+"""Electrical side of the converter: LC filter and step-up transformer, in the converter's frame.
+
+Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the converter's frequency [pu].
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor, QdState, power, qd_state
+from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.port import DevicePort
+
+APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"
+STAMP = "STAMP toolbox of the paper's group"
+
+
+@dataclass(frozen=True)
+class SteadyState:
+    """The operating point of the electrical side, in the converter's frame, from the power flow."""
+
+    theta: ca.SX
+    u: Phasor
+    i_s: Phasor
+    i_g: Phasor
+    v_c: Phasor
+    s: Phasor
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Parameters, states and algebraic quantities of the electrical side.
+
+    ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
+    """
+
+    R_c: ca.SX
+    X_c: ca.SX
+    B_c: ca.SX
+    R_t: ca.SX
+    X_t: ca.SX
+    R_cap: ca.SX
+    i_s: QdState
+    u_c: QdState
+    i_g: QdState
+    u: Phasor
+    initial: SteadyState
+
+
+def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
+    """Declare parameters and states; the equations follow once the control has formed v_c."""
+    with m.scope("filter"):
+        R_c = m.parameter("R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX)
+        X_c = m.parameter("X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=0.01, source=APPENDIX)
+        B_c = m.parameter("B_c", 0.15, "pu", "Capacitor susceptance", base="S_n", minimum=0.01, source=APPENDIX)
+    with m.scope("transformer"):
+        R_t = m.parameter("R_t", 0.002, "pu", "Resistance", base="S_n", minimum=0.0, source=STAMP)
+        X_t = m.parameter("X_t", 0.15, "pu", "Reactance", base="S_n", minimum=0.01, source="paper, case study 1")
+
+    # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
+    R_cap = 1 / (30 * B_c)
+    start = _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap)
+    u_c_start = start.u - (start.i_s - start.i_g) * R_cap
+    with m.scope("filter"):
+        i_s = qd_state(m, "i_s", start.i_s, "Current of the converter-side inductor")
+        u_c = qd_state(m, "u_c", u_c_start, "Capacitor voltage")
+    with m.scope("transformer"):
+        i_g = qd_state(m, "i_g", start.i_g, "Current into the grid")
+    u = u_c.value + R_cap * (i_s.value - i_g.value)
+    return Filter(R_c, X_c, B_c, R_t, X_t, R_cap, i_s, u_c, i_g, u, start)
+
+
+def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: ca.SX, w: ca.SX) -> None:
+    """Voltage over each inductor and current into the capacitor; ``v_c`` is the converter's own voltage."""
+    v_bus = port.v.rotated(-theta)
+    i_s, u_c, i_g = f.i_s.value, f.u_c.value, f.i_g.value
+    f.i_s.set_derivative(m, (v_c - f.u - Phasor(f.R_c, w * f.X_c) * i_s) * (port.omega_b / f.X_c))
+    f.u_c.set_derivative(m, (i_s - i_g - Phasor(0, w * f.B_c) * u_c) * (port.omega_b / f.B_c))
+    f.i_g.set_derivative(m, (f.u - v_bus - Phasor(f.R_t, w * f.X_t) * i_g) * (port.omega_b / f.X_t))
+
+
+def _steady_state(
+    port: DevicePort, R_c: ca.SX, X_c: ca.SX, B_c: ca.SX, R_t: ca.SX, X_t: ca.SX, R_cap: ca.SX
+) -> SteadyState:
+    u_network = port.v_0 + Phasor(R_t, X_t) * port.i_0
+    theta = u_network.angle()
+    u = Phasor(u_network.magnitude(), 0)
+    i_g = port.i_0.rotated(-theta)
+    u_c = u / Phasor(1, R_cap * B_c)
+    i_s = i_g + Phasor(0, B_c) * u_c
+    v_c = u + Phasor(R_c, X_c) * i_s
+    return SteadyState(theta, u, i_s, i_g, v_c, power(u, i_g))

@@ -1,0 +1,70 @@
+"""Inner control: voltage PI around current PI, with lagged feed-forwards and a limit on the current reference."""
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor, QdState, qd_state
+from fmus.toolchain.model import ModelBuilder
+from gfor_fmu.filter import APPENDIX, Filter
+
+LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"
+
+
+def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Phasor) -> Phasor:
+    """Declare both loops and return the voltage that the converter applies [pu, S_n]."""
+    start = f.initial
+    u_lagged, i_g_lagged = _feed_forwards(m, f)
+    with m.scope("voltage_control"):
+        tau = m.parameter("tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX)
+        xi = m.parameter("xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX)
+        i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
+        i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
+        C_c = f.B_c / omega_b
+        omega_n = 4 / (tau * xi)
+        k_p = 2 * xi * omega_n * C_c * 100  # the factor 100 is the paper's
+        k_i = omega_n**2 * C_c
+        x = qd_state(m, "x", start.i_s - Phasor(0, f.B_c) * start.u - start.i_g, "Integrator of the voltage loop")
+        error = u_ref - f.u
+        demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
+        i_ref = demanded.clamped(i_q_max, i_d_max)
+        _integrate_unless_clamped(m, x, k_i * error, demanded, i_q_max, i_d_max)
+        m.require(
+            i_q_max - ca.fabs(start.i_s.re),
+            "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
+        )
+        m.require(
+            i_d_max - ca.fabs(start.i_s.im),
+            "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
+        )
+    with m.scope("current_control"):
+        tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX)
+        L_c = f.X_c / omega_b
+        i_s = f.i_s.value
+        x = qd_state(m, "x", start.v_c - Phasor(0, f.X_c) * start.i_s - start.u, "Integrator of the current loop")
+        error = i_ref - i_s
+        x.set_derivative(m, f.R_c / tau * error)
+        return L_c / tau * error + x.value + Phasor(0, w * f.X_c) * i_s + u_lagged
+
+
+def _feed_forwards(m: ModelBuilder, f: Filter) -> tuple[Phasor, Phasor]:
+    """Lagged capacitor voltage, and lagged grid current."""
+    with m.scope("feed_forward"):
+        tau = m.parameter("tau", 1e-4, "s", "Lag of both feed-forwards", minimum=1e-5, source=APPENDIX)
+        m.require(2.5 * tau - m.internal_step, "internal_step must be shorter than 2.5 times feed_forward.tau")
+        u = qd_state(m, "u", f.initial.u, "Lagged capacitor voltage")
+        i_g = qd_state(m, "i_g", f.initial.i_g, "Lagged grid current")
+        u.set_derivative(m, (f.u - u.value) / tau)
+        i_g.set_derivative(m, (f.i_g.value - i_g.value) / tau)
+    return u.value, i_g.value
+
+
+def _integrate_unless_clamped(
+    m: ModelBuilder, x: QdState, rate: Phasor, demanded: Phasor, i_q_max: ca.SX, i_d_max: ca.SX
+) -> None:
+    """Freeze each component of the integrator while that component of the reference is at its limit."""
+    x.set_derivative(
+        m,
+        Phasor(
+            ca.if_else(ca.fabs(demanded.re) < i_q_max, rate.re, 0),
+            ca.if_else(ca.fabs(demanded.im) < i_d_max, rate.im, 0),
+        ),
+    )
