@@ -1,0 +1,1 @@
+"""Analysis of a coupled system: operating point, linear model by perturbation, modes, identification."""

@@ -1,0 +1,69 @@
+"""The state of the whole coupled system as one vector, and its step map as a function of it."""
+
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.component_linearization import Matrix, StateAccess
+from orchestrator.coupling.master import Master
+
+
+class CoupledState:
+    """States of all components, with a way to try a step from any of them and come back.
+
+    Parameters
+    ----------
+    master
+        A running system whose components let their states be set.
+
+    Raises
+    ------
+    AnalysisError
+        If a component does not.
+    """
+
+    def __init__(self, master: Master) -> None:
+        self._master = master
+        self._access = {name: StateAccess(component) for name, component in master.components.items()}
+
+    def read(self) -> Matrix:
+        """All states, shape (n,), in the order of the components."""
+        return np.concatenate([access.read() for access in self._access.values()])
+
+    def write(self, x: Matrix) -> None:
+        """Set all states and make every output consistent with them."""
+        first = 0
+        for access in self._access.values():
+            last = first + len(access.batch.names)
+            access.write(x[first:last])
+            first = last
+        self.settle()
+
+    def settle(self) -> None:
+        """Exchange outputs until they stop changing; two passes do, unless feed-through is chained."""
+        for _ in range(2):
+            for name in [name for group in self._master.schedule.groups for name in group]:
+                self._master.exchange_inputs(name)
+                self._master.exchanges[name].outputs.read()
+
+    def step_from(self, x: Matrix) -> Matrix:
+        """States one communication step after ``x``; the system is put back where it was."""
+        saved, y, index = self._save()
+        try:
+            self.write(x)
+            self._master.advance(1)
+            return self.read()
+        finally:
+            self._restore(saved, y, index)
+
+    def _save(self) -> tuple[dict[str, Any], Matrix, int]:
+        master = self._master
+        return {n: c.save_state() for n, c in master.components.items()}, master.y.copy(), master.index
+
+    def _restore(self, saved: dict[str, Any], y: Matrix, index: int) -> None:
+        master = self._master
+        for name, component in master.components.items():
+            component.restore_state(saved[name])
+            component.free_state(saved[name])
+        master.y[:] = y
+        master.index = index

@@ -1,0 +1,90 @@
+"""Modes seen in a recorded signal: the matrix pencil method.
+
+Hua and Sarkar, "Matrix pencil method for estimating parameters of exponentially damped/undamped
+sinusoids in noise", IEEE Trans. ASSP 38(5), 1990.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import AnalysisError
+
+_MAX_SAMPLES = 1200
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifiedMode:
+    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal]."""
+
+    eigenvalue: complex
+    amplitude: float
+
+    @property
+    def frequency_hz(self) -> float:
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping_percent(self) -> float:
+        return -100 * self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
+
+
+def identify_modes(
+    times: NDArray[np.float64],
+    signal: NDArray[np.float64],
+    *,
+    tolerance: float = 1e-6,
+    max_order: int = 24,
+    highest_hz: float = 10.0,
+) -> list[IdentifiedMode]:
+    """Write a signal as a sum of damped exponentials.
+
+    Parameters
+    ----------
+    times, signal
+        Shape (n,); equally spaced samples of a free response, [s] and any unit.
+    tolerance
+        Singular values below this fraction of the largest are taken for noise.
+    max_order
+        Most exponentials looked for.
+    highest_hz
+        The signal is thinned to ten samples per period of this frequency.
+
+    Returns
+    -------
+    list of IdentifiedMode
+        One of each conjugate pair, largest amplitude first.
+
+    Raises
+    ------
+    AnalysisError
+        If the signal is shorter than 20 samples or constant.
+    """
+    step = times[1] - times[0] if len(times) > 1 else 0.0
+    thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
+    y, interval = signal[::thin], step * thin
+    if len(y) < 20 or np.ptp(y) == 0:
+        raise AnalysisError(
+            f"no mode can be identified in a {'constant signal' if len(y) >= 20 else f'signal of {len(y)} samples'}; "
+            "record a longer response to an event"
+        )
+    pencil = len(y) // 3
+    hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
+    _, singular, right = np.linalg.svd(hankel, full_matrices=False)
+    order = min(int((singular > tolerance * singular[0]).sum()), max_order)
+    basis = right[:order].T
+    multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])
+    vandermonde = multipliers[None, :] ** np.arange(len(y))[:, None]
+    residues = np.linalg.lstsq(vandermonde, y.astype(complex), rcond=None)[0]
+    modes = [
+        IdentifiedMode(complex(np.log(mu) / interval), float(abs(r)))
+        for mu, r in zip(multipliers, residues, strict=True)
+        if mu.imag >= 0 and abs(mu) > 1e-6
+    ]
+    return sorted(modes, key=lambda m: -m.amplitude)
+
+
+def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:
+    """The identified mode closest to an eigenvalue [rad/s]."""
+    return min(modes, key=lambda m: abs(m.eigenvalue - eigenvalue), default=None)

@@ -1,0 +1,103 @@
+"""Modes of a linear model: eigenvalues, damping ratio, frequency, participation factors, mode shapes."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from orchestrator.analysis.linearization import LinearModel
+
+_DEAD = 1e-9
+"""A multiplier of the step map smaller than this belongs to what decays within one step, not to a mode."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One eigenvalue λ [rad/s] with its participation factors and its shape.
+
+    Attributes
+    ----------
+    participation
+        Factor of every state, largest first; the factors of a mode sum to 1.
+    shape
+        Right eigenvector by state name, scaled so that its largest element is 1.
+    """
+
+    eigenvalue: complex
+    participation: tuple[tuple[str, float], ...]
+    shape: dict[str, complex]
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ/2π."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """−Re λ/|λ|; 0 for λ = 0."""
+        size = abs(self.eigenvalue)
+        return -self.eigenvalue.real / size if size else 0.0
+
+    @property
+    def damping_percent(self) -> float:
+        return 100 * self.damping_ratio
+
+    def participation_of(self, states: Iterable[str]) -> float:
+        """Sum of the factors of some states."""
+        wanted = set(states)
+        return sum(factor for name, factor in self.participation if name in wanted)
+
+
+def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
+    """All eigenvalues [rad/s] without eigenvectors; ln(μ)/H for a step map."""
+    values = np.asarray(np.linalg.eigvals(model.A), dtype=complex)
+    return _continuous(values, model)[0]
+
+
+def find_modes(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
+    """Modes with a frequency in a range, one of each conjugate pair, least damped first.
+
+    Parameters
+    ----------
+    model
+        Step map or continuous matrix.
+    lowest_hz, highest_hz
+        Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
+    """
+    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
+    lambdas, alive = _continuous(values, model)
+    left, right = left[:, alive], right[:, alive]
+    chosen = [
+        k
+        for k, value in enumerate(lambdas)
+        if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
+    ]
+    modes = [_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
+    return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
+
+
+def most_associated(modes: Iterable[Mode], states: Iterable[str]) -> Mode | None:
+    """The mode in which some states together take part most; None if there are no modes."""
+    wanted = tuple(states)
+    return max(modes, key=lambda mode: mode.participation_of(wanted), default=None)
+
+
+def _continuous(values: NDArray[np.complex128], model: LinearModel) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+    if model.step_size is None:
+        return values, np.ones(len(values), dtype=bool)
+    alive = np.abs(values) > _DEAD
+    return np.log(values[alive]) / model.step_size, alive
+
+
+def _mode(value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]) -> Mode:
+    factors = np.abs(left.conj() * right)
+    factors /= factors.sum()
+    order = np.argsort(-factors)
+    shape = right / right[np.argmax(np.abs(right))]
+    return Mode(
+        complex(value),
+        tuple((names[k], float(factors[k])) for k in order),
+        dict(zip(names, shape.tolist(), strict=True)),
+    )

@@ -1,0 +1,1 @@
+"""Coupling of FMUs: systems, schedules, the clock, events, observers, and the master that runs them."""

@@ -1,0 +1,42 @@
+"""Time as an integer number of communication steps: it never drifts and events hit their step exactly."""
+
+from dataclasses import dataclass
+
+from orchestrator.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Communication points t = k·H.
+
+    Raises
+    ------
+    InputError
+        If the step size does not exceed 0.
+    """
+
+    step_size: float
+
+    def __post_init__(self) -> None:
+        if not self.step_size > 0:
+            raise InputError(f"communication step size {self.step_size!r} s: it must exceed 0")
+
+    def time(self, index: int) -> float:
+        """Time [s] of a communication point."""
+        return index * self.step_size
+
+    def index(self, time: float, what: str) -> int:
+        """Communication point at a time [s].
+
+        Raises
+        ------
+        InputError
+            If the time lies between two communication points, or before 0.
+        """
+        index = round(time / self.step_size)
+        if index < 0 or abs(time - self.time(index)) > 1e-6 * self.step_size:
+            raise InputError(
+                f"{what} at {time:g} s is not a communication point; with steps of {self.step_size:g} s the nearest is "
+                f"{self.time(max(index, 0)):g} s"
+            )
+        return index

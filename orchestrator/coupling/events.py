@@ -1,0 +1,75 @@
+"""Events at given times. Each says in the field's words what happens and comes down to variables that are set."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happens at a communication point, before the step that starts there.
+
+    Parameters
+    ----------
+    time
+        [s]
+    component
+        Whose variables are set.
+    """
+
+    time: float
+    component: str
+
+    def settings(self) -> Mapping[str, float | bool]:
+        """Variables of the component with their new values."""
+        raise TypeError(f"{type(self).__name__} is not a kind of event of its own")
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{self.component}.{name} = {value:g}" for name, value in self.settings().items())
+        return f"t = {self.time:g} s: {values}"
+
+
+@dataclass(frozen=True, slots=True)
+class LoadChange(Event):
+    """A load takes ``scale`` times its power: conductance and susceptance together."""
+
+    load: str
+    scale: float
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {f"{self.load}.scale": self.scale}
+
+
+@dataclass(frozen=True, slots=True)
+class BranchChange(Event):
+    """A line takes other values of X and, if given, R [pu]."""
+
+    line: str
+    X: float
+    R: float | None = None
+
+    def settings(self) -> Mapping[str, float | bool]:
+        values = {f"X_{self.line}": self.X}
+        return values if self.R is None else values | {f"R_{self.line}": self.R}
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceChange(Event):
+    """A reference moves by ``delta`` from its operating point: ``reference`` is e.g. ``exciter.V_ref``."""
+
+    reference: str
+    delta: float
+
+    def settings(self) -> Mapping[str, float | bool]:
+        scope, _, name = self.reference.rpartition(".")
+        return {f"{scope}.delta_{name}" if scope else f"delta_{name}": self.delta}
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterChange(Event):
+    """A tunable parameter, or an input that nothing feeds, takes a value."""
+
+    parameter: str
+    value: float | bool
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {self.parameter: self.value}

@@ -1,0 +1,300 @@
+"""The master: brings FMUs to life, exchanges their values, and steps them along a schedule."""
+
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from shutil import rmtree
+from time import perf_counter
+from types import TracebackType
+from typing import Self
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.events import Event
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
+from orchestrator.coupling.system import System
+from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.component import Component, RealBatch
+
+_INITIAL_PASSES = 20
+_TIMED_EVERY = 100
+"""One communication step in so many is timed call by call, for the statistics."""
+
+
+class ComponentExchange:
+    """The coupled inputs and outputs of one component.
+
+    Attributes
+    ----------
+    inputs, outputs
+        Batches of the connected variables. The outputs' values are a window of the system's vector y.
+    sources
+        For each input the index in y of the output that feeds it.
+    """
+
+    def __init__(self, component: Component, inputs: RealBatch, outputs: RealBatch, sources: NDArray[np.intp]) -> None:
+        self.component, self.inputs, self.outputs, self.sources = component, inputs, outputs, sources
+
+
+class Master:
+    """A running system; use it as a context manager, so that every FMU is released.
+
+    Parameters
+    ----------
+    system
+        Components and connections; every input must be fed or constant.
+    schedule
+        Order of the components within a communication step.
+    step_size
+        Communication step H [s].
+    stop_time
+        Told to the FMUs at set-up [s].
+
+    Attributes
+    ----------
+    index, time
+        Number of communication steps done, and the time [s] reached.
+    y
+        All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+
+    Raises
+    ------
+    InputError
+        If an input is fed by nothing, or the schedule does not fit the components.
+    ComponentError
+        If an FMU cannot be instantiated or initialised.
+    """
+
+    def __init__(self, system: System, schedule: Schedule, step_size: float, stop_time: float | None = None) -> None:
+        open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
+        if open_inputs:
+            raise InputError(f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value")
+        schedule.check(set(system.components))
+        self.system, self.schedule, self.clock = system, schedule, Clock(step_size)
+        self.index = 0
+        self.components: dict[str, Component] = {}
+        self._release = ExitStack()
+        self._timed_seconds = dict.fromkeys(system.components, 0.0)
+        self._timed_steps, self._timed_total = 0, 0.0
+        try:
+            self._instantiate(stop_time)
+            self.exchanges = self._connect()
+            self._initialise()
+        except BaseException:
+            self.close()
+            raise
+        self._plan = [[self._calls(self.exchanges[name]) for name in group] for group in schedule.groups]
+
+    # -- life cycle ------------------------------------------------------------------------------
+
+    def _instantiate(self, stop_time: float | None) -> None:
+        folders: dict[Path, Path] = {}
+        for name, plan in self.system.components.items():
+            path = plan.description.path
+            if path not in folders:
+                folders[path] = Path(fmpy.extract(str(path)))
+                self._release.callback(rmtree, folders[path], ignore_errors=True)
+            component = self._release.enter_context(Component(name, plan.description, folders[path]))
+            self.components[name] = component
+            component.set(plan.parameters)
+            component.setup(0.0, stop_time)
+
+    def _connect(self) -> dict[str, ComponentExchange]:
+        sources = list(dict.fromkeys(c.source for c in self.system.connections))
+        sources.sort(key=lambda s: list(self.components).index(s.component))
+        self.output_names = tuple(str(s) for s in sources)
+        self.y = np.zeros(len(sources))
+        exchanges = {}
+        for name, component in self.components.items():
+            window = [i for i, s in enumerate(sources) if s.component == name]
+            feeding = [c for c in self.system.connections if c.target.component == name]
+            values = self.y[window[0] : window[-1] + 1] if window else np.zeros(0)
+            exchanges[name] = ComponentExchange(
+                component,
+                RealBatch(component, [c.target.variable for c in feeding]),
+                RealBatch(component, [sources[i].variable for i in window], values),
+                np.array([sources.index(c.source) for c in feeding], dtype=np.intp),
+            )
+        return exchanges
+
+    def _initialise(self) -> None:
+        """Initialise all FMUs together: outputs are propagated until nothing changes any more."""
+        for name, component in self.components.items():
+            component.enter_initialization_mode()
+            component.set(self.system.components[name].inputs)
+        for _ in range(_INITIAL_PASSES):
+            before = self.y.copy()
+            for group in self.schedule.groups:
+                for name in group:
+                    self.exchange_inputs(name)
+                    self.exchanges[name].outputs.read()
+            if np.allclose(before, self.y, rtol=0, atol=1e-14):
+                break
+        for name, component in self.components.items():
+            self.exchange_inputs(name)
+            component.exit_initialization_mode()
+        for exchange in self.exchanges.values():
+            exchange.outputs.read()
+
+    def close(self) -> None:
+        """Terminate and free every FMU; calling it again does nothing."""
+        self._release.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    # -- single steps ----------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        return self.clock.time(self.index)
+
+    def exchange_inputs(self, name: str) -> None:
+        """Send a component the newest outputs of its partners."""
+        exchange = self.exchanges[name]
+        if len(exchange.sources):
+            np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
+            exchange.inputs.write()
+
+    @staticmethod
+    def _calls(exchange: ComponentExchange) -> tuple[object, ...]:
+        component = exchange.component
+        return (
+            component,
+            exchange.sources if len(exchange.sources) else None,
+            exchange.inputs.values,
+            component.set_real,
+            exchange.inputs.arguments,
+            component.do_step,
+            component.pointer,
+            component.get_real,
+            exchange.outputs.arguments if len(exchange.outputs.names) else None,
+        )
+
+    def advance(self, count: int) -> None:
+        """Do ``count`` communication steps and nothing else.
+
+        Raises
+        ------
+        ComponentError
+            With the time of the step that failed; ``index`` counts the steps that were completed.
+        """
+        y, step_size, take = self.y, self.clock.step_size, np.take
+        for index in range(self.index, self.index + count):
+            time = index * step_size
+            for group in self._plan:
+                for component, sources, values, set_real, inputs, do_step, pointer, _, _ in group:
+                    if sources is not None:
+                        take(y, sources, out=values, mode="clip")
+                        status = set_real(*inputs)
+                        if status > 1:
+                            component.check(status, "fmi2SetReal", time)
+                    status = do_step(pointer, time, step_size, 1)
+                    if status > 1:
+                        component.check(status, "fmi2DoStep", time)
+                for component, _, _, _, _, _, _, get_real, outputs in group:
+                    if outputs is not None:
+                        status = get_real(*outputs)
+                        if status > 1:
+                            component.check(status, "fmi2GetReal", time)
+            self.index = index + 1
+
+    def _timed_step(self) -> None:
+        """`advance(1)` with a stop-watch on every FMI call."""
+        begin, time, step_size = perf_counter(), self.time, self.clock.step_size
+        for group in self.schedule.groups:
+            for name in group:
+                exchange = self.exchanges[name]
+                component = exchange.component
+                np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
+                start = perf_counter()
+                if len(exchange.sources):
+                    exchange.inputs.write()
+                component.step(time, step_size)
+                self._timed_seconds[name] += perf_counter() - start
+            for name in group:
+                exchange = self.exchanges[name]
+                if exchange.outputs.names:
+                    start = perf_counter()
+                    exchange.outputs.read()
+                    self._timed_seconds[name] += perf_counter() - start
+        self.index += 1
+        self._timed_steps += 1
+        self._timed_total += perf_counter() - begin
+
+    # -- runs ------------------------------------------------------------------------------------
+
+    def run(self, stop_time: float, events: Sequence[Event] = (), observers: Sequence[Observer] = ()) -> StepStatistics:
+        """Step until a time [s].
+
+        An event happens at its communication point before the step that starts there, and the
+        outputs of its component are read again, so that its partners see the change at once.
+
+        Raises
+        ------
+        InputError
+            If the stop time or an event is not at a communication point.
+        ComponentError
+            If an FMU fails; observers are ended first, so nothing recorded is lost.
+        """
+        stop = self.clock.index(stop_time, "the stop")
+        due: dict[int, list[Event]] = {}
+        for event in events:
+            due.setdefault(self.clock.index(event.time, "an event"), []).append(event)
+        first, start = self.index, perf_counter()
+        stops = sorted({stop, *(i for i in due if first <= i < stop)})
+        begun: list[Observer] = []
+        try:
+            for observer in observers:
+                observer.begin(self, stop)
+                begun.append(observer)
+                observer.observe(self)
+            for target in stops:
+                self._run_to(target, first, observers)
+                if target < stop:
+                    self._apply(due[target])
+        except ComponentError as error:
+            if error.time is None:
+                raise ComponentError(error.component, error.call, error.status, error.log, self.time) from error
+            raise
+        finally:
+            for observer in begun:
+                observer.end(self)
+        return self.statistics(self.index - first, perf_counter() - start)
+
+    def _run_to(self, target: int, first: int, observers: Iterable[Observer]) -> None:
+        """Step to a communication point, stopping only where an observer looks."""
+        while self.index < target:
+            done = self.index - first
+            stretch = min([target - self.index, _TIMED_EVERY - done % _TIMED_EVERY] + [o.every - done % o.every for o in observers])
+            if done % _TIMED_EVERY == 0:
+                self._timed_step()
+                stretch -= 1
+            self.advance(stretch)
+            done = self.index - first
+            for observer in observers:
+                if done % observer.every == 0:
+                    observer.observe(self)
+
+    def _apply(self, events: Sequence[Event]) -> None:
+        for event in events:
+            self.components[event.component].set(event.settings())
+            self.exchanges[event.component].outputs.read()
+
+    def statistics(self, steps: int, seconds: float) -> StepStatistics:
+        """Share of every component, from the timed steps."""
+        total = self._timed_total or 1.0
+        timed = max(1, self._timed_steps)
+        components = tuple(
+            ComponentStatistics(name, steps, spent / timed * steps, spent / total)
+            for name, spent in self._timed_seconds.items()
+        )
+        return StepStatistics(steps, seconds, components)

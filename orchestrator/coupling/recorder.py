@@ -1,0 +1,67 @@
+"""Recording of variables at regular communication points."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import InputError
+from orchestrator.fmi.component import RealBatch
+
+if TYPE_CHECKING:
+    from orchestrator.coupling.master import Master
+
+
+class Recorder:
+    """Records variables named ``component.variable``.
+
+    Attributes
+    ----------
+    times
+        [s], shape (n,).
+    values
+        Shape (n, number of names), in the order of ``names``; only what was reached before a failure.
+    """
+
+    def __init__(self, names: Sequence[str], every: int) -> None:
+        self.names = tuple(names)
+        self.every = every
+        self._count = 0
+        self._times = np.empty(0)
+        self._values = np.empty((0, len(self.names)))
+        self._batches: list[tuple[RealBatch, NDArray[np.intp]]] = []
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        return self._times[: self._count]
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        return self._values[: self._count]
+
+    def begin(self, master: "Master", stop_index: int) -> None:
+        by_component: dict[str, list[tuple[int, str]]] = {}
+        for column, name in enumerate(self.names):
+            component, _, variable = name.partition(".")
+            if component not in master.components or variable not in master.components[component].description.variables:
+                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
+            by_component.setdefault(component, []).append((column, variable))
+        self._batches = [
+            (RealBatch(master.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))
+            for component, entries in by_component.items()
+        ]
+        rows = (stop_index - master.index) // self.every + 2
+        self._count = 0
+        self._times = np.empty(rows)
+        self._values = np.empty((rows, len(self.names)))
+
+    def observe(self, master: "Master") -> None:
+        self._times[self._count] = master.time
+        row = self._values[self._count]
+        for batch, columns in self._batches:
+            row[columns] = batch.read()
+        self._count += 1
+
+    def end(self, master: "Master") -> None:
+        """Nothing to do: what was recorded stays."""

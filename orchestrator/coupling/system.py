@@ -1,0 +1,104 @@
+"""A system on paper: components, the connections between them, and what their variables start from."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """One variable of one component."""
+
+    component: str
+    variable: str
+
+    def __str__(self) -> str:
+        return f"{self.component}.{self.variable}"
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """An output that feeds an input."""
+
+    source: Endpoint
+    target: Endpoint
+
+
+@dataclass
+class ComponentPlan:
+    """An FMU and the values it is given before initialisation."""
+
+    description: FmuDescription
+    parameters: dict[str, float | bool] = field(default_factory=dict)
+    inputs: dict[str, float] = field(default_factory=dict)
+
+
+class System:
+    """Components by name, with checked connections."""
+
+    def __init__(self) -> None:
+        self.components: dict[str, ComponentPlan] = {}
+        self.connections: list[Connection] = []
+
+    def add(
+        self,
+        name: str,
+        description: FmuDescription,
+        parameters: Mapping[str, float | bool] | None = None,
+        inputs: Mapping[str, float] | None = None,
+    ) -> None:
+        """Add a component; ``inputs`` are constants for inputs that nothing feeds.
+
+        Raises
+        ------
+        InputError
+            If the name is taken.
+        """
+        if name in self.components:
+            raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
+        self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}))
+
+    def connect(self, source: str, target: str) -> None:
+        """Connect an output to an input, both written ``component.variable``.
+
+        Raises
+        ------
+        InputError
+            Naming both ends and why they cannot be connected.
+        """
+        label = f"connection {source} → {target}"
+        start, out = self._resolve(source, label)
+        end, into = self._resolve(target, label)
+        if out.causality != "output":
+            raise InputError(f"{label}: {source} is of causality {out.causality}; a connection starts at an output")
+        if into.causality != "input":
+            raise InputError(f"{label}: {target} is of causality {into.causality}; a connection ends at an input")
+        if out.type != "Real" or into.type != "Real":
+            raise InputError(f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled")
+        if out.unit and into.unit and out.unit != into.unit:
+            raise InputError(f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal")
+        feeding = next((c.source for c in self.connections if c.target == end), None)
+        if feeding is not None:
+            raise InputError(f"{label}: {target} is already fed by {feeding}; an input takes one connection")
+        self.connections.append(Connection(start, end))
+
+    def _resolve(self, name: str, label: str) -> tuple[Endpoint, VariableInfo]:
+        component, _, variable = name.partition(".")
+        if component not in self.components:
+            known = ", ".join(self.components) or "none"
+            raise InputError(f"{label}: there is no component {component!r}; components: {known}")
+        info = self.components[component].description.variables.get(variable)
+        if info is None:
+            raise InputError(f"{label}: component {component!r} has no variable {variable!r}; `gfor info` lists them")
+        return Endpoint(component, variable), info
+
+    def unconnected_inputs(self) -> Iterator[Endpoint]:
+        """Inputs that neither a connection nor a constant feeds."""
+        fed = {c.target for c in self.connections}
+        for name, plan in self.components.items():
+            for variable in plan.description.inputs:
+                endpoint = Endpoint(name, variable)
+                if endpoint not in fed and variable not in plan.inputs:
+                    yield endpoint

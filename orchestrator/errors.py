@@ -1,0 +1,54 @@
+"""The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class CosimError(Exception):
+    """Base of all errors that are the user's to mend; the command line prints them without a traceback."""
+
+    exit_code = 1
+
+
+class InputError(CosimError):
+    """Something given to the program cannot be used; nothing was run."""
+
+    exit_code = 2
+
+
+class FmuFileError(InputError):
+    """A file is not an FMU that can be loaded here."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One mistake in a case: its place, and what is wrong with the remedy."""
+
+    place: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.text}" if self.place else self.text
+
+
+class CaseError(InputError):
+    """A case cannot be used; all its mistakes are listed together."""
+
+    def __init__(self, source: str, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
+        super().__init__(f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems))
+
+
+class ComponentError(CosimError):
+    """A running FMU refused a call; the message carries the FMU's own log text."""
+
+    def __init__(self, component: str, call: str, status: str, log: str, time: float | None = None) -> None:
+        self.component, self.call, self.status, self.log, self.time = component, call, status, log, time
+        when = "" if time is None else f" at t = {time:.6g} s"
+        said = log or "the FMU logged no text"
+        super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}")
+
+
+class AnalysisError(CosimError):
+    """An operating point or a linear model cannot be computed."""

@@ -1,0 +1,1 @@
+"""FMUs: what their files declare, and one running instance."""

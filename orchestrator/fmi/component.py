@@ -1,0 +1,229 @@
+"""One running FMU: FMI 2.0 calls on preallocated arguments, with the FMU's own words in every error."""
+
+import ctypes
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import fmpy
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from numpy.typing import NDArray
+
+from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.description import FmuDescription
+
+STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
+_ERROR = 3
+_LOG_LENGTH = 50
+
+try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms
+    from fmpy.logging import addLoggerProxy
+except (ImportError, OSError):
+    addLoggerProxy = None
+
+
+class RealBatch:
+    """Real variables of one component that are read or written together, without any copying.
+
+    Attributes
+    ----------
+    values
+        Array of shape (n,), the caller's to read or fill.
+    """
+
+    def __init__(self, component: "Component", names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
+        variables = component.description.variables
+        self.names = tuple(names)
+        self.values = np.zeros(len(self.names)) if values is None else values
+        self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
+        self.arguments = (
+            component.pointer,
+            ctypes.addressof(self._references),
+            len(self.names),
+            self.values.ctypes.data,
+        )
+        self._component = component
+
+    def read(self) -> NDArray[np.float64]:
+        """Fetch the values from the FMU."""
+        self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
+        return self.values
+
+    def write(self) -> None:
+        """Send the values to the FMU."""
+        self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
+
+
+class Component:
+    """An instance of an FMU; always released, also after an error.
+
+    Parameters
+    ----------
+    name
+        Name of the instance, used in errors and results.
+    description
+        The FMU.
+    directory
+        Where its archive is extracted; by default a new temporary folder of its own.
+    """
+
+    def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
+        self.name = name
+        self.description = description
+        self._messages: list[tuple[int, str]] = []
+        self._own_directory = None if directory else Path(fmpy.extract(str(description.path)))
+        self._callbacks = self._make_callbacks()
+        self._fmu: Any = None
+        self._initialised = False
+        try:
+            self._fmu = FMU2Slave(
+                guid=description.guid,
+                unzipDirectory=str(directory or self._own_directory),
+                modelIdentifier=description.model_identifier,
+                instanceName=name,
+            )
+            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except Exception as error:  # fmpy raises a bare Exception here
+            said = "; ".join(self._texts()) or str(error)
+            self.close()
+            raise ComponentError(name, "fmi2Instantiate", "no instance", said) from error
+        self.pointer = self._fmu.component
+        self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
+        self._bind_functions()
+
+    def _make_callbacks(self) -> Any:
+        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+            self._messages.append((status, (message or b"").decode("utf-8", "replace")))
+            del self._messages[:-_LOG_LENGTH]
+
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        if addLoggerProxy is not None:
+            addLoggerProxy(ctypes.byref(callbacks))
+        return callbacks
+
+    def _bind_functions(self) -> None:
+        """Function pointers with fixed prototypes: no per-call conversion, unlike fmpy's wrappers."""
+        library = self._fmu.dll
+        address, size, real, flag = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_int
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int, address, address, size, address)
+        self.set_real = prototype(("fmi2SetReal", library))
+        self.get_real = prototype(("fmi2GetReal", library))
+        self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(("fmi2DoStep", library))
+
+    # -- errors ----------------------------------------------------------------------------------
+
+    def _texts(self, least: int = 0) -> list[str]:
+        """Distinct messages of at least that status, in order, oldest first."""
+        return list(dict.fromkeys(text for status, text in self._messages if status >= least))
+
+    def check(self, status: int, call: str, time: float | None = None) -> None:
+        """Raise unless a call's status is OK or Warning."""
+        if status > 1:
+            name = STATUS[status] if status < len(STATUS) else f"status {status}"
+            raise ComponentError(self.name, call, name, "; ".join(self._texts(1) or self._texts()), time)
+
+    def _call(self, call: str, function: Any, *arguments: Any) -> Any:
+        """Call through fmpy; an FMU that logs an error but returns OK is taken at its word."""
+        try:
+            result = function(*arguments)
+        except FMICallException as error:
+            self.check(error.status, call)
+            raise ComponentError(self.name, call, str(error), "; ".join(self._texts())) from error
+        errors = self._texts(_ERROR)
+        if errors:
+            raise ComponentError(self.name, call, "an error in the log", "; ".join(errors))
+        return result
+
+    # -- life cycle ------------------------------------------------------------------------------
+
+    def setup(self, start_time: float, stop_time: float | None) -> None:
+        self._call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=start_time, stopTime=stop_time))
+
+    def enter_initialization_mode(self) -> None:
+        self._call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
+
+    def exit_initialization_mode(self) -> None:
+        self._call("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
+        self._initialised = True
+
+    def step(self, time: float, step_size: float) -> None:
+        """One communication step [s]."""
+        self.check(self.do_step(self.pointer, time, step_size, 1), "fmi2DoStep", time)
+
+    def close(self) -> None:
+        """Terminate and free the instance, and remove what was extracted for it."""
+        fmu, self._fmu = self._fmu, None
+        if fmu is not None and fmu.component is not None:
+            try:
+                if self._initialised:
+                    fmu.terminate()
+            except FMICallException:
+                pass  # an FMU that failed may refuse to terminate; it is freed all the same
+            fmu.freeInstance()
+        if self._own_directory is not None:
+            shutil.rmtree(self._own_directory, ignore_errors=True)
+            self._own_directory = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    # -- values ----------------------------------------------------------------------------------
+
+    def set(self, values: Mapping[str, float | bool]) -> None:
+        """Set variables of any numeric type by name.
+
+        Raises
+        ------
+        InputError
+            If a name does not exist or is of type String.
+        ComponentError
+            If the FMU refuses.
+        """
+        for name, value in values.items():
+            variable = self.description.variables.get(name)
+            if variable is None:
+                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
+            setters = {
+                "Real": (self._fmu.setReal, float),
+                "Integer": (self._fmu.setInteger, int),
+                "Enumeration": (self._fmu.setInteger, int),
+                "Boolean": (self._fmu.setBoolean, bool),
+            }
+            if variable.type not in setters:
+                raise InputError(f"component {self.name!r}: variable {name!r} is of type {variable.type}, which cannot be set here")
+            setter, convert = setters[variable.type]
+            self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
+
+    def get(self, names: Iterable[str]) -> dict[str, float]:
+        """Read Real variables by name."""
+        batch = RealBatch(self, tuple(names))
+        return dict(zip(batch.names, batch.read().tolist(), strict=True))
+
+    # -- state -----------------------------------------------------------------------------------
+
+    def save_state(self) -> Any:
+        """A handle to a copy of the FMU's whole state; give it back to `restore_state`, then `free_state`."""
+        return self._call("fmi2GetFMUstate", self._fmu.getFMUState)
+
+    def restore_state(self, state: Any) -> None:
+        self._call("fmi2SetFMUstate", self._fmu.setFMUState, state)
+
+    def free_state(self, state: Any) -> None:
+        self._call("fmi2FreeFMUstate", self._fmu.freeFMUState, state)

@@ -1,0 +1,173 @@
+"""What an FMU's file declares, read and checked before anything is loaded."""
+
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy
+from fmpy.model_description import ModelDescription
+
+from orchestrator.errors import FmuFileError
+
+VENDOR = "gfor-cosim"
+
+
+@dataclass(frozen=True, slots=True)
+class VariableInfo:
+    """One scalar variable of a modelDescription."""
+
+    name: str
+    reference: int
+    type: str
+    causality: str
+    variability: str
+    unit: str
+    start: str | None
+    minimum: float | None
+    maximum: float | None
+    description: str
+
+
+@dataclass(frozen=True)
+class FmuDescription:
+    """An FMI 2.0 co-simulation FMU on disk.
+
+    Attributes
+    ----------
+    path
+        The .fmu file.
+    variables
+        By name.
+    states
+        Names of the continuous states, in the order of ``ModelStructure/Derivatives``.
+    states_are_settable
+        Whether the FMU declares that a master may set its states at communication points. That is
+        an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
+    can_save_state
+        ``canGetAndSetFMUstate``.
+    """
+
+    path: Path
+    guid: str
+    model_name: str
+    title: str
+    model_identifier: str
+    generation_tool: str
+    variables: dict[str, VariableInfo]
+    states: tuple[str, ...]
+    states_are_settable: bool
+    can_save_state: bool
+    output_dependencies: dict[str, tuple[str, ...] | None]
+    platforms: tuple[str, ...]
+
+    @cached_property
+    def inputs(self) -> tuple[str, ...]:
+        return self._names("input")
+
+    @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        return self._names("output")
+
+    @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        return self._names("parameter")
+
+    def _names(self, causality: str) -> tuple[str, ...]:
+        return tuple(v.name for v in self.variables.values() if v.causality == causality)
+
+    def feedthrough(self, output: str) -> tuple[str, ...]:
+        """Inputs that an output depends on directly; all inputs where the FMU declares nothing."""
+        known = self.output_dependencies.get(output)
+        return self.inputs if known is None else tuple(n for n in known if n in self.inputs)
+
+
+def read_description(path: Path | str) -> FmuDescription:
+    """Read and check an FMU.
+
+    Raises
+    ------
+    FmuFileError
+        If the file is missing, not a zip archive, without (or with an unreadable) modelDescription.xml,
+        of another FMI version, for Model Exchange only, or without a binary for this platform.
+    """
+    path = Path(path)
+    text = _model_description_text(path)
+    version = _fmi_version(path, text)
+    if version != "2.0":
+        raise FmuFileError(f"{path}: it is an FMU of FMI {version}; this master runs FMI 2.0 co-simulation, ask for that export")
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # fmpy raises whatever its parsers raise
+        raise FmuFileError(f"{path}: modelDescription.xml cannot be read: {error}; run `fmpy validate` on the file") from error
+    if description.coSimulation is None:
+        raise FmuFileError(f"{path}: it is an FMU for Model Exchange only; this master needs FMI 2.0 co-simulation, ask for that export")
+    platforms = tuple(fmpy.supported_platforms(str(path)))
+    if fmpy.platform not in platforms:
+        has = ", ".join(platforms) or "none"
+        raise FmuFileError(
+            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; ask its author for a {fmpy.platform} build"
+        )
+    return _describe(path, description, text, platforms)
+
+
+def _model_description_text(path: Path) -> bytes:
+    if not path.is_file():
+        raise FmuFileError(f"{path}: there is no such file; give the path of an .fmu")
+    if not zipfile.is_zipfile(path):
+        raise FmuFileError(f"{path}: it is not an FMU: an .fmu is a zip archive and this file is not; export it again")
+    with zipfile.ZipFile(path) as archive:
+        try:
+            return archive.read("modelDescription.xml")
+        except KeyError:
+            raise FmuFileError(
+                f"{path}: the archive has no modelDescription.xml at its top; an FMU must, so export it again"
+            ) from None
+
+
+def _fmi_version(path: Path, text: bytes) -> str:
+    try:
+        return ElementTree.fromstring(text).get("fmiVersion", "unknown")
+    except ElementTree.ParseError as error:
+        raise FmuFileError(f"{path}: modelDescription.xml is not XML: {error}; export it again") from error
+
+
+def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...]) -> FmuDescription:
+    variables = {v.name: _variable(v) for v in md.modelVariables}
+    tool = ElementTree.fromstring(text).find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    dependencies = {
+        unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
+        for unknown in md.outputs
+    }
+    return FmuDescription(
+        path=path,
+        guid=md.guid,
+        model_name=md.modelName,
+        title=md.description or "",
+        model_identifier=md.coSimulation.modelIdentifier,
+        generation_tool=md.generationTool or "",
+        variables=variables,
+        states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
+        states_are_settable=tool is not None and tool.get("settable") == "true",
+        can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
+        output_dependencies=dependencies,
+        platforms=platforms,
+    )
+
+
+def _variable(v: Any) -> VariableInfo:
+    unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
+    return VariableInfo(
+        name=v.name,
+        reference=v.valueReference,
+        type=v.type,
+        causality=v.causality or "local",
+        variability=v.variability or "continuous",
+        unit=unit,
+        start=v.start,
+        minimum=None if v.min is None else float(v.min),
+        maximum=None if v.max is None else float(v.max),
+        description=v.description or "",
+    )
