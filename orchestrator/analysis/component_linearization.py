@@ -84,9 +84,9 @@ def linearize_component(exchange: ComponentExchange, time: float, step_size: flo
     names = component.description.states
     n = len(names)
     has_derivatives = all(f"der({s})" in component.description.variables for s in names)
-    with_u, p = results[0], len(exchange.outputs.names)
-    disagreement = max((float(np.abs(a - b).max(initial=0.0)) for a, b in zip(*results, strict=True)), default=0.0)
-    after, outputs, rates = with_u
+    (after, outputs, rates), p = results[0], len(exchange.outputs.names)
+    pairs = list(zip(*results, strict=True))[:2]
+    disagreement = max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs)
     return ComponentLinearization(
         component.name,
         names,

@@ -1,0 +1,1 @@
+"""Case files: what to couple, from which operating point, in which scenarios."""

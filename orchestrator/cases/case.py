@@ -1,0 +1,179 @@
+"""A case file, read and checked against its form."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from orchestrator.cases.locate import line_of
+from orchestrator.cases.prepare import PreparedScenario, Preparer
+from orchestrator.cases.schema import CaseTable, ScenarioTable, Value
+from orchestrator.errors import CaseError, InputError, Problem
+
+BUILT_IN = Path(__file__).parent
+_SCHEMA_PASSES = 50
+
+
+def built_in_cases() -> tuple[str, ...]:
+    """Names of the cases that come with the package."""
+    return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case file.
+
+    Attributes
+    ----------
+    table
+        Its contents. Where the form was wrong, the wrong entries are left out and stand in
+        ``problems``, so that what the rest means can be checked as well.
+    text, path
+        The file itself.
+    """
+
+    table: CaseTable
+    text: str
+    path: Path
+    problems: tuple[Problem, ...]
+
+    @property
+    def name(self) -> str:
+        return self.table.name
+
+    @property
+    def scenarios(self) -> dict[str, ScenarioTable]:
+        """By name; a case without scenarios has one, named as the case."""
+        return self.table.scenarios or {self.table.name: ScenarioTable()}
+
+    def prepare(
+        self,
+        scenarios: Sequence[str] = (),
+        overrides: Mapping[str, Value] | None = None,
+        step_size: float | None = None,
+        stop_time: float | None = None,
+    ) -> list[PreparedScenario]:
+        """Check everything and make the chosen scenarios ready to run.
+
+        Parameters
+        ----------
+        scenarios
+            Names; all of them where empty.
+        overrides
+            Values by ``component.variable`` that go before the file's and the scenario's.
+        step_size, stop_time
+            [s]; the file's where None.
+
+        Raises
+        ------
+        CaseError
+            With every problem of the file and of the overrides.
+        """
+        problems = list(self.problems)
+        unknown = [name for name in scenarios if name not in self.scenarios]
+        problems += [
+            Problem("--scenario", f"there is no scenario {name!r}; the case has: {', '.join(self.scenarios)}")
+            for name in unknown
+        ]
+        if unknown:
+            raise CaseError(str(self.path), problems)
+        prepared = []
+        for name in scenarios or self.scenarios:
+            preparer = Preparer(self.table, name, self.scenarios[name], dict(overrides or {}), self.path.parent, self.place)
+            prepared.append(preparer.prepare(step_size, stop_time))
+            problems += [p for p in preparer.problems if p not in problems]
+        if problems:
+            raise CaseError(str(self.path), problems)
+        return [p for p in prepared if p is not None]
+
+    def place(self, *path: str | int) -> str:
+        """A key path as text, with its line in the file."""
+        return _place(self.text, path)
+
+
+def load_case(name_or_path: str | Path) -> Case:
+    """Read a built-in case by name, or a case file by path.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or the file is not TOML.
+    CaseError
+        If the file lacks what nothing can be checked without.
+    """
+    path = Path(name_or_path)
+    if str(name_or_path) in built_in_cases():
+        path = BUILT_IN / str(name_or_path) / "case.toml"
+    if not path.is_file():
+        raise InputError(
+            f"{name_or_path}: there is neither a built-in case of that name ({', '.join(built_in_cases())}) nor such a file"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+        raw = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    table, problems = _validate(raw, text, path)
+    return Case(table, text, path, tuple(problems))
+
+
+def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, list[Problem]]:
+    """Validate; note each wrong entry, take it out, and go on with the rest."""
+    problems: list[Problem] = []
+    for _ in range(_SCHEMA_PASSES):
+        try:
+            return CaseTable.model_validate(raw), problems
+        except ValidationError as error:
+            removed = False
+            for detail in error.errors():
+                location = _location(raw, detail["loc"])
+                problem = Problem(_place(text, location), _schema_message(detail))
+                if problem not in problems:
+                    problems.append(problem)
+                removed |= _take_out(raw, location)
+            if not removed:
+                break
+    raise CaseError(str(path), problems)
+
+
+def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
+    """pydantic's location without the tags that it adds for unions."""
+    path: list[str | int] = []
+    for part in location:
+        inside = (isinstance(raw, dict) and part in raw) or (isinstance(raw, list) and isinstance(part, int) and part < len(raw))
+        if inside:
+            path.append(part)
+            raw = raw[part]
+        elif part == location[-1] and isinstance(raw, dict) and part not in ("float", "str", "bool"):
+            path.append(part)
+    return tuple(path)
+
+
+def _take_out(raw: Any, location: Sequence[str | int]) -> bool:
+    for part in location[:-1]:
+        raw = raw[part]
+    if isinstance(raw, dict) and location and location[-1] in raw:
+        del raw[location[-1]]
+        return True
+    return False
+
+
+def _schema_message(detail: Any) -> str:
+    match detail["type"]:
+        case "extra_forbidden":
+            return "this key is unknown; check its spelling, or remove it"
+        case "missing":
+            return "this key is missing; add it"
+        case _:
+            seen = detail.get("input")
+            shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""
+            return detail["msg"].removeprefix("Value error, ") + shown
+
+
+def _place(text: str, path: Sequence[str | int]) -> str:
+    label = ".".join(f'"{p}"' if "." in str(p) else str(p) for p in path)
+    line = line_of(text, path)
+    return f"line {line}, {label}" if line and label else label

@@ -1,0 +1,435 @@
+"""From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fmus.grid.network import Line, Load, Network, Port
+from fmus.toolchain.catalogue import build_model, model_names, network_of
+from fmus.toolchain.python_fmu import cached
+from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.schema import (
+    BranchChangeTable,
+    CaseTable,
+    ComponentTable,
+    EventTable,
+    LoadChangeTable,
+    ParameterChangeTable,
+    ReferenceChangeTable,
+    ScenarioTable,
+    Value,
+)
+from orchestrator.cases.units import to_unit
+from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.events import BranchChange, Event, LoadChange, ParameterChange, ReferenceChange
+from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
+from orchestrator.coupling.system import System
+from orchestrator.errors import InputError, Problem
+from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
+
+Place = Callable[..., str]
+_COMMAND_LINE = "--set"
+_POWER_FLOW_RESULTS = ("Q_0", "theta_0")
+
+
+@dataclass(frozen=True)
+class PreparedScenario:
+    """A scenario that is ready to run.
+
+    Attributes
+    ----------
+    record
+        Names ``component.variable`` of what is recorded, every ``record_every`` communication steps.
+    power_flow
+        What the components start from; None where the case has no network.
+    values
+        Every value that was set, by ``component.variable``.
+    """
+
+    name: str
+    title: str
+    system: System
+    schedule: Schedule
+    step_size: float
+    stop_time: float
+    record: tuple[str, ...]
+    record_every: int
+    events: tuple[Event, ...]
+    power_flow: PowerFlow | None
+    values: dict[str, float | bool]
+
+
+@cache
+def catalogue_fmu(model: str, network: Network | None = None) -> FmuDescription:
+    """FMU of a model of the catalogue, built once a machine."""
+    arguments = {"network": network} if network is not None else {}
+    return read_description(cached(build_model(model, **arguments)))
+
+
+class Preparer:
+    """Makes one scenario ready; ``problems`` collects what is wrong."""
+
+    def __init__(
+        self,
+        case: CaseTable,
+        name: str,
+        scenario: ScenarioTable,
+        overrides: dict[str, Value],
+        directory: Path,
+        place: Place,
+    ) -> None:
+        self.case, self.name, self.scenario = case, name, scenario
+        self.overrides, self.directory, self.place = overrides, directory, place
+        self.problems: list[Problem] = []
+        self.system = System()
+        self.network: Network | None = None
+        self.tables = {n: t for n, t in case.components.items() if n not in scenario.remove}
+
+    def note(self, place: str, text: str) -> None:
+        """Add a problem."""
+        self.problems.append(Problem(place, text))
+
+    def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
+        """Go through all of it; None if there were problems that leave nothing to run."""
+        for name in self.scenario.remove:
+            if name not in self.case.components:
+                self.note(self.place("scenarios", self.name, "remove"), f"there is no component {name!r} to remove")
+        self._find_network()
+        for name, table in self.tables.items():
+            self._add_component(name, table)
+        self._assign_values()
+        self._connect()
+        self._check_inputs()
+        flow = None if self.problems else self._power_flow()
+        clock = self._clock(step_size)
+        stop = stop_time if stop_time is not None else self.case.solver.stop_time
+        events = self._events(clock, stop)
+        if self.problems or clock is None:
+            return None
+        return PreparedScenario(
+            name=self.name,
+            title=self.scenario.title or self.name,
+            system=self.system,
+            schedule=self._schedule(),
+            step_size=clock.step_size,
+            stop_time=stop,
+            record=tuple(f"{n}.{v}" for n, p in self.system.components.items() for v in p.description.outputs),
+            record_every=max(1, round(self.case.solver.record_interval / clock.step_size)),
+            events=events,
+            power_flow=flow,
+            values={f"{n}.{v}": x for n, p in self.system.components.items() for v, x in p.parameters.items()},
+        )
+
+    # -- components ------------------------------------------------------------------------------
+
+    def _find_network(self) -> None:
+        """The network behind the grid component: the model's own, or the file's table."""
+        if self.case.power_flow is None:
+            return
+        grid = self.tables.get(self.case.power_flow.grid)
+        if grid is None:
+            self.note(self.place("power_flow", "grid"), f"there is no component {self.case.power_flow.grid!r}")
+        elif grid.model == "grid":
+            self.network = self._network_from_table()
+        elif grid.model in model_names():
+            self.network = network_of(grid.model or "")
+
+    def _network_from_table(self) -> Network | None:
+        if self.case.network is None:
+            self.note(self.place("power_flow", "grid"), "the model 'grid' needs a [network] table with buses, lines and loads")
+            return None
+        table = self.case.network
+        try:
+            return Network(
+                name=f"{self.case.name}_grid",
+                buses=tuple(table.buses),
+                lines=tuple(Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B) for n, t in table.lines.items()),
+                loads=tuple(Load(n, t.bus, t.p, t.q) for n, t in table.loads.items()),
+                ports=tuple(Port(n, t.bus) for n, t in self.tables.items() if t.bus),
+            )
+        except ValueError as error:
+            self.note(self.place("network"), str(error))
+            return None
+
+    def _add_component(self, name: str, table: ComponentTable) -> None:
+        where = self.place("components", name)
+        if (table.model is None) == (table.fmu is None):
+            self.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
+            return
+        try:
+            self.system.add(name, self._description(table))
+        except InputError as error:
+            self.note(where, str(error))
+        except KeyError as error:
+            self.note(self.place("components", name, "model"), str(error.args[0]))
+
+    def _description(self, table: ComponentTable) -> FmuDescription:
+        if table.fmu is not None:
+            return read_description(self.directory / table.fmu)
+        own = table.model == "grid"
+        if own and self.network is None:
+            raise InputError("the model 'grid' needs a [network] table and a [power_flow] table that names this component")
+        return catalogue_fmu(table.model or "", self.network if own else None)
+
+    # -- values ----------------------------------------------------------------------------------
+
+    def _assign_values(self) -> None:
+        for name, table in self.tables.items():
+            for group in ("parameters", "inputs"):
+                for path, value in _flatten(getattr(table, group)):
+                    self._assign(name, ".".join(path), value, self.place("components", name, group, *path))
+        for key, value in self.scenario.set.items():
+            self._assign_key(key, value, self.place("scenarios", self.name, "set", key))
+        for key, value in self.overrides.items():
+            self._assign_key(key, value, f"{_COMMAND_LINE} {key}")
+
+    def _assign_key(self, key: str, value: Value, where: str) -> None:
+        component, _, variable = key.partition(".")
+        if component in self.tables:
+            self._assign(component, variable, value, where)
+        elif component not in self.case.components:
+            self.note(where, f"there is no component {component!r}; the case has: {', '.join(self.case.components)}")
+
+    def _assign(self, name: str, variable: str, value: Value, where: str) -> None:
+        plan = self.system.components.get(name)
+        if plan is None:
+            return  # the component itself is a problem already
+        info = plan.description.variables.get(variable)
+        if info is None:
+            settable = [*plan.description.parameters, *plan.description.inputs]
+            close = difflib.get_close_matches(variable, settable, n=3, cutoff=0.5)
+            hint = f"did you mean {' or '.join(close)}?" if close else f"`gfor info {plan.description.path}` lists them"
+            self.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
+            return
+        if info.causality not in ("parameter", "input"):
+            self.note(where, f"{variable} is of causality {info.causality}; only parameters and inputs can be set")
+            return
+        converted = self._convert(info, value, where)
+        if converted is not None:
+            target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
+            target[variable] = converted
+
+    def _convert(self, info: VariableInfo, value: Value, where: str) -> float | bool | None:
+        """The value in the declared unit, if type, unit and range fit."""
+        if info.type == "Boolean":
+            if isinstance(value, bool):
+                return value
+            self.note(where, f"{info.name} = {value!r}; it must be true or false")
+            return None
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            self.note(where, f"{info.name} = {value!r}; it must be a number")
+            return None
+        try:
+            number = to_unit(value, info.unit)
+        except ValueError as error:
+            self.note(where, f"{info.name}: {error}")
+            return None
+        unit = f" {info.unit}" if info.unit not in ("", "1") else ""
+        if info.type == "Integer" and number != int(number):
+            self.note(where, f"{info.name} = {number:g}; it must be a whole number")
+        elif info.minimum is not None and number < info.minimum:
+            self.note(where, f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}")
+        elif info.maximum is not None and number > info.maximum:
+            self.note(where, f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}")
+        elif number != number:
+            self.note(where, f"{info.name} is not a number; give one")
+        else:
+            return number
+        return None
+
+    # -- connections -----------------------------------------------------------------------------
+
+    def _connect(self) -> None:
+        for index, table in enumerate(self.case.connections):
+            ends = {table.source.partition(".")[0], table.target.partition(".")[0]}
+            if not ends & set(self.scenario.remove):
+                self._try_connect(table.source, table.target, self.place("connections", index))
+        for name, table in self.tables.items():
+            if table.bus is not None and name in self.system.components:
+                self._connect_to_bus(name, table.bus)
+
+    def _connect_to_bus(self, name: str, bus: str) -> None:
+        where = self.place("components", name, "bus")
+        if self.case.power_flow is None or self.network is None:
+            self.note(where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]")
+            return
+        ports = {port.name: port.bus for port in self.network.ports}
+        if ports.get(name) != bus:
+            known = ", ".join(f"{p} at {b}" for p, b in ports.items())
+            self.note(where, f"the network has no port {name!r} at bus {bus!r}; it has: {known}")
+            return
+        grid = self.case.power_flow.grid
+        if grid in self.system.components:
+            for part in ("re", "im"):
+                self._try_connect(f"{grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
+                self._try_connect(f"{name}.i_{part}", f"{grid}.{name}.i_{part}", where)
+
+    def _try_connect(self, source: str, target: str, where: str) -> None:
+        known = set(self.case.components) - set(self.system.components)
+        if {source.partition(".")[0], target.partition(".")[0]} & known:
+            return  # an end is a problem already
+        try:
+            self.system.connect(source, target)
+        except InputError as error:
+            self.note(where, str(error))
+
+    def _check_inputs(self) -> None:
+        for endpoint in self.system.unconnected_inputs():
+            self.note(
+                self.place("components", endpoint.component),
+                f"scenario {self.name!r}: nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'",
+            )
+
+    # -- operating point -------------------------------------------------------------------------
+
+    def _value(self, component: str, variable: str) -> float:
+        plan = self.system.components[component]
+        if variable in plan.parameters:
+            return float(plan.parameters[variable])
+        return float(plan.description.variables[variable].start or 0.0)
+
+    def _power_flow(self) -> PowerFlow | None:
+        """Solve the power flow from the values set, and give every component what it starts from."""
+        if self.case.power_flow is None or self.network is None:
+            return None
+        grid, slack = self.case.power_flow.grid, self.case.power_flow.slack
+        units = {p.name: p.bus for p in self.network.ports if p.name in self.system.components}
+        if slack not in units:
+            self.note(self.place("power_flow", "slack"), f"{slack!r} is no unit of this scenario; units: {', '.join(units)}")
+            return None
+        self._reject_results(units, grid)
+        network, value = self.network, self._value
+        try:
+            flow = solve_power_flow(
+                network.buses,
+                [
+                    FlowLine(l.name, l.from_bus, l.to_bus, value(grid, f"R_{l.name}"), value(grid, f"X_{l.name}"),
+                             value(grid, f"B_{l.name}") if l.B else 0.0)
+                    for l in network.lines
+                ],
+                [
+                    FlowLoad(l.bus, value(grid, f"{l.name}.P"), value(grid, f"{l.name}.Q") if l.q_mvar else 0.0)
+                    for l in network.loads
+                ],
+                [FlowUnit(n, bus, value(n, "S_n"), value(n, "P_0"), value(n, "v_0")) for n, bus in units.items()],
+                slack,
+            )  # fmt: skip
+        except InputError as error:
+            self.note(self.place("power_flow"), f"scenario {self.name!r}: {error}")
+            return None
+        self._start_from(flow, units, grid)
+        return flow
+
+    def _reject_results(self, units: Mapping[str, str], grid: str) -> None:
+        """What the power flow computes cannot be given as well."""
+        for name in units:
+            for variable in _POWER_FLOW_RESULTS:
+                if variable in self.system.components[name].parameters:
+                    self.note(self.place("components", name), f"{name}.{variable} is a result of the power flow; remove it, and set P_0 and v_0")
+
+    def _start_from(self, flow: PowerFlow, units: Mapping[str, str], grid: str) -> None:
+        import cmath
+
+        for bus, voltage in flow.voltages.items():
+            self.system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
+        for name, bus in units.items():
+            power, voltage = flow.powers[name], flow.voltages[bus]
+            start = {"P_0": power.real, "Q_0": power.imag, "v_0": abs(voltage), "theta_0": cmath.phase(voltage)}
+            plan = self.system.components[name]
+            for variable, number in start.items():
+                maximum = plan.description.variables[variable].maximum
+                if maximum is not None and abs(number) > maximum:
+                    self.note(
+                        self.place("components", name),
+                        f"scenario {self.name!r}: the power flow gives {name} {variable} = {number:.4g} pu, more than it can "
+                        f"take ({maximum:g}); raise its S_n or move load and generation",
+                    )
+            plan.parameters |= start
+
+    # -- time ------------------------------------------------------------------------------------
+
+    def _clock(self, step_size: float | None) -> Clock | None:
+        try:
+            return Clock(step_size if step_size is not None else self.case.solver.step_size)
+        except InputError as error:
+            self.note("--step", str(error))
+            return None
+
+    def _schedule(self) -> Schedule:
+        """The file's groups; else devices and then the grid, or every component in a group of its own."""
+        names = tuple(self.system.components)
+        if self.case.solver.schedule == "jacobi":
+            return jacobi(names)
+        if self.case.solver.groups is not None:
+            groups = [tuple(n for n in group if n not in self.scenario.remove) for group in self.case.solver.groups]
+            return gauss_seidel(tuple(group for group in groups if group))
+        if self.case.power_flow is not None:
+            grid = self.case.power_flow.grid
+            return gauss_seidel((tuple(n for n in names if n != grid), (grid,)))
+        return gauss_seidel(tuple((name,) for name in names))
+
+    def _events(self, clock: Clock | None, stop: float) -> tuple[Event, ...]:
+        own = self.scenario.events is not None
+        tables = self.scenario.events if self.scenario.events is not None else self.case.events
+        events = []
+        for index, table in enumerate(tables):
+            where = self.place("scenarios", self.name, "events", index) if own else self.place("events", index)
+            event = _event(table)
+            if event.component in self.scenario.remove:
+                continue
+            if self._check_event(event, where) and clock is not None:
+                try:
+                    clock.index(event.time, "the event")
+                except InputError as error:
+                    self.note(where, str(error))
+                events.append(event)
+        if clock is not None:
+            try:
+                clock.index(stop, "the stop")
+            except InputError as error:
+                self.note(self.place("solver", "stop_time"), str(error))
+        return tuple(event for event in events if event.time < stop)
+
+    def _check_event(self, event: Event, where: str) -> bool:
+        plan = self.system.components.get(event.component)
+        if plan is None:
+            if event.component not in self.tables:
+                self.note(where, f"there is no component {event.component!r}")
+            return False
+        before = len(self.problems)
+        for variable, value in event.settings().items():
+            info = plan.description.variables.get(variable)
+            if info is None:
+                self.note(where, f"component {event.component!r} has no variable {variable!r} for this event to set")
+            elif info.causality != "input" and info.variability != "tunable":
+                self.note(where, f"{event.component}.{variable} is {info.variability}; only a tunable parameter can change during a run")
+            else:
+                self._convert(info, value, where)
+        return len(self.problems) == before
+
+
+def _event(table: EventTable) -> Event:
+    match table:
+        case LoadChangeTable():
+            return LoadChange(table.time, table.component, table.load, table.scale)
+        case BranchChangeTable():
+            return BranchChange(table.time, table.component, table.line, table.X, table.R)
+        case ReferenceChangeTable():
+            return ReferenceChange(table.time, table.component, table.reference, table.delta)
+        case ParameterChangeTable():
+            value = table.value if isinstance(table.value, bool) else float(table.value)
+            return ParameterChange(table.time, table.component, table.parameter, value)
+
+
+def _flatten(table: Mapping[str, Any]) -> list[tuple[tuple[str, ...], Any]]:
+    """Nested tables as paths: ``droop.R_f = 0.05`` is the variable ``droop.R_f``."""
+    flat: list[tuple[tuple[str, ...], Any]] = []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            flat += [((key, *path), inner) for path, inner in _flatten(value)]
+        else:
+            flat.append(((key,), value))
+    return flat

@@ -1,0 +1,188 @@
+"""The form of a case file. What the file means is checked in `case`."""
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from orchestrator.cases.units import to_unit
+
+Value = bool | float | str
+
+
+def _in(unit: str) -> Callable[[Any], Any]:
+    def convert(value: Any) -> Any:
+        return to_unit(value, unit) if isinstance(value, str) else value
+
+    return convert
+
+
+Seconds = Annotated[float, BeforeValidator(_in("s"))]
+PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
+Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
+Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
+
+
+class Table(BaseModel):
+    """A table that knows all its keys."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+class SolverTable(Table):
+    """Communication step, schedule and recording."""
+
+    step_size: Seconds = Field(default=1e-4, gt=0, le=0.1)
+    stop_time: Seconds = Field(default=20.0, gt=0)
+    record_interval: Seconds = Field(default=0.005, gt=0)
+    schedule: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    groups: list[list[str]] | None = None
+
+
+class ComponentTable(Table):
+    """An FMU file, or a model of the catalogue, with its values."""
+
+    model: str | None = None
+    fmu: str | None = None
+    bus: str | None = None
+    parameters: dict[str, Any] = {}
+    inputs: dict[str, Any] = {}
+
+
+class PowerFlowTable(Table):
+    """Which component is the grid, and which unit balances it."""
+
+    grid: str
+    slack: str
+
+
+class LineTable(Table):
+    from_bus: str = Field(alias="from")
+    to_bus: str = Field(alias="to")
+    X: PerUnit
+    R: PerUnit = 0.0
+    B: PerUnit = 0.0
+
+
+class LoadTable(Table):
+    bus: str
+    p: Megawatt
+    q: Megavar = 0.0
+
+
+class NetworkTable(Table):
+    """A network of the user's own, for the model ``grid``."""
+
+    buses: list[str]
+    lines: dict[str, LineTable] = {}
+    loads: dict[str, LoadTable] = {}
+
+
+class ConnectionTable(Table):
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+
+
+class LoadChangeTable(Table):
+    type: Literal["load_change"]
+    time: Seconds = Field(ge=0)
+    component: str
+    load: str
+    scale: float = Field(gt=0)
+
+
+class BranchChangeTable(Table):
+    type: Literal["branch_change"]
+    time: Seconds = Field(ge=0)
+    component: str
+    line: str
+    X: PerUnit
+    R: PerUnit | None = None
+
+
+class ReferenceChangeTable(Table):
+    type: Literal["reference_change"]
+    time: Seconds = Field(ge=0)
+    component: str
+    reference: str
+    delta: PerUnit
+
+
+class ParameterChangeTable(Table):
+    type: Literal["parameter_change"]
+    time: Seconds = Field(ge=0)
+    component: str
+    parameter: str
+    value: Value
+
+
+EventTable = Annotated[
+    LoadChangeTable | BranchChangeTable | ReferenceChangeTable | ParameterChangeTable, Field(discriminator="type")
+]
+
+
+class ScenarioTable(Table):
+    """What differs from the case."""
+
+    title: str = ""
+    remove: list[str] = []
+    set: dict[str, Value] = {}
+    events: list[EventTable] | None = None
+
+
+class RingDownTable(Table):
+    signal: str
+    start: Seconds
+
+
+class AnalysisTable(Table):
+    """What an electromechanical mode is here, and where its ring-down is read."""
+
+    electromechanical_states: list[str] = []
+    ring_down: RingDownTable | None = None
+
+
+class ReferenceModeTable(Table):
+    real: float
+    imag: float
+    frequency_hz: float
+    damping_percent: float
+
+
+class ReferenceTable(Table):
+    """Figures of somebody else, shown beside ours where their conditions hold."""
+
+    title: str
+    source: str
+    when: dict[str, Value] = {}
+    modes: dict[str, ReferenceModeTable]
+
+
+class PanelTable(Table):
+    signal: str
+    label: str
+    scale: float = 1.0
+
+
+class PlotTable(Table):
+    name: str
+    title: str
+    panels: list[PanelTable]
+
+
+class CaseTable(Table):
+    """A whole case file."""
+
+    name: str
+    title: str = ""
+    source: str = ""
+    solver: SolverTable = SolverTable()
+    components: dict[str, ComponentTable]
+    network: NetworkTable | None = None
+    power_flow: PowerFlowTable | None = None
+    connections: list[ConnectionTable] = []
+    events: list[EventTable] = []
+    scenarios: dict[str, ScenarioTable] = {}
+    analysis: AnalysisTable = AnalysisTable()
+    reference: ReferenceTable | None = None
+    plots: list[PlotTable] = []

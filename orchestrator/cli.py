@@ -1,0 +1,266 @@
+"""The command ``gfor``."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress as ProgressBar, TextColumn, TimeRemainingColumn
+
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+from fmus.toolchain.kernel import TARGETS
+from fmus.toolchain.python_fmu import export
+from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.cases.units import to_unit
+from orchestrator.coupling.progress import Progress
+from orchestrator.errors import CosimError, InputError
+from orchestrator.fmi.description import read_description
+from orchestrator.report import tables
+from orchestrator.report.study_files import save_run, save_study, summary_of
+from orchestrator.study import ModesResult, RunResult, compute_modes, modes_json, run_scenario
+
+EXAMPLES = """\
+examples:
+  gfor run two_area                              the paper's first case study, into results/two_area
+  gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
+  gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
+  gfor modes my_case.toml --json                 a case file of your own, for a program to read
+  gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
+  gfor info fmus/gfor.fmu                        what an FMU declares
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
+    options = _parser().parse_args(arguments)
+    errors = Console(stderr=True, soft_wrap=True, highlight=False)
+    try:
+        return int(options.command(options))
+    except CosimError as error:
+        errors.print(f"[bold red]error:[/bold red] {_escape(str(error))}")
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    except KeyboardInterrupt:
+        errors.print("interrupted")
+        return 130
+
+
+def _escape(text: str) -> str:
+    return text.replace("[", "\\[")
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose help opens with the examples."""
+
+    def format_help(self) -> str:
+        text = super().format_help()
+        return text if self.prog != "gfor" else f"{EXAMPLES}\n{text}"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=argparse.ArgumentParser)
+
+    run = commands.add_parser("run", help="steady state, modes and time response of a case's scenarios")
+    _case_arguments(run)
+    run.add_argument("--stop", type=_seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
+    run.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    run.add_argument("--json", action="store_true", help="print the summary as JSON")
+    run.set_defaults(command=_run)
+
+    modes = commands.add_parser("modes", help="steady state and eigenvalues of a case's scenarios")
+    _case_arguments(modes)
+    modes.add_argument("--range", type=_range, default=(0.1, 2.0), metavar="LO:HI", help="frequencies shown [Hz] (default: 0.1:2)")
+    modes.add_argument("--json", action="store_true", help="print JSON")
+    modes.set_defaults(command=_modes)
+
+    build = commands.add_parser("build", help="build FMUs of the catalogue's models")
+    build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
+    build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
+    build.add_argument(
+        "--platform", action="append", choices=sorted(TARGETS), help="compile the kernel for this platform (repeatable; default: this machine's)"
+    )
+    build.set_defaults(command=_build)
+
+    info = commands.add_parser("info", help="show what an FMU declares")
+    info.add_argument("file", type=Path, metavar="FILE.fmu")
+    info.set_defaults(command=_info)
+    return parser
+
+
+def _case_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("case", metavar="CASE", help="a built-in case (two_area) or the path of a case file")
+    parser.add_argument("--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)")
+    parser.add_argument(
+        "--set", action="append", default=[], type=_assignment, metavar="COMPONENT.PARAMETER=VALUE", help="override a value (repeatable)"
+    )
+    parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+
+
+# -- arguments -----------------------------------------------------------------------------------
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = to_unit(_value(text), "s")  # type: ignore[arg-type]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if not value > 0:
+        raise argparse.ArgumentTypeError(f"{text!r} must exceed 0")
+    return value
+
+
+def _range(text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    try:
+        limits = float(low), float(high)
+    except ValueError:
+        limits = (1.0, 0.0)
+    if not colon or not 0 <= limits[0] < limits[1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
+    return limits
+
+
+def _assignment(text: str) -> tuple[str, Value]:
+    key, equals, value = text.partition("=")
+    if not equals or "." not in key or not value:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
+    return key.strip(), _value(value.strip())
+
+
+def _value(text: str) -> Value:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
+    case = load_case(options.case)
+    stop = getattr(options, "stop", None)
+    return case, case.prepare(options.scenario, dict(options.set), options.step, stop)
+
+
+# -- commands ------------------------------------------------------------------------------------
+
+
+def _modes(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    results = [compute_modes(case, prepared, options.range) for prepared in scenarios]
+    if options.json:
+        print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
+        return 0
+    console = Console()
+    for result in results:
+        console.print(tables.all_modes(result), "")
+    _print_electromechanical(console, case, results)
+    _print_warnings(results)
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    folder = options.out or Path("results") / case.name
+    console = Console(stderr=options.json)
+    results: list[RunResult] = []
+    with _progress_bar(console) as bar:
+        for prepared in scenarios:
+            task = bar.add_task(prepared.title, total=None)
+
+            def report(done: int, total: int, task: Any = task) -> None:
+                bar.update(task, completed=done, total=total)
+
+            result = run_scenario(case, prepared, observers=[Progress(report)])
+            results.append(result)
+            save_run(result, folder)
+            _print_warnings([result.modes])
+            if result.failure:
+                break
+    plots = save_study(case, results, folder)
+    if options.json:
+        print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
+    else:
+        _print_run(console, case, results)
+        console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, step_size.csv, summary.json, "
+                      f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
+    if results and results[-1].failure:
+        Console(stderr=True, soft_wrap=True, highlight=False).print(
+            f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: {_escape(str(results[-1].failure))}\n"
+            f"What was computed until then is in {folder}"
+        )
+        return 1
+    return 0
+
+
+def _print_run(console: Console, case: Case, results: Sequence[RunResult]) -> None:
+    modes = [r.modes for r in results]
+    console.print(tables.steady_states(modes), "")
+    _print_electromechanical(console, case, modes)
+    if any(r.ring_down for r in results):
+        console.print("", tables.ring_downs(results))
+    if any(r.shifts for r in results):
+        console.print("", tables.mode_shifts(results))
+    console.print("", tables.run_statistics(results), "")
+
+
+def _print_electromechanical(console: Console, case: Case, results: Sequence[ModesResult]) -> None:
+    if any(r.electromechanical for r in results):
+        title = case.table.reference.title if case.table.reference else None
+        console.print(tables.electromechanical_modes(results, title))
+        if case.table.reference and any(r.reference for r in results):
+            console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
+
+
+def _print_warnings(results: Sequence[ModesResult]) -> None:
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    for result in results:
+        for text in result.warnings:
+            console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {_escape(text)}")
+
+
+def _progress_bar(console: Console) -> ProgressBar:
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
+    return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
+
+
+def _build(options: argparse.Namespace) -> int:
+    names = options.names or [name for name in model_names() if not needs_arguments(name)]
+    models = []
+    for name in names:
+        if name not in model_names():
+            raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
+        if needs_arguments(name):
+            raise InputError(f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`")
+        models.append(build_model(name))
+    for model in models:
+        platforms = tuple(options.platform) if options.platform else None
+        print(export(model, options.dest, platforms))
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    description = read_description(options.file)
+    console = Console()
+    console.print(f"[bold]{_escape(description.model_name)}[/bold]: {_escape(description.title)}")
+    console.print(f"FMI 2.0 co-simulation, guid {_escape(description.guid)}, made by {_escape(description.generation_tool or '?')}", highlight=False)
+    settable = "settable by a master" if description.states_are_settable else "not settable"
+    console.print(
+        f"platforms: {', '.join(description.platforms)}; continuous states: {len(description.states)} ({settable}); "
+        f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
+        highlight=False,
+    )
+    for table in tables.fmu_variables(description):
+        console.print("", table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,102 @@
+"""Everything a study leaves in its output folder."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.cases.case import Case
+from orchestrator.report.plots import plot_eigenvalues, plot_signals
+from orchestrator.report.storage import save_dataset, save_json, save_table
+
+if TYPE_CHECKING:
+    from orchestrator.study import ModesResult, RunResult
+
+
+def save_run(result: "RunResult", folder: Path) -> None:
+    """Write one scenario's trajectory and modes, as soon as they are there."""
+    scenario = folder / result.modes.prepared.name
+    save_dataset(result.dataset, scenario / "trajectory")
+    save_table(_mode_rows([result.modes]), scenario / "modes.csv")
+
+
+def save_study(case: Case, results: Sequence["RunResult"], folder: Path) -> list[Path]:
+    """Write what concerns all scenarios together; return the plots."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "case.toml").write_text(case.text, encoding="utf-8")
+    save_table(_mode_rows([r.modes for r in results]), folder / "modes.csv")
+    save_table(_shift_rows(results), folder / "step_size.csv")
+    save_json(_summary(case, results), folder / "summary.json")
+    plots = []
+    for table in case.table.plots:
+        path = folder / f"{table.name}.png"
+        if plot_signals(table, results, path):
+            plots.append(path)
+    plot_eigenvalues([r.modes for r in results], folder / "eigenvalues.png")
+    return [*plots, folder / "eigenvalues.png"]
+
+
+def _mode_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
+    return [
+        {
+            "scenario": r.prepared.name,
+            "real [1/s]": f"{m.eigenvalue.real:.8g}",
+            "imag [rad/s]": f"{m.eigenvalue.imag:.8g}",
+            "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}",
+            "electromechanical": m is r.electromechanical,
+            "participation": "; ".join(f"{name} {factor:.4f}" for name, factor in m.participation[:6]),
+        }
+        for r in results
+        for m in r.modes
+    ]
+
+
+def _shift_rows(results: Sequence["RunResult"]) -> list[dict[str, Any]]:
+    return [
+        {
+            "scenario": r.modes.prepared.name,
+            "schedule": s.schedule,
+            "step size [s]": s.step_size,
+            "real [1/s]": f"{s.eigenvalue.real:.8g}",
+            "imag [rad/s]": f"{s.eigenvalue.imag:.8g}",
+            "continuous real [1/s]": f"{s.continuous.real:.8g}",
+            "continuous imag [rad/s]": f"{s.continuous.imag:.8g}",
+            "shift [rad/s]": f"{s.shift:.4g}",
+        }
+        for r in results
+        for s in r.shifts
+    ]
+
+
+def _summary(case: Case, results: Sequence["RunResult"]) -> dict[str, Any]:
+    return {"case": case.name, "scenarios": [summary_of(r) for r in results]}
+
+
+def summary_of(result: "RunResult") -> dict[str, Any]:
+    """Figures of one scenario: steady state, electromechanical mode, reference, ring-down, speed, failure."""
+    modes, mode, ref = result.modes, result.modes.electromechanical, result.modes.reference
+    seen, stats = result.ring_down, result.statistics
+    return {
+        "name": modes.prepared.name,
+        "title": modes.prepared.title,
+        "residual": modes.operating_point.residual,
+        "states": modes.model.number_of_states,
+        "electromechanical_mode": _mode_summary(mode),
+        "reference": ref.model_dump() if ref else None,
+        "ring_down": _mode_summary(seen),
+        "steps_per_second": stats.steps_per_second if stats else None,
+        "share_in_fmus": stats.share_in_fmus if stats else None,
+        "warnings": list(modes.warnings),
+        "failure": str(result.failure) if result.failure else None,
+    }
+
+
+def _mode_summary(mode: Any) -> dict[str, float] | None:
+    if mode is None:
+        return None
+    return {
+        "real": mode.eigenvalue.real,
+        "imag": mode.eigenvalue.imag,
+        "frequency_hz": mode.frequency_hz,
+        "damping_percent": mode.damping_percent,
+    }

@@ -1,0 +1,124 @@
+"""Tables for a terminal, with rich."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from orchestrator.fmi.description import FmuDescription
+
+if TYPE_CHECKING:
+    from orchestrator.study import ModesResult, RunResult
+
+
+def _table(title: str, *columns: str, left: int = 1) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="left" if index < left else "right", no_wrap=index < left)
+    return table
+
+
+def steady_states(results: Sequence["ModesResult"]) -> Table:
+    """Residual of the coupled steady state, scenario by scenario."""
+    table = _table("Steady state", "Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
+    for r in results:
+        flow = r.prepared.power_flow
+        table.add_row(
+            r.prepared.title,
+            str(r.model.number_of_states),
+            f"{r.operating_point.residual:.1e}",
+            f"{r.operating_point.drift:.1e}",
+            f"{flow.residual:.1e}" if flow else "–",
+        )
+    return table
+
+
+def electromechanical_modes(results: Sequence["ModesResult"], reference_title: str | None) -> Table:
+    """One electromechanical mode a scenario, beside somebody else's figures where there are any."""
+    compared = any(r.reference for r in results)
+    columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
+    if compared:
+        columns += [f"{reference_title}: mode", "f [Hz]", "Damping [%]"]
+    table = _table("Electromechanical mode", *columns)
+    for r in results:
+        mode = r.electromechanical
+        if mode is None:
+            table.add_row(r.prepared.title, "none in range")
+            continue
+        row = [r.prepared.title, eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
+        if compared and r.reference:
+            ref = r.reference
+            row += [eigenvalue_text(complex(ref.real, ref.imag), 2), f"{ref.frequency_hz:.2f}", f"{ref.damping_percent:.2f}"]
+        table.add_row(*row)
+    return table
+
+
+def all_modes(result: "ModesResult") -> Table:
+    """Every mode of a scenario in the range, least damped first."""
+    title = f"{result.prepared.title}: {result.model.number_of_states} states, residual {result.operating_point.residual:.1e}"
+    table = _table(title, "Most associated states (participation)", "Mode [rad/s]", "f [Hz]", "Damping [%]")
+    for mode in result.modes:
+        states = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
+        marked = f"[bold]{states}[/bold]" if mode is result.electromechanical else states
+        table.add_row(marked, eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
+    return table
+
+
+def ring_downs(results: Sequence["RunResult"]) -> Table:
+    """Frequency and damping of the simulated response against the eigenvalue."""
+    table = _table(
+        "Ring-down of the simulated response against the eigenvalue",
+        "Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]",
+    )  # fmt: skip
+    for r in results:
+        mode, seen = r.modes.electromechanical, r.ring_down
+        if mode and seen:
+            table.add_row(
+                r.modes.prepared.title,
+                f"{seen.frequency_hz:.4f}",
+                f"{mode.frequency_hz:.4f}",
+                f"{seen.damping_percent:.2f}",
+                f"{mode.damping_percent:.2f}",
+            )
+    return table
+
+
+def mode_shifts(results: Sequence["RunResult"]) -> Table:
+    """|λ(H) − λ(continuous)| of the electromechanical mode."""
+    steps = sorted({s.step_size for r in results for s in r.shifts})
+    columns = [f"{h * 1e6:g} µs" for h in steps]
+    table = _table("Shift of the electromechanical mode by the communication step [rad/s]", "Scenario", "Schedule", *columns, left=2)
+    for r in results:
+        for schedule in sorted({s.schedule for s in r.shifts}):
+            values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
+            table.add_row(r.modes.prepared.title, schedule, *(f"{values[h]:.1e}" for h in steps))
+    return table
+
+
+def run_statistics(results: Sequence["RunResult"]) -> Table:
+    """Speed, and where the time went."""
+    table = _table("Run", "Scenario", "Steps", "Steps/s", "Inside FMUs", "By FMU")
+    for r in results:
+        if r.statistics:
+            s = r.statistics
+            shares = ", ".join(f"{c.name} {c.share:.0%}" for c in s.components)
+            table.add_row(r.modes.prepared.title, str(s.steps), f"{s.steps_per_second:,.0f}", f"{s.share_in_fmus:.0%}", shares)
+    return table
+
+
+def fmu_variables(description: FmuDescription) -> Iterable[Table]:
+    """The variables of an FMU, one table a causality."""
+    for causality in ("input", "output", "parameter", "calculatedParameter", "local"):
+        variables = [v for v in description.variables.values() if v.causality == causality and not v.name.startswith("der(")]
+        if not variables:
+            continue
+        table = _table(f"{causality} ({len(variables)})", "Name", "Unit", "Start", "Range", "Variability", "Description", left=6)
+        for v in variables:
+            bounds = ["" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)]
+            table.add_row(v.name, v.unit, v.start or "", "…".join(bounds) if any(bounds) else "", v.variability, v.description)
+        yield table
+
+
+def eigenvalue_text(value: complex, digits: int = 4) -> str:
+    """``-0.3892 ± j3.6551``."""
+    return f"{value.real:+.{digits}f} ± j{abs(value.imag):.{digits}f}"

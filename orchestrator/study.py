@@ -1,0 +1,237 @@
+"""One study: a case, what to compute of each scenario, and what comes out."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
+from orchestrator.analysis.linearization import Blocks, LinearModel, compose, continuous
+from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated
+from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import ReferenceModeTable
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.schedule import jacobi
+from orchestrator.coupling.statistics import StepStatistics
+from orchestrator.errors import AnalysisError, CosimError
+from orchestrator.report.signals import signal
+from orchestrator.report.storage import trajectory_dataset
+
+STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
+"""Communication steps [s] for which the shift of the electromechanical mode is reported."""
+
+_COUPLING_UNSTABLE = 1.0
+"""A step map's growth rate above the continuous system's by more than this [1/s] is the coupling's doing."""
+
+
+@dataclass(frozen=True)
+class ModesResult:
+    """Steady state and modes of one scenario.
+
+    Attributes
+    ----------
+    electromechanical
+        The mode in which the case's electromechanical states take part most; None if none is in range.
+    reference
+        Somebody else's figures for it, where their conditions hold.
+    """
+
+    prepared: PreparedScenario
+    operating_point: OperatingPoint
+    model: LinearModel
+    modes: list[Mode]
+    electromechanical: Mode | None
+    reference: ReferenceModeTable | None
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ModeShift:
+    """How far a communication step moves the electromechanical mode from the continuous system's [rad/s]."""
+
+    schedule: str
+    step_size: float
+    continuous: complex
+    eigenvalue: complex
+
+    @property
+    def shift(self) -> float:
+        return abs(self.eigenvalue - self.continuous)
+
+
+@dataclass
+class RunResult:
+    """A scenario's modes and its simulated response.
+
+    Attributes
+    ----------
+    dataset
+        What was recorded, up to the failure if there was one.
+    ring_down
+        The electromechanical mode as identified from the response.
+    failure
+        The error that ended the run before its time.
+    """
+
+    modes: ModesResult
+    dataset: xr.Dataset
+    statistics: StepStatistics | None = None
+    ring_down: IdentifiedMode | None = None
+    shifts: list[ModeShift] = field(default_factory=list)
+    failure: CosimError | None = None
+
+
+def compute_modes(
+    case: Case, prepared: PreparedScenario, frequency_range: tuple[float, float] = (0.1, 2.0)
+) -> ModesResult:
+    """Initialise a scenario's FMUs, verify their steady state, and linearise around it."""
+    with _master(prepared) as master:
+        return _modes(case, prepared, master, frequency_range)[0]
+
+
+def run_scenario(
+    case: Case,
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = (0.1, 2.0),
+    observers: Sequence[Observer] = (),
+) -> RunResult:
+    """Compute the modes of a scenario and its response to the case's events.
+
+    A component that fails in the middle ends the run; what was recorded until then is in the result.
+    """
+    recorder = Recorder(prepared.record, prepared.record_every)
+    statistics, failure = None, None
+    with _master(prepared) as master:
+        modes, blocks = _modes(case, prepared, master, frequency_range)
+        shifts = _shifts(master, modes.electromechanical, blocks)
+        try:
+            statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
+        except CosimError as error:
+            failure = error
+    dataset = trajectory_dataset(recorder, case, prepared)
+    ring_down = None if failure else _ring_down(case, modes, dataset)
+    return RunResult(modes, dataset, statistics, ring_down, shifts, failure)
+
+
+def run_study(
+    case: Case, scenarios: Sequence[PreparedScenario], observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None
+) -> Iterator[RunResult]:
+    """Run scenarios one after another; each result is there as soon as it is computed."""
+    for prepared in scenarios:
+        yield run_scenario(case, prepared, observers=observe(prepared) if observe else ())
+
+
+def _master(prepared: PreparedScenario) -> Master:
+    return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time)
+
+
+def _modes(
+    case: Case, prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float]
+) -> tuple[ModesResult, Blocks]:
+    point = find_operating_point(master)
+    blocks = Blocks(master)
+    model = compose(blocks, master.schedule)
+    modes = find_modes(model, *frequency_range)
+    states = [s for s in case.table.analysis.electromechanical_states if s in model.names]
+    electromechanical = most_associated(modes, states) if states else None
+    reference = _reference(case, prepared)
+    return ModesResult(prepared, point, model, modes, electromechanical, reference, _warnings(blocks, model)), blocks
+
+
+def _warnings(blocks: Blocks, model: LinearModel) -> tuple[str, ...]:
+    """Say before a run that the coupling itself is unstable."""
+    try:
+        growth = eigenvalues(continuous(blocks)).real.max()
+    except AnalysisError:
+        return ()
+    coupled = eigenvalues(model).real.max()
+    if coupled - growth <= _COUPLING_UNSTABLE:
+        return ()
+    return (
+        f"the coupling is numerically unstable: with a communication step of {blocks.step_size:g} s the step map grows "
+        f"at {coupled:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s; take a shorter step or the "
+        "Gauss-Seidel schedule, devices before the grid",
+    )
+
+
+def _reference(case: Case, prepared: PreparedScenario) -> ReferenceModeTable | None:
+    table = case.table.reference
+    if table is None:
+        return None
+    holds = all(_same(prepared.values.get(name), value) for name, value in table.when.items())
+    return table.modes.get(prepared.name) if holds else None
+
+
+def _same(value: Any, wanted: Any) -> bool:
+    return value is not None and bool(np.isclose(float(value), float(wanted)))
+
+
+def _shifts(master: Master, mode: Mode | None, blocks: Blocks) -> list[ModeShift]:
+    """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
+    if mode is None:
+        return []
+    try:
+        exact = _closest(continuous(blocks), mode.eigenvalue)
+    except AnalysisError:
+        return []
+    schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
+    shifts = []
+    for step_size in STEP_SIZES:
+        at_step = Blocks(master, step_size)
+        for name, schedule in sorted(schedules.items()):
+            shifts.append(ModeShift(name, step_size, exact, _closest(compose(at_step, schedule), exact)))
+    return shifts
+
+
+def _closest(model: LinearModel, eigenvalue: complex) -> complex:
+    values = eigenvalues(model)
+    return complex(values[np.argmin(np.abs(values - eigenvalue))])
+
+
+def _ring_down(case: Case, modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
+    table, mode = case.table.analysis.ring_down, modes.electromechanical
+    if table is None or mode is None:
+        return None
+    recorded = signal(dataset, table.signal)
+    if recorded is None:
+        return None
+    window = recorded.sel(time=slice(table.start, None))
+    try:
+        found = identify_modes(window["time"].values, window.values)
+    except AnalysisError:
+        return None
+    return nearest(found, mode.eigenvalue)
+
+
+def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> Mapping[str, Any]:
+    """The machine-readable form of `gfor modes`."""
+    return {
+        "case": case.name,
+        "step_size_s": step_size,
+        "scenarios": [
+            {
+                "name": r.prepared.name,
+                "residual": r.operating_point.residual,
+                "states": r.model.number_of_states,
+                "warnings": list(r.warnings),
+                "modes": [
+                    {
+                        "real": m.eigenvalue.real,
+                        "imag": m.eigenvalue.imag,
+                        "frequency_hz": m.frequency_hz,
+                        "damping_percent": m.damping_percent,
+                        "electromechanical": m is r.electromechanical,
+                        "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
+                    }
+                    for m in r.modes
+                ],
+            }
+            for r in results
+        ],
+    }
