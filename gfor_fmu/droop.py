@@ -48,10 +48,10 @@ def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droo
 
 
 def frequency(d: Droop, delta_p_pod: ca.SX) -> ca.SX:
-    """w = 1 + R_f (P_ref + ΔP_POD − P_f)  [pu]."""
+    """Frequency w = 1 + R_f (P_ref + ΔP_POD − P_f)  [pu]."""
     return 1 + d.R_f * (d.P_ref + delta_p_pod - d.p_f)
 
 
 def voltage_reference(d: Droop, delta_q_pod: ca.SX) -> Phasor:
-    """u_ref = U_0 + R_V (Q_ref + ΔQ_POD − Q_f) on the q axis, 0 on the d axis [pu]."""
+    """Reference u_ref = U_0 + R_V (Q_ref + ΔQ_POD − Q_f) on the q axis, 0 on the d axis [pu]."""
     return Phasor(d.U_ref + d.R_V * (d.Q_ref + delta_q_pod - d.q_f), 0)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress as ProgressBar, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.kernel import TARGETS
@@ -76,7 +77,13 @@ def _parser() -> argparse.ArgumentParser:
 
     modes = commands.add_parser("modes", help="steady state and eigenvalues of a case's scenarios")
     _case_arguments(modes)
-    modes.add_argument("--range", type=_range, default=(0.1, 2.0), metavar="LO:HI", help="frequencies shown [Hz] (default: 0.1:2)")
+    modes.add_argument(
+        "--range",
+        type=_range,
+        default=(0.1, 2.0),
+        metavar="LO:HI",
+        help="frequencies shown [Hz] (default: 0.1:2)",
+    )
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
 
@@ -84,7 +91,10 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
     build.add_argument(
-        "--platform", action="append", choices=sorted(TARGETS), help="compile the kernel for this platform (repeatable; default: this machine's)"
+        "--platform",
+        action="append",
+        choices=sorted(TARGETS),
+        help="compile the kernel for this platform (repeatable; default: this machine's)",
     )
     build.set_defaults(command=_build)
 
@@ -96,9 +106,16 @@ def _parser() -> argparse.ArgumentParser:
 
 def _case_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", metavar="CASE", help="a built-in case (two_area) or the path of a case file")
-    parser.add_argument("--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)")
     parser.add_argument(
-        "--set", action="append", default=[], type=_assignment, metavar="COMPONENT.PARAMETER=VALUE", help="override a value (repeatable)"
+        "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=_assignment,
+        metavar="COMPONENT.PARAMETER=VALUE",
+        help="override a value (repeatable)",
     )
     parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
 
@@ -108,7 +125,7 @@ def _case_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _seconds(text: str) -> float:
     try:
-        value = to_unit(_value(text), "s")  # type: ignore[arg-type]
+        value = to_unit(_value(text), "s")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     if not value > 0:
@@ -158,7 +175,7 @@ def _modes(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
         return 0
-    console = Console()
+    console = _console()
     for result in results:
         console.print(tables.all_modes(result), "")
     _print_electromechanical(console, case, results)
@@ -169,7 +186,7 @@ def _modes(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
     folder = options.out or Path("results") / case.name
-    console = Console(stderr=options.json)
+    console = _console(stderr=options.json)
     results: list[RunResult] = []
     with _progress_bar(console) as bar:
         for prepared in scenarios:
@@ -193,11 +210,17 @@ def _run(options: argparse.Namespace) -> int:
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
     if results and results[-1].failure:
         Console(stderr=True, soft_wrap=True, highlight=False).print(
-            f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: {_escape(str(results[-1].failure))}\n"
-            f"What was computed until then is in {folder}"
+            f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: "
+            f"{_escape(str(results[-1].failure))}\nWhat was computed until then is in {folder}"
         )
         return 1
     return 0
+
+
+def _console(*, stderr: bool = False) -> Console:
+    """A terminal's own width; elsewhere one that lets no table wrap."""
+    console = Console(stderr=stderr)
+    return console if console.is_terminal else Console(stderr=stderr, width=160)
 
 
 def _print_run(console: Console, case: Case, results: Sequence[RunResult]) -> None:
@@ -227,7 +250,12 @@ def _print_warnings(results: Sequence[ModesResult]) -> None:
 
 
 def _progress_bar(console: Console) -> ProgressBar:
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+    )
     return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
 
 
@@ -238,7 +266,9 @@ def _build(options: argparse.Namespace) -> int:
         if name not in model_names():
             raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
         if needs_arguments(name):
-            raise InputError(f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`")
+            raise InputError(
+                f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
+            )
         models.append(build_model(name))
     for model in models:
         platforms = tuple(options.platform) if options.platform else None
@@ -248,9 +278,13 @@ def _build(options: argparse.Namespace) -> int:
 
 def _info(options: argparse.Namespace) -> int:
     description = read_description(options.file)
-    console = Console()
+    console = _console()
     console.print(f"[bold]{_escape(description.model_name)}[/bold]: {_escape(description.title)}")
-    console.print(f"FMI 2.0 co-simulation, guid {_escape(description.guid)}, made by {_escape(description.generation_tool or '?')}", highlight=False)
+    console.print(
+        f"FMI 2.0 co-simulation, guid {_escape(description.guid)}, "
+        f"made by {_escape(description.generation_tool or 'an unnamed tool')}",
+        highlight=False,
+    )
     settable = "settable by a master" if description.states_are_settable else "not settable"
     console.print(
         f"platforms: {', '.join(description.platforms)}; continuous states: {len(description.states)} ({settable}); "

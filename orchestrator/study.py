@@ -120,7 +120,9 @@ def run_scenario(
 
 
 def run_study(
-    case: Case, scenarios: Sequence[PreparedScenario], observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None
+    case: Case,
+    scenarios: Sequence[PreparedScenario],
+    observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None,
 ) -> Iterator[RunResult]:
     """Run scenarios one after another; each result is there as soon as it is computed."""
     for prepared in scenarios:

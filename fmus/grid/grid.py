@@ -10,7 +10,7 @@ import casadi as ca
 
 from fmus.grid.network import SYSTEM_BASE_MVA, Line, Load, Network
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model, ModelBuilder, Scalar
 from fmus.toolchain.port import SYSTEM_BASE
 
 
@@ -29,11 +29,16 @@ class _Bus:
 class _Branch:
     """An inductive current state with R and X, from a voltage to a voltage."""
 
-    current: Phasor
-    R: ca.SX | float
+    current_re: ca.SX
+    current_im: ca.SX
+    R: Scalar
     X: ca.SX
     from_bus: str
     to_bus: str | None
+
+    @property
+    def current(self) -> Phasor:
+        return Phasor(self.current_re, self.current_im)
 
 
 def grid(network: Network) -> Model:
@@ -76,40 +81,67 @@ def _port_current(m: ModelBuilder, name: str) -> Phasor:
 
 def _declare_line(m: ModelBuilder, line: Line, buses: dict[str, _Bus]) -> _Branch:
     X = m.parameter(
-        f"X_{line.name}", line.X, "pu", f"Reactance of line {line.name}", base=SYSTEM_BASE, minimum=1e-5, maximum=100, tunable=True
+        f"X_{line.name}",
+        line.X,
+        "pu",
+        f"Reactance of line {line.name}",
+        base=SYSTEM_BASE,
+        minimum=1e-5,
+        maximum=100,
+        tunable=True,
     )
-    R = m.parameter(f"R_{line.name}", line.R, "pu", f"Resistance of line {line.name}", base=SYSTEM_BASE, minimum=0, tunable=True)
+    R = m.parameter(
+        f"R_{line.name}",
+        line.R,
+        "pu",
+        f"Resistance of line {line.name}",
+        base=SYSTEM_BASE,
+        minimum=0,
+        tunable=True,
+    )
     if line.B:
         B = m.parameter(f"B_{line.name}", line.B, "pu", f"Charging of line {line.name}", base=SYSTEM_BASE, minimum=1e-9)
         for bus in (line.from_bus, line.to_bus):
             buses[bus].B += B / 2
     initial = (buses[line.from_bus].v_0 - buses[line.to_bus].v_0) / Phasor(R, X)
-    return _Branch(_current_state(m, line.name, initial, f"Current of line {line.name}"), R, X, line.from_bus, line.to_bus)
+    with m.scope(line.name):
+        return _branch(m, initial, f"Current of line {line.name}", R, X, line.from_bus, line.to_bus)
 
 
 def _declare_load(m: ModelBuilder, load: Load, buses: dict[str, _Bus]) -> list[_Branch]:
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
     with m.scope(load.name):
-        scale = m.parameter("scale", 1.0, "1", "Load step: factor on G and 1/X", minimum=1e-6, maximum=100, tunable=True)
+        scale = m.parameter(
+            "scale", 1.0, "1", "Load step: factor on G and 1/X", minimum=1e-6, maximum=100, tunable=True
+        )
         P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage", minimum=0)
         bus.G += scale * P / SYSTEM_BASE_MVA / v_squared
         if load.q_mvar == 0:
             return []
-        limits = {"minimum": 1e-6} if load.q_mvar > 0 else {"maximum": -1e-6}
-        Q = m.parameter("Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage", **limits)
-        if load.q_mvar < 0:
+        inductive = load.q_mvar > 0
+        Q = m.parameter(
+            "Q",
+            load.q_mvar,
+            "Mvar",
+            "Reactive power at the power flow's voltage",
+            minimum=1e-6 if inductive else None,
+            maximum=None if inductive else -1e-6,
+        )
+        if not inductive:
             bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
             return []
         X = v_squared / (scale * Q / SYSTEM_BASE_MVA)
-        return [_Branch(_current_state(m, "i_L", bus.v_0 / Phasor(0, X), "Inductor current"), 0.0, X, load.bus, None)]
+        return [_branch(m, bus.v_0 / Phasor(0, X), "Inductor current", 0.0, X, load.bus, None)]
 
 
-def _current_state(m: ModelBuilder, name: str, initial: Phasor, text: str) -> Phasor:
-    return Phasor(
-        m.state(f"{name}.i_re" if not name.startswith("i_") else f"{name}_re", initial.re, "pu", f"{text}, real part", SYSTEM_BASE),
-        m.state(f"{name}.i_im" if not name.startswith("i_") else f"{name}_im", initial.im, "pu", f"{text}, imaginary part", SYSTEM_BASE),
-    )
+def _branch(
+    m: ModelBuilder, initial: Phasor, text: str, R: Scalar, X: ca.SX, from_bus: str, to_bus: str | None
+) -> _Branch:
+    """Declare the current of an inductive branch as a state, in the builder's scope."""
+    re = m.state("i_re", initial.re, "pu", f"{text}, real part", SYSTEM_BASE)
+    im = m.state("i_im", initial.im, "pu", f"{text}, imaginary part", SYSTEM_BASE)
+    return _Branch(re, im, R, X, from_bus, to_bus)
 
 
 def _bus_voltage(m: ModelBuilder, name: str, bus: _Bus, omega_b: ca.SX, *, dynamic: bool) -> None:
@@ -130,8 +162,8 @@ def _branch_equation(m: ModelBuilder, branch: _Branch, buses: dict[str, _Bus], o
     """(X/ω_b)·di/dt = v_from − v_to − (R + jX)·i."""
     over = buses[branch.from_bus].v - (buses[branch.to_bus].v if branch.to_bus else ZERO)
     rate = (over - Phasor(branch.R, branch.X) * branch.current) * (omega_b / branch.X)
-    m.derivative(branch.current.re, rate.re)
-    m.derivative(branch.current.im, rate.im)
+    m.derivative(branch.current_re, rate.re)
+    m.derivative(branch.current_im, rate.im)
 
 
 def _declare_outputs(m: ModelBuilder, network: Network, buses: dict[str, _Bus], branches: list[_Branch]) -> None:

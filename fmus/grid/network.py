@@ -69,12 +69,18 @@ class Network:
         for line in self.lines:
             for bus in {line.from_bus, line.to_bus} - known:
                 yield f"line {line.name!r} ends at bus {bus!r}, which does not exist"
-        for element in (*self.loads, *self.ports):
-            if element.bus not in known:
-                yield f"{type(element).__name__.lower()} {element.name!r} is at bus {element.bus!r}, which does not exist"
+        attached = [("load", x.name, x.bus) for x in self.loads] + [("port", x.name, x.bus) for x in self.ports]
+        for kind, name, bus in attached:
+            if bus not in known:
+                yield f"{kind} {name!r} is at bus {bus!r}, which does not exist"
 
     def _bad_elements(self) -> Iterable[str]:
-        names = [element.name for element in (*self.lines, *self.loads, *self.ports)] + list(self.buses)
+        names = [
+            *self.buses,
+            *(x.name for x in self.lines),
+            *(x.name for x in self.loads),
+            *(x.name for x in self.ports),
+        ]
         yield from (f"the name {name!r} is used twice" for name in sorted({n for n in names if names.count(n) > 1}))
         for line in self.lines:
             if line.X <= 0:

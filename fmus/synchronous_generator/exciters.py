@@ -12,8 +12,7 @@ import casadi as ca
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
-from fmus.toolchain.frames import Scalar
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model import ModelBuilder, Scalar
 
 TerminalVoltage = Callable[[ca.SX], ca.SX]
 
@@ -29,9 +28,7 @@ class Exciter(Protocol):
     ) -> tuple[ca.SX, ca.SX]: ...
 
 
-def ac4a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX
-) -> tuple[ca.SX, ca.SX]:
+def ac4a(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A)."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
@@ -42,9 +39,7 @@ def ac4a(
         return _close_measurement(m, v_m, E_fd, terminal_voltage)
 
 
-def st1(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX
-) -> tuple[ca.SX, ca.SX]:
+def st1(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
@@ -53,9 +48,7 @@ def st1(
         return _close_measurement(m, v_m, E_fd, terminal_voltage)
 
 
-def st4b(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX
-) -> tuple[ca.SX, ca.SX]:
+def st4b(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
     """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)

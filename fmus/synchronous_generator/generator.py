@@ -1,6 +1,14 @@
 """Machine, exciter and governor put together; one model for each excitation system."""
 
-from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
+from fmus.synchronous_generator.data import (
+    IEEE118,
+    IEEEG1_NTS631,
+    IEEEG1_STAMP,
+    SG1,
+    SG2,
+    GovernorData,
+    MachineData,
+)
 from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_voltage

@@ -115,11 +115,11 @@ def declare_machine(m: ModelBuilder, port: DevicePort, data: MachineData) -> Mac
         H = m.parameter("H", data.H, "s", "Inertia constant", minimum=0.01, source=data.source)
         D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_n", minimum=0, source=STAMP)
         d_data, q_data = _axis_parameters(m, data)
-        use_exact = m.switch("exact_conversion", data.exact_conversion, "Standard data to circuit: exact, not classical")
-        saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
-        start, d, q, delta_0 = _operating_point(
-            m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation
+        use_exact = m.switch(
+            "exact_conversion", data.exact_conversion, "Standard data to circuit: exact, not classical"
         )
+        saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
+        start, d, q, delta_0 = _operating_point(m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation)
         w = m.state("omega", 1.0, "pu", "Rotor speed", base="f_n")
         delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
     return Machine(R_s + R_t, R_t, X_t, H, D, d, q, w, delta, start)
@@ -186,8 +186,22 @@ def _saturation_factor(
 ) -> ca.SX:
     """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
     on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
-    s_10 = m.parameter("s_10", data.s_10, "1", "Saturation s(1.0) of the open-circuit curve", minimum=1e-6, source=data.source)
-    s_12 = m.parameter("s_12", data.s_12, "1", "Saturation s(1.2) of the open-circuit curve", minimum=1e-6, source=data.source)
+    s_10 = m.parameter(
+        "s_10",
+        data.s_10,
+        "1",
+        "Saturation s(1.0) of the open-circuit curve",
+        minimum=1e-6,
+        source=data.source,
+    )
+    s_12 = m.parameter(
+        "s_12",
+        data.s_12,
+        "1",
+        "Saturation s(1.2) of the open-circuit curve",
+        minimum=1e-6,
+        source=data.source,
+    )
     psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
     s = s_10 * ca.exp(ca.log(s_12 / s_10) / ca.log(1.2) * ca.log(psi))
     return m.calculated("saturation_factor", 1 + on * s, "1", "1 + s(ψ) at the operating point")
@@ -207,7 +221,9 @@ def _operating_point(
     """Circuit of both axes, rotor angle and every flux of the steady state."""
     reactances = {}
     for axis, data in {"d": d_data, "q": q_data}.items():
-        X_m = m.calculated(f"X_m{axis}", (data.X - data.X_l) / saturation, "pu", f"Magnetising reactance, {axis} axis", "S_n")
+        X_m = m.calculated(
+            f"X_m{axis}", (data.X - data.X_l) / saturation, "pu", f"Magnetising reactance, {axis} axis", "S_n"
+        )
         b = convert(data, port.omega_b, use_exact)
         branches = RotorBranches(
             *(
@@ -215,9 +231,16 @@ def _operating_point(
                 for name, value in {"X_1": b.X_1, "R_1": b.R_1, "X_2": b.X_2, "R_2": b.R_2}.items()
             )
         )
-        m.require(ca.fmin(branches.X_1, branches.X_2), f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants")
+        m.require(
+            ca.fmin(branches.X_1, branches.X_2),
+            f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants",
+        )
         X_sub = m.calculated(
-            f"X_m{axis}2", 1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2), "pu", f"Subtransient X''_{axis} − X_l", "S_n"
+            f"X_m{axis}2",
+            1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2),
+            "pu",
+            f"Subtransient X''_{axis} − X_l",
+            "S_n",
         )
         reactances[axis] = X_m, branches, X_sub, X_sub + data.X_l + X_t
 

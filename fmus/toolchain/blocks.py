@@ -8,8 +8,7 @@ through; its state then follows the input with `BYPASS_TIME` and is seen by nobo
 
 import casadi as ca
 
-from fmus.toolchain.frames import Scalar
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model import ModelBuilder, Scalar
 
 BYPASS_TIME = 0.01
 """Time constant [s] with which the unused state of a left-out block follows its input."""
@@ -37,9 +36,7 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial
     return ca.if_else(left_out, u, x)
 
 
-def lead_lag(
-    m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0
-) -> ca.SX:
+def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0."""
     x = m.state(name, initial, "pu", "lead/lag", base="S_n")
     left_out = _is_zero(T_lag)
@@ -48,9 +45,7 @@ def lead_lag(
     return ca.if_else(left_out, u, x + (T_lead / T) * (u - x))
 
 
-def proportional_integral(
-    m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar
-) -> ca.SX:
+def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar) -> ca.SX:
     """K_P + K_I/s; ``initial`` is the steady-state output, carried by the integrator."""
     x = m.state(name, initial, "pu", "integrator", base="S_n")
     m.derivative(x, K_I * error)

@@ -49,7 +49,12 @@ def model_description(model: Model, guid: str, identifier: str, tool: str) -> by
     _units(root, model)
     categories = SubElement(root, "LogCategories")
     for status in ("Warning", "Discard", "Error", "Fatal"):
-        SubElement(categories, "Category", name=f"logStatus{status}", description=f"Messages with fmi2{status} status")
+        SubElement(
+            categories,
+            "Category",
+            name=f"logStatus{status}",
+            description=f"Messages with fmi2{status} status",
+        )
     SubElement(categories, "Category", name="logAll", description="All messages")
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
     annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=VENDOR)
@@ -57,7 +62,8 @@ def model_description(model: Model, guid: str, identifier: str, tool: str) -> by
     _variables(root, model)
     _structure(root, model)
     indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8")
+    text: str = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def _derivative_unit(state: State) -> str:
@@ -77,16 +83,18 @@ def _units(root: Element, model: Model) -> None:
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(model.variables):
-        attributes, kind, start = _attributes(variable)
+        attributes, kind, own = _attributes(variable)
         element = SubElement(
             variables,
             "ScalarVariable",
-            name=variable.name,
-            valueReference=str(reference),
-            description=variable.text,
-            **attributes,
+            {
+                "name": variable.name,
+                "valueReference": str(reference),
+                "description": variable.text,
+                **attributes,
+            },
         )
-        SubElement(element, kind, start)
+        SubElement(element, kind, own)
     first_state = len(model.parameters) + len(model.calculated) + len(model.inputs)
     for position, state in enumerate(model.states):
         name = f"der({state.name})"
@@ -164,11 +172,16 @@ def _structure(root: Element, model: Model) -> None:
     write(unknowns, np_ + nc + nu, [(x_p, parameters)])
     through = [(g_p | _product(g_x, x_p) | _product(g_c, c_p), parameters), (g_u, inputs)]
     write(unknowns, first_output, through)
-    write(unknowns, first_derivative, [(f_p | _product(f_x, x_p) | _product(f_c, c_p), parameters), (f_u, inputs)])
+    write(
+        unknowns,
+        first_derivative,
+        [(f_p | _product(f_x, x_p) | _product(f_c, c_p), parameters), (f_u, inputs)],
+    )
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return (a.astype(int) @ b.astype(int)) > 0
+    product: np.ndarray = (a.astype(int) @ b.astype(int)) > 0
+    return product
 
 
 def _dependence(function: ca.Function, output: int, input_: int) -> np.ndarray:

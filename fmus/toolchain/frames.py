@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.toolchain.model import ModelBuilder
-
-Scalar = ca.SX | float
+from fmus.toolchain.model import ModelBuilder, Scalar
 
 
 @dataclass(frozen=True)
@@ -61,9 +59,7 @@ class Phasor:
 
     def clamped(self, limit_re: Scalar, limit_im: Scalar) -> Phasor:
         """Each part limited to ± its limit."""
-        return Phasor(
-            ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im)
-        )
+        return Phasor(ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im))
 
 
 ZERO = Phasor(0.0, 0.0)
@@ -80,7 +76,7 @@ def power(voltage: Phasor, current: Phasor) -> Phasor:
 
 
 def current_of_power(p: Scalar, q: Scalar, voltage: Phasor) -> Phasor:
-    """i = conj((P + jQ)/v), per unit."""
+    """Current i = conj((P + jQ)/v), per unit."""
     return (Phasor(p, q) / voltage).conjugate()
 
 

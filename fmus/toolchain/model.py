@@ -11,7 +11,18 @@ from functools import cached_property
 
 import casadi as ca
 
-from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable, VariableType
+from fmus.toolchain.variables import (
+    CalculatedParameter,
+    Input,
+    Output,
+    Parameter,
+    State,
+    Variable,
+    VariableType,
+)
+
+Scalar = ca.SX | float
+"""What equations are made of."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +151,16 @@ class ModelBuilder:
         """Declare a parameter; ``start`` is its default."""
         return self._declare(
             Parameter(
-                self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source
+                self._full(name),
+                unit,
+                description,
+                base,
+                float(start),
+                minimum,
+                maximum,
+                tunable,
+                type,
+                source,
             )
         )
 
@@ -148,7 +168,7 @@ class ModelBuilder:
         """Declare a Boolean parameter; in the equations it is 0 or 1."""
         return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
 
-    def calculated(self, name: str, value: ca.SX, unit: str, description: str, base: str = "") -> ca.SX:
+    def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
         """Declare a quantity computed at initialisation from fixed parameters."""
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
@@ -158,19 +178,19 @@ class ModelBuilder:
         """Declare an input."""
         return self._declare(Input(self._full(name), unit, description, base, start))
 
-    def state(self, name: str, initial: ca.SX | float, unit: str, description: str, base: str = "") -> ca.SX:
+    def state(self, name: str, initial: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
         """Declare a continuous state with its initial value, an expression of parameters."""
         full = self._full(name)
         self._expressions[full] = ca.SX(initial)
         return self._declare(State(full, unit, description, base))
 
-    def derivative(self, state: ca.SX, rate: ca.SX) -> None:
+    def derivative(self, state: ca.SX, rate: Scalar) -> None:
         """Give the time derivative [unit of the state per second] of a declared state."""
         if state.name() in self._derivatives:
             raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
         self._derivatives[state.name()] = ca.SX(rate)
 
-    def output(self, name: str, value: ca.SX, unit: str, description: str, base: str = "") -> None:
+    def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
         """Declare an output as a function of states, inputs and parameters."""
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
@@ -180,7 +200,7 @@ class ModelBuilder:
         """Return a symbol for a signal that is used before it can be written; `close` gives its value."""
         return ca.SX.sym(self._full(name))
 
-    def close(self, symbol: ca.SX, value: ca.SX) -> None:
+    def close(self, symbol: ca.SX, value: Scalar) -> None:
         """Give the value of an `algebraic` signal.
 
         Raises
@@ -188,11 +208,12 @@ class ModelBuilder:
         ValueError
             If the value depends on the signal itself: an algebraic loop.
         """
+        value = ca.SX(value)
         if ca.depends_on(value, symbol):
             raise ValueError(f"model {self.name}: signal {symbol.name()!r} depends directly on itself")
         self._algebraic.append((symbol, value))
 
-    def require(self, positive: ca.SX, rule: str) -> None:
+    def require(self, positive: Scalar, rule: str) -> None:
         """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
         self._requirements.append((ca.SX(positive), rule))
 
@@ -243,9 +264,7 @@ class ModelBuilder:
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:
         """Express every calculated parameter by parameters alone; each may use those declared before it."""
-        tunable = ca.vertcat(
-            *[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable]
-        )
+        tunable = ca.vertcat(*[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable])
         values: list[ca.SX] = []
         for index, (variable, _) in enumerate(entries):
             value = ca.substitute(self._expressions[variable.name], c[:index], ca.vertcat(*values))

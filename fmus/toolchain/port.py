@@ -42,10 +42,14 @@ def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     rating = m.parameter("S_n", S_n, "MVA", "Rated apparent power, the device's base", minimum=1e-3)
     system = m.parameter("S_base", 100.0, "MVA", "Base power of the network", minimum=1e-3)
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
-    v_0 = m.parameter("v_0", 1.0, "pu", "Power flow: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0)
+    v_0 = m.parameter(
+        "v_0", 1.0, "pu", "Power flow: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0
+    )
     theta_0 = m.parameter("theta_0", 0.0, "rad", "Power flow: voltage angle at the bus")
     p_0 = m.parameter("P_0", P_0, "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
-    q_0 = m.parameter("Q_0", 0.0, "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
+    q_0 = m.parameter(
+        "Q_0", 0.0, "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0
+    )
     bus = polar(v_0, theta_0)
     v = Phasor(
         m.input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0),

@@ -17,8 +17,9 @@ import pythonfmu
 
 from fmus.toolchain.cache import cache_directory
 from fmus.toolchain.description import model_description
-from fmus.toolchain.kernel import COMPILER_FLAGS, TARGETS, c_source, compile_kernel, python_source
+from fmus.toolchain.kernel import COMPILER_FLAGS, TARGETS, c_source, compile_kernel
 from fmus.toolchain.model import Model
+from fmus.toolchain.python_kernel import python_source
 
 _NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
 _TIMESTAMP = (2020, 1, 1, 0, 0, 0)

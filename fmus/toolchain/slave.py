@@ -94,7 +94,7 @@ class Slave(Fmi2Slave):
 
     def _check_requirements(self):
         self._kernel.requirements(self._address, self._margins_address)
-        broken = [rule for rule, margin in zip(self._rules, self._margins, strict=False) if not margin > 0.0]
+        broken = [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]
         if broken:
             self._fail("parameters cannot be used: " + "; ".join(broken))
 
@@ -107,7 +107,7 @@ class Slave(Fmi2Slave):
         try:
             self._refresh()
             self._check_requirements()
-            worst = [n for n, v in zip(self._names, self._z, strict=True) if not math.isfinite(v)]
+            worst = [n for n, v in zip(self._names, self._z) if not math.isfinite(v)]
             if worst:
                 self._fail(f"initialisation gives no finite value for {', '.join(worst[:5])}; check the parameters")
         except Exception as error:

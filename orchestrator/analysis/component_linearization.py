@@ -102,7 +102,9 @@ def linearize_component(exchange: ComponentExchange, time: float, step_size: flo
     )
 
 
-def _differences(exchange: ComponentExchange, time: float, step_size: float, size: float) -> tuple[Matrix, Matrix, Matrix]:
+def _differences(
+    exchange: ComponentExchange, time: float, step_size: float, size: float
+) -> tuple[Matrix, Matrix, Matrix]:
     """Columns of d(x⁺), d(y), d(ẋ) by every state, then every coupled input."""
     component = exchange.component
     states = StateAccess(component)
@@ -132,7 +134,7 @@ def _differences(exchange: ComponentExchange, time: float, step_size: float, siz
                 component.step(time, step_size)
                 ends.append((states.read(), y, rate))
                 component.restore_state(saved)
-            columns.append(tuple((a - b) / (2 * step) for a, b in zip(*ends, strict=True)))  # type: ignore[arg-type]
+            columns.append(tuple((a - b) / (2 * step) for a, b in zip(*ends, strict=True)))
     finally:
         component.restore_state(saved)
         component.free_state(saved)

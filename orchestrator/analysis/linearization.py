@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.analysis.component_linearization import ComponentLinearization, Matrix, linearize_component
+from orchestrator.analysis.component_linearization import Matrix, linearize_component
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import AnalysisError
@@ -139,7 +139,9 @@ def continuous(blocks: Blocks) -> LinearModel:
     windows, names = blocks.state_windows(), blocks.state_names()
     silent = [name for name, c in blocks.components.items() if c.A_c is None]
     if silent:
-        raise AnalysisError(f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made")
+        raise AnalysisError(
+            f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made"
+        )
     x = np.eye(len(names))
     y = np.zeros((len(blocks.output_names), len(names)))
     _settle_outputs(blocks, windows, x, y, list(blocks.components))

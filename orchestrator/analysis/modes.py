@@ -70,9 +70,7 @@ def find_modes(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2
     lambdas, alive = _continuous(values, model)
     left, right = left[:, alive], right[:, alive]
     chosen = [
-        k
-        for k, value in enumerate(lambdas)
-        if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
+        k for k, value in enumerate(lambdas) if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
     ]
     modes = [_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
     return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
@@ -86,9 +84,9 @@ def most_associated(modes: Iterable[Mode], states: Iterable[str]) -> Mode | None
 
 def _continuous(values: NDArray[np.complex128], model: LinearModel) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     if model.step_size is None:
-        return values, np.ones(len(values), dtype=bool)
+        return values.astype(complex), np.ones(len(values), dtype=bool)
     alive = np.abs(values) > _DEAD
-    return np.log(values[alive]) / model.step_size, alive
+    return np.log(values[alive].astype(complex)) / model.step_size, alive
 
 
 def _mode(value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]) -> Mode:

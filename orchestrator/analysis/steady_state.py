@@ -99,5 +99,4 @@ def _newton_correction(master: Master, n: int, change: Matrix) -> Matrix:
     if extra:  # held outputs are functions of the states at a fixed point: eliminate them
         memory = model.A[n:, n:]
         A = A + model.A[:n, n:] @ np.linalg.solve(np.eye(len(extra)) - memory, model.A[n:, :n])
-    correction: Matrix = np.linalg.lstsq(np.eye(n) - A, change, rcond=1e-13)[0]
-    return correction
+    return np.asarray(np.linalg.lstsq(np.eye(n) - A, change, rcond=1e-13)[0], dtype=float)

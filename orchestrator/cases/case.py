@@ -82,7 +82,9 @@ class Case:
             raise CaseError(str(self.path), problems)
         prepared = []
         for name in scenarios or self.scenarios:
-            preparer = Preparer(self.table, name, self.scenarios[name], dict(overrides or {}), self.path.parent, self.place)
+            preparer = Preparer(
+                self.table, name, self.scenarios[name], dict(overrides or {}), self.path.parent, self.place
+            )
             prepared.append(preparer.prepare(step_size, stop_time))
             problems += [p for p in preparer.problems if p not in problems]
         if problems:
@@ -109,7 +111,8 @@ def load_case(name_or_path: str | Path) -> Case:
         path = BUILT_IN / str(name_or_path) / "case.toml"
     if not path.is_file():
         raise InputError(
-            f"{name_or_path}: there is neither a built-in case of that name ({', '.join(built_in_cases())}) nor such a file"
+            f"{name_or_path}: there is no such file, nor a built-in case of that name; "
+            f"built-in: {', '.join(built_in_cases())}"
         )
     try:
         text = path.read_text(encoding="utf-8")
@@ -140,10 +143,12 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
 
 
 def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
-    """pydantic's location without the tags that it adds for unions."""
+    """Location of a pydantic error, without the tags that it adds for unions."""
     path: list[str | int] = []
     for part in location:
-        inside = (isinstance(raw, dict) and part in raw) or (isinstance(raw, list) and isinstance(part, int) and part < len(raw))
+        inside = (isinstance(raw, dict) and part in raw) or (
+            isinstance(raw, list) and isinstance(part, int) and part < len(raw)
+        )
         if inside:
             path.append(part)
             raw = raw[part]
@@ -170,7 +175,7 @@ def _schema_message(detail: Any) -> str:
         case _:
             seen = detail.get("input")
             shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""
-            return detail["msg"].removeprefix("Value error, ") + shown
+            return str(detail["msg"]).removeprefix("Value error, ") + shown
 
 
 def _place(text: str, path: Sequence[str | int]) -> str:

@@ -64,7 +64,11 @@ class PowerFlow:
 
 
 def solve_power_flow(
-    buses: Sequence[str], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], units: Sequence[FlowUnit], slack: str
+    buses: Sequence[str],
+    lines: Sequence[FlowLine],
+    loads: Sequence[FlowLoad],
+    units: Sequence[FlowUnit],
+    slack: str,
 ) -> PowerFlow:
     """Solve the power flow.
 
@@ -82,7 +86,9 @@ def solve_power_flow(
     for bus, members in at_bus.items():
         if len({u.v_0 for u in members}) > 1:
             wanted = ", ".join(f"{u.name} wants {u.v_0:g}" for u in members)
-            raise InputError(f"power flow: bus {bus!r} cannot have two voltages ({wanted}); give its units the same v_0")
+            raise InputError(
+                f"power flow: bus {bus!r} cannot have two voltages ({wanted}); give its units the same v_0"
+            )
     slack_bus = next(u.bus for u in units if u.name == slack)
     voltages = _pandapower_voltages(buses, lines, loads, at_bus, slack_bus)
     return _shares(voltages, lines, loads, at_bus, slack_bus)
@@ -95,7 +101,7 @@ def _pandapower_voltages(
     at_bus: Mapping[str, Sequence[FlowUnit]],
     slack_bus: str,
 ) -> dict[str, complex]:
-    import pandapower as pp  # slow to import; only needed here
+    import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
 
     logging.getLogger("pandapower").setLevel(logging.ERROR)
     kv = 230.0
@@ -129,9 +135,7 @@ def _pandapower_voltages(
             "Lower P_0 or the loads, or the line reactances"
         ) from error
     result = net.res_bus
-    return {
-        bus: cmath.rect(float(result.vm_pu[i]), float(np.deg2rad(result.va_degree[i]))) for bus, i in index.items()
-    }
+    return {bus: cmath.rect(float(result.vm_pu[i]), float(np.deg2rad(result.va_degree[i]))) for bus, i in index.items()}
 
 
 def _shares(

@@ -1,7 +1,7 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 from fmus.grid.network import Line, Load, Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, network_of
 from fmus.toolchain.python_fmu import cached
-from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import (
     BranchChangeTable,
     CaseTable,
@@ -22,7 +22,8 @@ from orchestrator.cases.schema import (
     ScenarioTable,
     Value,
 )
-from orchestrator.cases.units import to_unit
+from orchestrator.cases.start_values import start_from_power_flow
+from orchestrator.cases.values import convert, flatten
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import BranchChange, Event, LoadChange, ParameterChange, ReferenceChange
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
@@ -32,7 +33,6 @@ from orchestrator.fmi.description import FmuDescription, VariableInfo, read_desc
 
 Place = Callable[..., str]
 _COMMAND_LINE = "--set"
-_POWER_FLOW_RESULTS = ("Q_0", "theta_0")
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,10 @@ class Preparer:
 
     def _network_from_table(self) -> Network | None:
         if self.case.network is None:
-            self.note(self.place("power_flow", "grid"), "the model 'grid' needs a [network] table with buses, lines and loads")
+            self.note(
+                self.place("power_flow", "grid"),
+                "the model 'grid' needs a [network] table with buses, lines and loads",
+            )
             return None
         table = self.case.network
         try:
@@ -171,7 +174,9 @@ class Preparer:
             return read_description(self.directory / table.fmu)
         own = table.model == "grid"
         if own and self.network is None:
-            raise InputError("the model 'grid' needs a [network] table and a [power_flow] table that names this component")
+            raise InputError(
+                "the model 'grid' needs a [network] table and a [power_flow] table that names this component"
+            )
         return catalogue_fmu(table.model or "", self.network if own else None)
 
     # -- values ----------------------------------------------------------------------------------
@@ -179,7 +184,7 @@ class Preparer:
     def _assign_values(self) -> None:
         for name, table in self.tables.items():
             for group in ("parameters", "inputs"):
-                for path, value in _flatten(getattr(table, group)):
+                for path, value in flatten(getattr(table, group)):
                     self._assign(name, ".".join(path), value, self.place("components", name, group, *path))
         for key, value in self.scenario.set.items():
             self._assign_key(key, value, self.place("scenarios", self.name, "set", key))
@@ -213,40 +218,19 @@ class Preparer:
             target[variable] = converted
 
     def _convert(self, info: VariableInfo, value: Value, where: str) -> float | bool | None:
-        """The value in the declared unit, if type, unit and range fit."""
-        if info.type == "Boolean":
-            if isinstance(value, bool):
-                return value
-            self.note(where, f"{info.name} = {value!r}; it must be true or false")
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            self.note(where, f"{info.name} = {value!r}; it must be a number")
-            return None
         try:
-            number = to_unit(value, info.unit)
+            return convert(info, value)
         except ValueError as error:
-            self.note(where, f"{info.name}: {error}")
+            self.note(where, str(error))
             return None
-        unit = f" {info.unit}" if info.unit not in ("", "1") else ""
-        if info.type == "Integer" and number != int(number):
-            self.note(where, f"{info.name} = {number:g}; it must be a whole number")
-        elif info.minimum is not None and number < info.minimum:
-            self.note(where, f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}")
-        elif info.maximum is not None and number > info.maximum:
-            self.note(where, f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}")
-        elif number != number:
-            self.note(where, f"{info.name} is not a number; give one")
-        else:
-            return number
-        return None
 
     # -- connections -----------------------------------------------------------------------------
 
     def _connect(self) -> None:
-        for index, table in enumerate(self.case.connections):
-            ends = {table.source.partition(".")[0], table.target.partition(".")[0]}
+        for index, wire in enumerate(self.case.connections):
+            ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
             if not ends & set(self.scenario.remove):
-                self._try_connect(table.source, table.target, self.place("connections", index))
+                self._try_connect(wire.source, wire.target, self.place("connections", index))
         for name, table in self.tables.items():
             if table.bus is not None and name in self.system.components:
                 self._connect_to_bus(name, table.bus)
@@ -254,7 +238,10 @@ class Preparer:
     def _connect_to_bus(self, name: str, bus: str) -> None:
         where = self.place("components", name, "bus")
         if self.case.power_flow is None or self.network is None:
-            self.note(where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]")
+            self.note(
+                where,
+                "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
+            )
             return
         ports = {port.name: port.bus for port in self.network.ports}
         if ports.get(name) != bus:
@@ -280,74 +267,26 @@ class Preparer:
         for endpoint in self.system.unconnected_inputs():
             self.note(
                 self.place("components", endpoint.component),
-                f"scenario {self.name!r}: nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'",
+                f"scenario {self.name!r}: nothing feeds the input {endpoint}; "
+                "connect it, or give it a constant under 'inputs'",
             )
 
     # -- operating point -------------------------------------------------------------------------
 
-    def _value(self, component: str, variable: str) -> float:
-        plan = self.system.components[component]
-        if variable in plan.parameters:
-            return float(plan.parameters[variable])
-        return float(plan.description.variables[variable].start or 0.0)
-
     def _power_flow(self) -> PowerFlow | None:
-        """Solve the power flow from the values set, and give every component what it starts from."""
         if self.case.power_flow is None or self.network is None:
             return None
-        grid, slack = self.case.power_flow.grid, self.case.power_flow.slack
+        table = self.case.power_flow
         units = {p.name: p.bus for p in self.network.ports if p.name in self.system.components}
-        if slack not in units:
-            self.note(self.place("power_flow", "slack"), f"{slack!r} is no unit of this scenario; units: {', '.join(units)}")
+        if table.slack not in units:
+            known = ", ".join(units)
+            self.note(self.place("power_flow", "slack"), f"{table.slack!r} is no unit of this scenario; units: {known}")
             return None
-        self._reject_results(units, grid)
-        network, value = self.network, self._value
         try:
-            flow = solve_power_flow(
-                network.buses,
-                [
-                    FlowLine(l.name, l.from_bus, l.to_bus, value(grid, f"R_{l.name}"), value(grid, f"X_{l.name}"),
-                             value(grid, f"B_{l.name}") if l.B else 0.0)
-                    for l in network.lines
-                ],
-                [
-                    FlowLoad(l.bus, value(grid, f"{l.name}.P"), value(grid, f"{l.name}.Q") if l.q_mvar else 0.0)
-                    for l in network.loads
-                ],
-                [FlowUnit(n, bus, value(n, "S_n"), value(n, "P_0"), value(n, "v_0")) for n, bus in units.items()],
-                slack,
-            )  # fmt: skip
+            return start_from_power_flow(self.system, self.network, table.grid, units, table.slack)
         except InputError as error:
             self.note(self.place("power_flow"), f"scenario {self.name!r}: {error}")
             return None
-        self._start_from(flow, units, grid)
-        return flow
-
-    def _reject_results(self, units: Mapping[str, str], grid: str) -> None:
-        """What the power flow computes cannot be given as well."""
-        for name in units:
-            for variable in _POWER_FLOW_RESULTS:
-                if variable in self.system.components[name].parameters:
-                    self.note(self.place("components", name), f"{name}.{variable} is a result of the power flow; remove it, and set P_0 and v_0")
-
-    def _start_from(self, flow: PowerFlow, units: Mapping[str, str], grid: str) -> None:
-        import cmath
-
-        for bus, voltage in flow.voltages.items():
-            self.system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
-        for name, bus in units.items():
-            power, voltage = flow.powers[name], flow.voltages[bus]
-            start = {"P_0": power.real, "Q_0": power.imag, "v_0": abs(voltage), "theta_0": cmath.phase(voltage)}
-            plan = self.system.components[name]
-            for variable, number in start.items():
-                maximum = plan.description.variables[variable].maximum
-                if maximum is not None and abs(number) > maximum:
-                    self.note(
-                        self.place("components", name),
-                        f"scenario {self.name!r}: the power flow gives {name} {variable} = {number:.4g} pu, more than it can "
-                        f"take ({maximum:g}); raise its S_n or move load and generation",
-                    )
-            plan.parameters |= start
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -405,7 +344,10 @@ class Preparer:
             if info is None:
                 self.note(where, f"component {event.component!r} has no variable {variable!r} for this event to set")
             elif info.causality != "input" and info.variability != "tunable":
-                self.note(where, f"{event.component}.{variable} is {info.variability}; only a tunable parameter can change during a run")
+                self.note(
+                    where,
+                    f"{event.component}.{variable} is {info.variability}; only tunable parameters change during a run",
+                )
             else:
                 self._convert(info, value, where)
         return len(self.problems) == before
@@ -422,14 +364,3 @@ def _event(table: EventTable) -> Event:
         case ParameterChangeTable():
             value = table.value if isinstance(table.value, bool) else float(table.value)
             return ParameterChange(table.time, table.component, table.parameter, value)
-
-
-def _flatten(table: Mapping[str, Any]) -> list[tuple[tuple[str, ...], Any]]:
-    """Nested tables as paths: ``droop.R_f = 0.05`` is the variable ``droop.R_f``."""
-    flat: list[tuple[tuple[str, ...], Any]] = []
-    for key, value in table.items():
-        if isinstance(value, dict):
-            flat += [((key, *path), inner) for path, inner in _flatten(value)]
-        else:
-            flat.append(((key,), value))
-    return flat

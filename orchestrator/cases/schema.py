@@ -117,7 +117,8 @@ class ParameterChangeTable(Table):
 
 
 EventTable = Annotated[
-    LoadChangeTable | BranchChangeTable | ReferenceChangeTable | ParameterChangeTable, Field(discriminator="type")
+    LoadChangeTable | BranchChangeTable | ReferenceChangeTable | ParameterChangeTable,
+    Field(discriminator="type"),
 ]
 
 

@@ -8,7 +8,7 @@ import pint
 
 @cache
 def _registry() -> Any:
-    registry = pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry()
     registry.define("per_unit = [per_unit] = pu")
     registry.define("volt_ampere = volt * ampere = VA")
     registry.define("volt_ampere_reactive = volt * ampere = var")

@@ -6,7 +6,7 @@ from pathlib import Path
 from shutil import rmtree
 from time import perf_counter
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import fmpy
 import numpy as np
@@ -73,7 +73,9 @@ class Master:
     def __init__(self, system: System, schedule: Schedule, step_size: float, stop_time: float | None = None) -> None:
         open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
         if open_inputs:
-            raise InputError(f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value")
+            raise InputError(
+                f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value"
+            )
         schedule.check(set(system.components))
         self.system, self.schedule, self.clock = system, schedule, Clock(step_size)
         self.index = 0
@@ -88,7 +90,7 @@ class Master:
         except BaseException:
             self.close()
             raise
-        self._plan = [[self._calls(self.exchanges[name]) for name in group] for group in schedule.groups]
+        self._plan = [[_calls(self.exchanges[name]) for name in group] for group in schedule.groups]
 
     # -- life cycle ------------------------------------------------------------------------------
 
@@ -148,7 +150,9 @@ class Master:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     # -- single steps ----------------------------------------------------------------------------
@@ -163,21 +167,6 @@ class Master:
         if len(exchange.sources):
             np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
             exchange.inputs.write()
-
-    @staticmethod
-    def _calls(exchange: ComponentExchange) -> tuple[object, ...]:
-        component = exchange.component
-        return (
-            component,
-            exchange.sources if len(exchange.sources) else None,
-            exchange.inputs.values,
-            component.set_real,
-            exchange.inputs.arguments,
-            component.do_step,
-            component.pointer,
-            component.get_real,
-            exchange.outputs.arguments if len(exchange.outputs.names) else None,
-        )
 
     def advance(self, count: int) -> None:
         """Do ``count`` communication steps and nothing else.
@@ -274,7 +263,10 @@ class Master:
         """Step to a communication point, stopping only where an observer looks."""
         while self.index < target:
             done = self.index - first
-            stretch = min([target - self.index, _TIMED_EVERY - done % _TIMED_EVERY] + [o.every - done % o.every for o in observers])
+            stretch = min(
+                [target - self.index, _TIMED_EVERY - done % _TIMED_EVERY]
+                + [o.every - done % o.every for o in observers]
+            )
             if done % _TIMED_EVERY == 0:
                 self._timed_step()
                 stretch -= 1
@@ -298,3 +290,19 @@ class Master:
             for name, spent in self._timed_seconds.items()
         )
         return StepStatistics(steps, seconds, components)
+
+
+def _calls(exchange: ComponentExchange) -> tuple[Any, ...]:
+    """What the inner loop needs of a component, looked up once."""
+    component = exchange.component
+    return (
+        component,
+        exchange.sources if len(exchange.sources) else None,
+        exchange.inputs.values,
+        component.set_real,
+        exchange.inputs.arguments,
+        component.do_step,
+        component.pointer,
+        component.get_real,
+        exchange.outputs.arguments if exchange.outputs.names else None,
+    )

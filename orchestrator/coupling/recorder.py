@@ -48,7 +48,10 @@ class Recorder:
                 raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
-            (RealBatch(master.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))
+            (
+                RealBatch(master.components[component], [v for _, v in entries]),
+                np.array([c for c, _ in entries]),
+            )
             for component, entries in by_component.items()
         ]
         rows = (stop_index - master.index) // self.every + 2

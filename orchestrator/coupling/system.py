@@ -76,7 +76,9 @@ class System:
         if into.causality != "input":
             raise InputError(f"{label}: {target} is of causality {into.causality}; a connection ends at an input")
         if out.type != "Real" or into.type != "Real":
-            raise InputError(f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled")
+            raise InputError(
+                f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled"
+            )
         if out.unit and into.unit and out.unit != into.unit:
             raise InputError(f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal")
         feeding = next((c.source for c in self.connections if c.target == end), None)

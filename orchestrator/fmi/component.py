@@ -28,9 +28,9 @@ _ERROR = 3
 _LOG_LENGTH = 50
 
 try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms
-    from fmpy.logging import addLoggerProxy
+    from fmpy import logging as fmpy_logging
 except (ImportError, OSError):
-    addLoggerProxy = None
+    fmpy_logging = None
 
 
 class RealBatch:
@@ -111,8 +111,8 @@ class Component:
         callbacks.logger = fmi2CallbackLoggerTYPE(log)
         callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        if addLoggerProxy is not None:
-            addLoggerProxy(ctypes.byref(callbacks))
+        if fmpy_logging is not None:
+            fmpy_logging.addLoggerProxy(ctypes.byref(callbacks))
         return callbacks
 
     def _bind_functions(self) -> None:
@@ -181,7 +181,9 @@ class Component:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     # -- values ----------------------------------------------------------------------------------
@@ -207,7 +209,9 @@ class Component:
                 "Boolean": (self._fmu.setBoolean, bool),
             }
             if variable.type not in setters:
-                raise InputError(f"component {self.name!r}: variable {name!r} is of type {variable.type}, which cannot be set here")
+                raise InputError(
+                    f"component {self.name!r}: variable {name!r} is of type {variable.type}, which cannot be set here"
+                )
             setter, convert = setters[variable.type]
             self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
 

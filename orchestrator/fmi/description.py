@@ -97,18 +97,26 @@ def read_description(path: Path | str) -> FmuDescription:
     text = _model_description_text(path)
     version = _fmi_version(path, text)
     if version != "2.0":
-        raise FmuFileError(f"{path}: it is an FMU of FMI {version}; this master runs FMI 2.0 co-simulation, ask for that export")
+        raise FmuFileError(
+            f"{path}: it is an FMU of FMI {version}; this master runs FMI 2.0 co-simulation, ask for that export"
+        )
     try:
         description = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:  # fmpy raises whatever its parsers raise
-        raise FmuFileError(f"{path}: modelDescription.xml cannot be read: {error}; run `fmpy validate` on the file") from error
+        raise FmuFileError(
+            f"{path}: modelDescription.xml cannot be read: {error}; run `fmpy validate` on the file"
+        ) from error
     if description.coSimulation is None:
-        raise FmuFileError(f"{path}: it is an FMU for Model Exchange only; this master needs FMI 2.0 co-simulation, ask for that export")
+        raise FmuFileError(
+            f"{path}: it is an FMU for Model Exchange only; this master needs FMI 2.0 co-simulation, "
+            "ask for that export"
+        )
     platforms = tuple(fmpy.supported_platforms(str(path)))
     if fmpy.platform not in platforms:
         has = ", ".join(platforms) or "none"
         raise FmuFileError(
-            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; ask its author for a {fmpy.platform} build"
+            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
+            f"ask its author for a {fmpy.platform} build"
         )
     return _describe(path, description, text, platforms)
 

@@ -14,7 +14,7 @@ from orchestrator.report.signals import signal
 if TYPE_CHECKING:
     from orchestrator.study import ModesResult, RunResult
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "grid.color": "#e3e3e3",
     "grid.linewidth": 0.6,
@@ -42,12 +42,15 @@ def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -
             for index, result, data in curves:
                 if data is not None:
                     axis.plot(
-                        data["time"], panel.scale * data, color=_colour(index), label=result.modes.prepared.title
+                        data["time"],
+                        panel.scale * data,
+                        color=_colour(index),
+                        label=result.modes.prepared.title,
                     )
             axis.set_ylabel(panel.label)
+            axis.margins(x=0)
         axes[0].set_title(table.title, loc="left")
         axes[-1].set_xlabel("Time [s]")
-        axes[-1].margins(x=0)
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))
         _save(figure, path)
@@ -81,7 +84,11 @@ def plot_eigenvalues(results: Sequence["ModesResult"], path: Path, highest_hz: f
                     edgecolors=_colour(index),
                     zorder=3,
                 )
-        left = min(-1.5, *(1.15 * m.eigenvalue.real for r in results for m in r.modes if m.eigenvalue.real > -3)) if results else -1.5
+        left = (
+            min(-1.5, *(1.15 * m.eigenvalue.real for r in results for m in r.modes if m.eigenvalue.real > -3))
+            if results
+            else -1.5
+        )
         axis.set_xlim(left, 0.35)
         axis.set_ylim(0, highest_hz)
         _damping_rays(axis, left, highest_hz)
@@ -89,7 +96,7 @@ def plot_eigenvalues(results: Sequence["ModesResult"], path: Path, highest_hz: f
         axis.set_xlabel("Real part [1/s]")
         axis.set_ylabel("Frequency [Hz]")
         axis.set_title("Modes; large: electromechanical, circles: reference", loc="left")
-        axis.legend(loc="upper left")
+        figure.legend(loc="outside lower center", ncols=3)
         _save(figure, path)
 
 

@@ -15,7 +15,9 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     """
     names = [part.strip() for part in expression.split(" - ")]
     if not 1 <= len(names) <= 2 or not all(names):
-        raise InputError(f"signal {expression!r}: write 'component.variable' or 'component.variable - component.variable'")
+        raise InputError(
+            f"signal {expression!r}: write 'component.variable' or 'component.variable - component.variable'"
+        )
     if any(name not in dataset for name in names):
         return None
     first = dataset[names[0]]

@@ -28,7 +28,9 @@ def provenance(case: Case, prepared: PreparedScenario) -> dict[str, str | float]
         "events": "; ".join(map(str, prepared.events)),
         "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
-        "fmus": json.dumps({n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool} for n, d in fmus.items()}),
+        "fmus": json.dumps(
+            {n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool} for n, d in fmus.items()}
+        ),
         "versions": json.dumps({p: version(p) for p in packages}),
         "Conventions": "CF-1.10",
     }
@@ -54,7 +56,15 @@ def save_dataset(dataset: xr.Dataset, path: Path) -> None:
     names = list(dataset.data_vars)
     header = ",".join(["time [s]", *(f"{n} [{dataset[n].attrs['units']}]" for n in names)])
     table = np.column_stack([dataset["time"].values, *(dataset[n].values for n in names)])
-    np.savetxt(path.with_suffix(".csv"), table, delimiter=",", header=header, comments="", fmt="%.10g", encoding="utf-8")
+    np.savetxt(
+        path.with_suffix(".csv"),
+        table,
+        delimiter=",",
+        header=header,
+        comments="",
+        fmt="%.10g",
+        encoding="utf-8",
+    )
 
 
 def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:

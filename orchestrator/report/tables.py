@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def _table(title: str, *columns: str, left: int = 1) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index < left else "right", no_wrap=index < left)
+        table.add_column(column, justify="left" if index < left else "right", overflow="fold")
     return table
 
 
@@ -45,22 +45,38 @@ def electromechanical_modes(results: Sequence["ModesResult"], reference_title: s
         if mode is None:
             table.add_row(r.prepared.title, "none in range")
             continue
-        row = [r.prepared.title, eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
+        row = [
+            r.prepared.title,
+            eigenvalue_text(mode.eigenvalue),
+            f"{mode.frequency_hz:.3f}",
+            f"{mode.damping_percent:.2f}",
+        ]
         if compared and r.reference:
             ref = r.reference
-            row += [eigenvalue_text(complex(ref.real, ref.imag), 2), f"{ref.frequency_hz:.2f}", f"{ref.damping_percent:.2f}"]
+            row += [
+                eigenvalue_text(complex(ref.real, ref.imag), 2),
+                f"{ref.frequency_hz:.2f}",
+                f"{ref.damping_percent:.2f}",
+            ]
         table.add_row(*row)
     return table
 
 
 def all_modes(result: "ModesResult") -> Table:
-    """Every mode of a scenario in the range, least damped first."""
-    title = f"{result.prepared.title}: {result.model.number_of_states} states, residual {result.operating_point.residual:.1e}"
-    table = _table(title, "Most associated states (participation)", "Mode [rad/s]", "f [Hz]", "Damping [%]")
+    """Every mode of a scenario in the range, least damped first; the electromechanical one is marked."""
+    states, residual = result.model.number_of_states, result.operating_point.residual
+    title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
+    table = _table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
+    table.add_column("Most associated states (participation)", overflow="fold")
     for mode in result.modes:
-        states = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-        marked = f"[bold]{states}[/bold]" if mode is result.electromechanical else states
-        table.add_row(marked, eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
+        named = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
+        table.add_row(
+            eigenvalue_text(mode.eigenvalue),
+            f"{mode.frequency_hz:.4f}",
+            f"{mode.damping_percent:.2f}",
+            named,
+            style="bold" if mode is result.electromechanical else None,
+        )
     return table
 
 
@@ -87,7 +103,13 @@ def mode_shifts(results: Sequence["RunResult"]) -> Table:
     """|λ(H) − λ(continuous)| of the electromechanical mode."""
     steps = sorted({s.step_size for r in results for s in r.shifts})
     columns = [f"{h * 1e6:g} µs" for h in steps]
-    table = _table("Shift of the electromechanical mode by the communication step [rad/s]", "Scenario", "Schedule", *columns, left=2)
+    table = _table(
+        "Shift of the electromechanical mode by the communication step [rad/s]",
+        "Scenario",
+        "Schedule",
+        *columns,
+        left=2,
+    )
     for r in results:
         for schedule in sorted({s.schedule for s in r.shifts}):
             values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
@@ -97,25 +119,49 @@ def mode_shifts(results: Sequence["RunResult"]) -> Table:
 
 def run_statistics(results: Sequence["RunResult"]) -> Table:
     """Speed, and where the time went."""
-    table = _table("Run", "Scenario", "Steps", "Steps/s", "Inside FMUs", "By FMU")
+    table = _table("Run", "Scenario", "Steps", "Steps/s", "Inside FMUs", "Of each FMU")
     for r in results:
         if r.statistics:
             s = r.statistics
             shares = ", ".join(f"{c.name} {c.share:.0%}" for c in s.components)
-            table.add_row(r.modes.prepared.title, str(s.steps), f"{s.steps_per_second:,.0f}", f"{s.share_in_fmus:.0%}", shares)
+            table.add_row(
+                r.modes.prepared.title,
+                str(s.steps),
+                f"{s.steps_per_second:,.0f}",
+                f"{s.share_in_fmus:.0%}",
+                shares,
+            )
     return table
 
 
 def fmu_variables(description: FmuDescription) -> Iterable[Table]:
     """The variables of an FMU, one table a causality."""
     for causality in ("input", "output", "parameter", "calculatedParameter", "local"):
-        variables = [v for v in description.variables.values() if v.causality == causality and not v.name.startswith("der(")]
+        variables = [
+            v for v in description.variables.values() if v.causality == causality and not v.name.startswith("der(")
+        ]
         if not variables:
             continue
-        table = _table(f"{causality} ({len(variables)})", "Name", "Unit", "Start", "Range", "Variability", "Description", left=6)
+        table = _table(
+            f"{causality} ({len(variables)})",
+            "Name",
+            "Unit",
+            "Start",
+            "Range",
+            "Variability",
+            "Description",
+            left=6,
+        )
         for v in variables:
             bounds = ["" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)]
-            table.add_row(v.name, v.unit, v.start or "", "…".join(bounds) if any(bounds) else "", v.variability, v.description)
+            table.add_row(
+                v.name,
+                v.unit,
+                v.start or "",
+                "…".join(bounds) if any(bounds) else "",
+                v.variability,
+                v.description,
+            )
         yield table
 
 

@@ -1,0 +1,138 @@
+"""The kernel of a model in pure Python: the fallback where no compiled kernel fits the platform.
+
+It is written from the same CasADi operations in the same order as the C code, so both give the same
+results to rounding.
+"""
+
+import casadi as ca
+
+from fmus.toolchain.kernel import kernel_functions, scalar_function
+from fmus.toolchain.model import Model
+
+_PYTHON_HEADER = '''"""Pure-Python kernel of {name}: the fallback where no compiled kernel fits the platform."""
+
+from math import atan2, copysign, cos, exp, fabs, floor, isfinite, log, sin, sqrt, tan
+
+NP, NC, NU, NX, NY = {np}, {nc}, {nu}, {nx}, {ny}
+C = NP
+U = C + NC
+X = U + NU
+Y = X + NX
+DX = Y + NY
+
+'''
+
+_PYTHON_FUNCTIONS = """
+
+def _rates(z, x):
+    return derivatives_code(x, z[U:X], z[:C], z[C:U])[0]
+
+
+def initialise(z):
+    z[C:U], z[X:Y] = initialise_code(z[:C])
+
+
+def outputs(z):
+    z[Y:DX] = outputs_code(z[X:Y], z[U:X], z[:C], z[C:U])[0]
+
+
+def derivatives(z):
+    z[DX:DX + NX] = _rates(z, z[X:Y])
+
+
+def requirements(z, r):
+    r[:] = requirements_code(z[:C], z[C:U])[0]
+
+
+def advance(z, h, n):
+    x = z[X:Y]
+    for _ in range(n):
+        k1 = _rates(z, x)
+        k2 = _rates(z, [a + h / 2 * k for a, k in zip(x, k1)])
+        k3 = _rates(z, [a + h / 2 * k for a, k in zip(x, k2)])
+        k4 = _rates(z, [a + h * k for a, k in zip(x, k3)])
+        x = [
+            a + h / 6 * (b + 2 * c + 2 * d + e)
+            for a, b, c, d, e in zip(x, k1, k2, k3, k4)
+        ]
+    z[X:Y] = x
+    for index, value in enumerate(x):
+        if not isfinite(value):
+            return index + 1
+    outputs(z)
+    return 0
+"""
+
+_BINARY = {
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_POW: "{0} ** {1}",
+    ca.OP_CONSTPOW: "{0} ** {1}",
+    ca.OP_LT: "1.0 if {0} < {1} else 0.0",
+    ca.OP_LE: "1.0 if {0} <= {1} else 0.0",
+    ca.OP_EQ: "1.0 if {0} == {1} else 0.0",
+    ca.OP_NE: "1.0 if {0} != {1} else 0.0",
+    ca.OP_AND: "1.0 if {0} and {1} else 0.0",
+    ca.OP_OR: "1.0 if {0} or {1} else 0.0",
+    ca.OP_FMIN: "min({0}, {1})",
+    ca.OP_FMAX: "max({0}, {1})",
+    ca.OP_IF_ELSE_ZERO: "{1} if {0} else 0.0",
+    ca.OP_ATAN2: "atan2({0}, {1})",
+    ca.OP_COPYSIGN: "copysign({0}, {1})",
+}
+_UNARY = {
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_INV: "1.0 / {0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "2.0 * {0}",
+    ca.OP_SQRT: "sqrt({0})",
+    ca.OP_SIN: "sin({0})",
+    ca.OP_COS: "cos({0})",
+    ca.OP_TAN: "tan({0})",
+    ca.OP_EXP: "exp({0})",
+    ca.OP_LOG: "log({0})",
+    ca.OP_FABS: "fabs({0})",
+    ca.OP_FLOOR: "floor({0})",
+    ca.OP_NOT: "0.0 if {0} else 1.0",
+}
+
+
+def python_source(model: Model) -> str:
+    """The kernel of a model as the text of a Python module that imports nothing but `math`."""
+    header = _PYTHON_HEADER.format(
+        name=model.name,
+        np=len(model.parameters),
+        nc=len(model.calculated),
+        nu=len(model.inputs),
+        nx=len(model.states),
+        ny=len(model.outputs),
+    )
+    bodies = [_python_function(f"{name}_code", function) for name, function in kernel_functions(model).items()]
+    return header + "\n\n".join(bodies) + _PYTHON_FUNCTIONS
+
+
+def _python_function(name: str, function: ca.Function) -> str:
+    """Write an SX function as straight-line Python, one line an operation."""
+    function = scalar_function(function, name)
+    arguments = [f"i{k}" for k in range(function.n_in())]
+    lines = [f"def {name}({', '.join(arguments)}):"]
+    lines += [f"    o{k} = [0.0] * {function.numel_out(k)}" for k in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        source, target = function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_CONST:
+            lines.append(f"    w{target[0]} = {function.instruction_constant(k)!r}")
+        elif operation == ca.OP_INPUT:
+            lines.append(f"    w{target[0]} = i{source[0]}[{source[1]}]")
+        elif operation == ca.OP_OUTPUT:
+            lines.append(f"    o{target[0]}[{target[1]}] = w{source[0]}")
+        else:
+            template = _UNARY.get(operation) or _BINARY.get(operation)
+            if template is None:
+                raise ValueError(f"{name}: operation {operation} of CasADi has no Python form yet; add it to kernel.py")
+            lines.append(f"    w{target[0]} = " + template.format(*[f"w{s}" for s in source]))
+    lines.append(f"    return {', '.join(f'o{k}' for k in range(function.n_out()))},")
+    return "\n".join(lines)

@@ -1,0 +1,103 @@
+"""What every component starts from: the power flow of the values that are set, handed to the FMUs."""
+
+import cmath
+from collections.abc import Mapping
+
+from fmus.grid.network import Network
+from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.coupling.system import ComponentPlan, System
+from orchestrator.errors import InputError
+
+_RESULTS = ("Q_0", "theta_0")
+
+
+def start_from_power_flow(
+    system: System, network: Network, grid: str, units: Mapping[str, str], slack: str
+) -> PowerFlow:
+    """Solve the power flow and set the start values of the grid and of all units.
+
+    Lines, loads and units are taken with the values that are set in the system, so that any
+    override moves the operating point as well.
+
+    Parameters
+    ----------
+    system
+        Its plans for the grid and the units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
+    grid
+        The component that is the network.
+    units
+        Bus of every unit.
+
+    Raises
+    ------
+    InputError
+        If a value is set that the power flow computes, no solution is found, or a unit cannot
+        feed what the solution asks of it.
+    """
+    for name in units:
+        given = [v for v in _RESULTS if v in system.components[name].parameters]
+        if given:
+            raise InputError(
+                f"{name}: {' and '.join(given)} cannot be set, because the power flow computes it; "
+                "remove it, and set P_0 and v_0"
+            )
+    flow = solve_power_flow(
+        network.buses,
+        _lines(network, system.components[grid]),
+        _loads(network, system.components[grid]),
+        [_unit(name, bus, system.components[name]) for name, bus in units.items()],
+        slack,
+    )
+    for bus, voltage in flow.voltages.items():
+        system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
+    for name, bus in units.items():
+        _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
+    return flow
+
+
+def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
+    return [
+        FlowLine(
+            line.name,
+            line.from_bus,
+            line.to_bus,
+            R=_value(grid, f"R_{line.name}"),
+            X=_value(grid, f"X_{line.name}"),
+            B=_value(grid, f"B_{line.name}") if line.B else 0.0,
+        )
+        for line in network.lines
+    ]
+
+
+def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
+    return [
+        FlowLoad(
+            load.bus,
+            p_mw=_value(grid, f"{load.name}.scale") * _value(grid, f"{load.name}.P"),
+            q_mvar=_value(grid, f"{load.name}.scale") * _value(grid, f"{load.name}.Q") if load.q_mvar else 0.0,
+        )
+        for load in network.loads
+    ]
+
+
+def _unit(name: str, bus: str, plan: ComponentPlan) -> FlowUnit:
+    return FlowUnit(name, bus, _value(plan, "S_n"), _value(plan, "P_0"), _value(plan, "v_0"))
+
+
+def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:
+    start = {"P_0": power.real, "Q_0": power.imag, "v_0": abs(voltage), "theta_0": cmath.phase(voltage)}
+    for variable in ("P_0", "Q_0"):
+        most = plan.description.variables[variable].maximum
+        if most is not None and abs(start[variable]) > most:
+            raise InputError(
+                f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "
+                "raise its S_n, or move load and generation"
+            )
+    plan.parameters |= start
+
+
+def _value(plan: ComponentPlan, variable: str) -> float:
+    """The value that is set, else the FMU's default."""
+    if variable in plan.parameters:
+        return float(plan.parameters[variable])
+    return float(plan.description.variables[variable].start or 0.0)
