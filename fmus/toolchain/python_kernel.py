@@ -41,7 +41,8 @@ def derivatives(z):
 
 
 def requirements(z, r):
-    r[:] = requirements_code(z[:C], z[C:U])[0]
+    margins = requirements_code(z[:C], z[C:U])[0]
+    r[:len(margins)] = margins
 
 
 def advance(z, h, n):

@@ -66,7 +66,7 @@ def identify_modes(
     y, interval = signal[::thin], step * thin
     if len(y) < 20 or np.ptp(y) == 0:
         raise AnalysisError(
-            f"no mode can be identified in a {'constant signal' if len(y) >= 20 else f'signal of {len(y)} samples'}; "
+            f"no mode can be identified in a {'constant signal' if len(y) >= 20 else f'signal of {len(signal)} samples'}; "
             "record a longer response to an event"
         )
     pencil = len(y) // 3

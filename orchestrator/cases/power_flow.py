@@ -128,7 +128,7 @@ def _pandapower_voltages(
         else:
             pp.create_gen(net, index[bus], p_mw=sum(u.P_0 * u.S_n for u in members), vm_pu=members[0].v_0)
     try:
-        pp.runpp(net, tolerance_mva=1e-9, max_iteration=50, numba=False, init="dc")
+        pp.runpp(net, tolerance_mva=1e-10, max_iteration=50, numba=False, init="dc")
     except pp.LoadflowNotConverged as error:
         raise InputError(
             "power flow: no solution found; the lines cannot carry the power asked of them. "

@@ -1,0 +1,48 @@
+"""The matrix pencil on signals whose exponentials are known."""
+
+import numpy as np
+import pytest
+
+from orchestrator.analysis.identification import identify_modes, nearest
+from orchestrator.errors import AnalysisError
+
+TIMES = np.arange(0, 18, 0.005)
+
+
+def exponential(eigenvalue: complex, amplitude: float, phase: float = 0.3) -> np.ndarray:
+    return amplitude * np.real(np.exp(eigenvalue * TIMES + 1j * phase))
+
+
+@pytest.mark.parametrize("eigenvalue", [0.05 + 3.6j, -0.38 + 3.65j, -1.2 + 5.1j, -0.9 + 3.6j])
+def test_one_mode_on_a_drift(eigenvalue):
+    signal = exponential(eigenvalue, 1e-4) + 2e-4 * np.exp(-0.3 * TIMES) + 1e-3
+    found = nearest(identify_modes(TIMES, signal), eigenvalue)
+    assert found is not None
+    assert found.eigenvalue == pytest.approx(eigenvalue, abs=1e-3)
+    assert found.amplitude == pytest.approx(0.5e-4, rel=0.01)
+
+
+def test_close_and_well_damped_modes_are_told_apart():
+    wanted = [-1.1 + 4.8j, -0.73 + 2.12j, -0.53 + 0.88j]
+    signal = sum(exponential(v, a, p) for v, a, p in zip(wanted, (1.0, 0.7, 0.4), (0.1, 1.0, 2.0), strict=True))
+    modes = identify_modes(TIMES, signal)
+    for value in wanted:
+        assert nearest(modes, value).eigenvalue == pytest.approx(value, abs=1e-2)
+    assert modes[0].eigenvalue == pytest.approx(wanted[0], abs=1e-2)
+
+
+def test_noise_is_not_a_mode():
+    rng = np.random.default_rng(1)
+    signal = exponential(-0.2 + 4j, 1.0) + 1e-3 * rng.standard_normal(len(TIMES))
+    found = identify_modes(TIMES, signal, tolerance=0.05)
+    assert found[0].eigenvalue == pytest.approx(-0.2 + 4j, abs=5e-3)
+    assert len(found) <= 2
+
+
+@pytest.mark.parametrize(
+    ("times", "signal", "word"),
+    [(TIMES, np.ones_like(TIMES), "constant"), (TIMES[:15], TIMES[:15], "15 samples")],
+)
+def test_what_holds_no_mode_is_said(times, signal, word):
+    with pytest.raises(AnalysisError, match=word):
+        identify_modes(times, signal)
