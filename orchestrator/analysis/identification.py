@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import AnalysisError
 
-_MAX_SAMPLES = 1200
+_MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +64,9 @@ def identify_modes(
     step = times[1] - times[0] if len(times) > 1 else 0.0
     thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
     y, interval = signal[::thin], step * thin
-    if len(y) < 20 or np.ptp(y) == 0:
-        raise AnalysisError(
-            f"no mode can be identified in a {'constant signal' if len(y) >= 20 else f'signal of {len(signal)} samples'}; "
-            "record a longer response to an event"
-        )
+    if len(y) < _MIN_SAMPLES or np.ptp(y) == 0:
+        what = "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
+        raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
     pencil = len(y) // 3
     hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
     _, singular, right = np.linalg.svd(hankel, full_matrices=False)

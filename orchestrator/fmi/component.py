@@ -1,11 +1,13 @@
 """One running FMU: FMI 2.0 calls on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
+import itertools
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from weakref import WeakValueDictionary
 
 import fmpy
 import numpy as np
@@ -31,6 +33,41 @@ try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing o
     from fmpy import logging as fmpy_logging
 except (ImportError, OSError):
     fmpy_logging = None
+
+_message_lists: WeakValueDictionary[int, "_Messages"] = WeakValueDictionary()
+_next_environment = itertools.count(1)
+
+
+class _Messages(list[tuple[int, str]]):
+    """The newest messages of one component, as (status, text)."""
+
+
+def _receive(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+    messages = _message_lists.get(environment or 0)
+    if messages is not None:
+        messages.append((status, (message or b"").decode("utf-8", "replace")))
+        del messages[:-_LOG_LENGTH]
+
+
+_receive_pointer = fmi2CallbackLoggerTYPE(_receive)
+
+
+def _callbacks(messages: _Messages) -> Any:
+    """Callbacks whose messages end in one component's list.
+
+    All components share one logger function, because fmpy's proxy keeps only the last one it was
+    given; the component is told by its environment pointer.
+    """
+    environment = next(_next_environment)
+    _message_lists[environment] = messages
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _receive_pointer
+    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    callbacks.componentEnvironment = environment
+    if fmpy_logging is not None:
+        fmpy_logging.addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
 
 
 class RealBatch:
@@ -81,9 +118,9 @@ class Component:
     def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
         self.name = name
         self.description = description
-        self._messages: list[tuple[int, str]] = []
+        self._messages = _Messages()
         self._own_directory = None if directory else Path(fmpy.extract(str(description.path)))
-        self._callbacks = self._make_callbacks()
+        self._callbacks = _callbacks(self._messages)
         self._fmu: Any = None
         self._initialised = False
         try:
@@ -101,19 +138,6 @@ class Component:
         self.pointer = self._fmu.component
         self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
         self._bind_functions()
-
-    def _make_callbacks(self) -> Any:
-        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-            self._messages.append((status, (message or b"").decode("utf-8", "replace")))
-            del self._messages[:-_LOG_LENGTH]
-
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(log)
-        callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        if fmpy_logging is not None:
-            fmpy_logging.addLoggerProxy(ctypes.byref(callbacks))
-        return callbacks
 
     def _bind_functions(self) -> None:
         """Function pointers with fixed prototypes: no per-call conversion, unlike fmpy's wrappers."""
