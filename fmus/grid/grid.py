@@ -61,7 +61,10 @@ def grid(network: Network) -> Model:
     for branch in branches:
         _branch_equation(m, branch, buses, omega_b)
     _declare_outputs(m, network, buses, branches)
-    return m.build()
+    # Bus capacitances against small line reactances are far faster than any communication step: such a
+    # network needs an integrator that is stable at any step and damps the ringing after a switching.
+    stiff = any(network.has_capacitance(bus) for bus in network.buses)
+    return m.build(integrator="sdirk" if stiff else "runge_kutta")
 
 
 def _declare_bus(m: ModelBuilder, name: str) -> _Bus:

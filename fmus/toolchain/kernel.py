@@ -6,8 +6,9 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 - ``initialise(z)``: c and x from p;
 - ``outputs(z)``: y from x, u;
 - ``derivatives(z)``: ẋ from x, u;
-- ``advance(z, h, n)``: n classical Runge-Kutta steps of h seconds at constant u, then y; returns 0,
-  or 1 + the index of the first state that is no longer finite;
+- ``advance(z, h, n, workspace)``: n steps of h seconds at constant u, then y; returns 0, or 1 + the
+  index of the first state that is no longer finite. ``workspace_size()`` tells how many numbers of
+  its own it needs between calls;
 - ``requirements(z, r)``: the model may run where every r > 0.
 
 `python_kernel` writes the same functions in Python.
@@ -23,6 +24,7 @@ from pathlib import Path
 import casadi as ca
 
 from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.elimination import Elimination, plan_elimination
 from fmus.toolchain.model import Model
 
 TARGETS = {
@@ -35,80 +37,47 @@ TARGETS = {
 COMPILER_FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-g0")
 """No fast-math and no fused operations: the compiled kernel and the Python fallback agree to rounding."""
 
-_FUNCTIONS = """
-#include <math.h>
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-enum {{ NP = {np}, NC = {nc}, NU = {nu}, NX = {nx}, NY = {ny}, NW = {nw},
-       C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY }};
-
-static void rates(const double *z, const double *x, double *rate) {{
-    double w[NW];
-    const double *arg[] = {{x, z + U, z, z + C}};
-    double *res[] = {{rate}};
-    derivatives_code(arg, res, 0, w, 0);
-}}
-
-EXPORT void initialise(double *z) {{
-    double w[NW];
-    const double *arg[] = {{z}};
-    double *res[] = {{z + C, z + X}};
-    initialise_code(arg, res, 0, w, 0);
-}}
-
-EXPORT void outputs(double *z) {{
-    double w[NW];
-    const double *arg[] = {{z + X, z + U, z, z + C}};
-    double *res[] = {{z + Y}};
-    outputs_code(arg, res, 0, w, 0);
-}}
-
-EXPORT void derivatives(double *z) {{ rates(z, z + X, z + DX); }}
-
-EXPORT void requirements(const double *z, double *r) {{
-    double w[NW];
-    const double *arg[] = {{z, z + C}};
-    double *res[] = {{r}};
-    requirements_code(arg, res, 0, w, 0);
-}}
-
-EXPORT int advance(double *z, double h, int n) {{
-    double k1[NX], k2[NX], k3[NX], k4[NX], t[NX], *x = z + X;
-    for (int step = 0; step < n; ++step) {{
-        rates(z, x, k1);
-        for (int i = 0; i < NX; ++i) t[i] = x[i] + h / 2 * k1[i];
-        rates(z, t, k2);
-        for (int i = 0; i < NX; ++i) t[i] = x[i] + h / 2 * k2[i];
-        rates(z, t, k3);
-        for (int i = 0; i < NX; ++i) t[i] = x[i] + h * k3[i];
-        rates(z, t, k4);
-        for (int i = 0; i < NX; ++i) x[i] += h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
-    }}
-    for (int i = 0; i < NX; ++i) if (!isfinite(x[i])) return i + 1;
-    outputs(z);
-    return 0;
-}}
-"""
+_C = Path(__file__).with_name("c")
 
 
 def c_source(model: Model) -> str:
     """The whole C kernel of a model as one translation unit."""
     functions = kernel_functions(model)
+    sizes = {
+        "NP": len(model.parameters),
+        "NC": len(model.calculated),
+        "NU": len(model.inputs),
+        "NX": len(model.states),
+        "NY": len(model.outputs),
+    }
+    tables = ""
+    if model.integrator == "sdirk":
+        elimination = plan_elimination(model)
+        functions["iteration"] = elimination.values
+        sizes |= {"NM": len(elimination.matrix_column), "NLU": len(elimination.column)}
+        tables = _tables(elimination)
+    sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     generator = ca.CodeGenerator(model.name, {"with_header": False, "main": False, "verbose": False})
     for name, function in functions.items():
         generator.add(scalar_function(function, f"{name}_code"))
-    sizes = {
-        "np": len(model.parameters),
-        "nc": len(model.calculated),
-        "nu": len(model.inputs),
-        "nx": len(model.states),
-        "ny": len(model.outputs),
-        "nw": max(1, *(f.sz_w() for f in functions.values())),
+    enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
+    parts = [str(generator.dump()), enumeration, tables]
+    parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
+    return "\n".join(parts)
+
+
+def _tables(e: Elimination) -> str:
+    lists = {
+        "PERM": e.order,
+        "ROW": e.row,
+        "COL": e.column,
+        "DIAG": e.diagonal,
+        "MROW": e.matrix_row,
+        "MCOL": e.matrix_column,
     }
-    return str(generator.dump()) + _FUNCTIONS.format(**sizes)
+    return "\n".join(
+        f"static const int {name}[] = {{{', '.join(map(str, values))}}};" for name, values in lists.items()
+    )
 
 
 def kernel_functions(model: Model) -> dict[str, ca.Function]:

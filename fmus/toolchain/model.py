@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 
@@ -23,6 +24,8 @@ from fmus.toolchain.variables import (
 
 Scalar = ca.SX | float
 """What equations are made of."""
+
+Integrator = Literal["runge_kutta", "sdirk"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,9 @@ class Model:
         (p, c) → r; the model may run where every r > 0.
     requirement_texts
         The rule behind each r, with its remedy.
+    integrator
+        ``runge_kutta`` (explicit, order 4) or ``sdirk`` (L-stable, order 2, for stiff models that
+        are linear in x).
     """
 
     name: str
@@ -57,6 +63,7 @@ class Model:
     outputs_function: ca.Function
     requirements: ca.Function
     requirement_texts: tuple[str, ...]
+    integrator: Integrator = "runge_kutta"
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -219,7 +226,7 @@ class ModelBuilder:
 
     # -- the model ---------------------------------------------------------------------------
 
-    def build(self) -> Model:
+    def build(self, integrator: Integrator = "runge_kutta") -> Model:
         """Return the finished model.
 
         Raises
@@ -260,6 +267,7 @@ class ModelBuilder:
             outputs_function=ca.Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
             requirements=ca.Function("requirements", [p, c], [r_value]),
             requirement_texts=tuple(text for _, text in self._requirements),
+            integrator=integrator,
         )
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:

@@ -6,6 +6,7 @@ results to rounding.
 
 import casadi as ca
 
+from fmus.toolchain.elimination import plan_elimination
 from fmus.toolchain.kernel import kernel_functions, scalar_function
 from fmus.toolchain.model import Model
 
@@ -45,7 +46,18 @@ def requirements(z, r):
     r[:len(margins)] = margins
 
 
-def advance(z, h, n):
+def _finish(z, x):
+    z[X:Y] = x
+    for index, value in enumerate(x):
+        if not isfinite(value):
+            return index + 1
+    outputs(z)
+    return 0
+"""
+
+_RUNGE_KUTTA = """
+
+def advance(z, h, n, workspace):
     x = z[X:Y]
     for _ in range(n):
         k1 = _rates(z, x)
@@ -56,12 +68,62 @@ def advance(z, h, n):
             a + h / 6 * (b + 2 * c + 2 * d + e)
             for a, b, c, d, e in zip(x, k1, k2, k3, k4)
         ]
-    z[X:Y] = x
-    for index, value in enumerate(x):
-        if not isfinite(value):
-            return index + 1
-    outputs(z)
-    return 0
+    return _finish(z, x)
+"""
+
+_SDIRK = """
+
+G = 0.29289321881345254
+_factors = {}
+
+
+def _factorise(z, gh):
+    m = iteration_code(z[:C], z[C:U], [gh])[0]
+    lu, inverse = [0.0] * len(COL), [0.0] * NX
+    for i in range(NX):
+        row = dict.fromkeys(COL[ROW[i]:ROW[i + 1]], 0.0)
+        for q in range(MROW[i], MROW[i + 1]):
+            row[MCOL[q]] = m[q]
+        for q in range(ROW[i], DIAG[i]):
+            c = COL[q]
+            l = row[c] * inverse[c]
+            row[c] = l
+            for r in range(DIAG[c] + 1, ROW[c + 1]):
+                row[COL[r]] -= l * lu[r]
+        for q in range(ROW[i], ROW[i + 1]):
+            lu[q] = row[COL[q]]
+        inverse[i] = 1 / row[i]
+    return lu, inverse
+
+
+def _solve(b, lu, inverse):
+    v, k = [0.0] * NX, [0.0] * NX
+    for i in range(NX):
+        s = b[PERM[i]]
+        for q in range(ROW[i], DIAG[i]):
+            s -= lu[q] * v[COL[q]]
+        v[i] = s
+    for i in range(NX - 1, -1, -1):
+        s = v[i]
+        for q in range(DIAG[i] + 1, ROW[i + 1]):
+            s -= lu[q] * v[COL[q]]
+        v[i] = s * inverse[i]
+        k[PERM[i]] = v[i]
+    return k
+
+
+def advance(z, h, n, workspace):
+    key = (h, *z[:U])
+    if key not in _factors:
+        _factors.clear()
+        _factors[key] = _factorise(z, G * h)
+    lu, inverse = _factors[key]
+    x = z[X:Y]
+    for _ in range(n):
+        k1 = _solve(_rates(z, x), lu, inverse)
+        k2 = _solve(_rates(z, [a + (1 - G) * h * k for a, k in zip(x, k1)]), lu, inverse)
+        x = [a + h * ((1 - G) * b + G * c) for a, b, c in zip(x, k1, k2)]
+    return _finish(z, x)
 """
 
 _BINARY = {
@@ -111,8 +173,17 @@ def python_source(model: Model) -> str:
         nx=len(model.states),
         ny=len(model.outputs),
     )
-    bodies = [_python_function(f"{name}_code", function) for name, function in kernel_functions(model).items()]
-    return header + "\n\n".join(bodies) + _PYTHON_FUNCTIONS
+    functions, tables, advance = kernel_functions(model), "", _RUNGE_KUTTA
+    if model.integrator == "sdirk":
+        e = plan_elimination(model)
+        functions["iteration"] = e.values
+        advance = _SDIRK
+        tables = (
+            f"PERM = {e.order}\nROW = {e.row}\nCOL = {e.column}\nDIAG = {e.diagonal}\n"
+            f"MROW = {e.matrix_row}\nMCOL = {e.matrix_column}\n\n"
+        )
+    bodies = [_python_function(f"{name}_code", function) for name, function in functions.items()]
+    return header + tables + "\n\n".join(bodies) + _PYTHON_FUNCTIONS + advance
 
 
 def _python_function(name: str, function: ca.Function) -> str:

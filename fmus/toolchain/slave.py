@@ -65,7 +65,7 @@ class Slave(Fmi2Slave):
         if library.exists() and os.environ.get("GFOR_COSIM_KERNEL") != "python":
             try:
                 kernel = ctypes.PyDLL(str(library))
-                kernel.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int]
+                kernel.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
                 for function in (kernel.initialise, kernel.outputs, kernel.derivatives):
                     function.argtypes, function.restype = [ctypes.c_void_p], None
                 kernel.requirements.argtypes, kernel.requirements.restype = [ctypes.c_void_p] * 2, None
@@ -76,10 +76,13 @@ class Slave(Fmi2Slave):
                 self._kernel, self._address = kernel, ctypes.addressof(self._z)
                 self._margins_address = ctypes.addressof(self._margins)
                 self._advance = kernel.advance
+                self._workspace = (ctypes.c_double * max(1, kernel.workspace_size()))()
+                self._workspace_address = ctypes.addressof(self._workspace)
                 return
         self._kernel, self._address = importlib.import_module(python_kernel), self._z
         self._margins_address = self._margins
         self._advance = self._kernel.advance
+        self._workspace_address = None
 
     # -- reports ---------------------------------------------------------------------------------
 
@@ -134,7 +137,7 @@ class Slave(Fmi2Slave):
                 self._parameters_changed = False
                 if self._failure is not None:
                     return False
-            status = self._advance(self._address, step_size / self._parts, self._parts)
+            status = self._advance(self._address, step_size / self._parts, self._parts, self._workspace_address)
             self._outputs_stale = False
             if status:
                 self._fail(self._describe_divergence(status - 1, current_time))

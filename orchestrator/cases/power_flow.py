@@ -68,7 +68,7 @@ def solve_power_flow(
     lines: Sequence[FlowLine],
     loads: Sequence[FlowLoad],
     units: Sequence[FlowUnit],
-    slack: str,
+    slack_bus: str,
 ) -> PowerFlow:
     """Solve the power flow.
 
@@ -89,7 +89,6 @@ def solve_power_flow(
             raise InputError(
                 f"power flow: bus {bus!r} cannot have two voltages ({wanted}); give its units the same v_0"
             )
-    slack_bus = next(u.bus for u in units if u.name == slack)
     voltages = _pandapower_voltages(buses, lines, loads, at_bus, slack_bus)
     return _shares(voltages, lines, loads, at_bus, slack_bus)
 

@@ -1,15 +1,17 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
 import difflib
+import fnmatch
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmus.grid.network import Line, Load, Network, Port
+from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, network_of
 from fmus.toolchain.python_fmu import cached
+from orchestrator.cases.network_data import network_elements, unit_rows
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import (
     BranchChangeTable,
@@ -20,6 +22,7 @@ from orchestrator.cases.schema import (
     ParameterChangeTable,
     ReferenceChangeTable,
     ScenarioTable,
+    UnitsTable,
     Value,
 )
 from orchestrator.cases.start_values import start_from_power_flow
@@ -33,6 +36,7 @@ from orchestrator.fmi.description import FmuDescription, VariableInfo, read_desc
 
 Place = Callable[..., str]
 _COMMAND_LINE = "--set"
+_ALPHA = "units.alpha"
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,9 @@ class Preparer:
         self.problems: list[Problem] = []
         self.system = System()
         self.network: Network | None = None
-        self.tables = {n: t for n, t in case.components.items() if n not in scenario.remove}
+        everything = dict(case.components) | self._units()
+        self.known = {*everything, *self._possible_units}
+        self.tables = {n: t for n, t in everything.items() if n not in scenario.remove}
 
     def note(self, place: str, text: str) -> None:
         """Add a problem."""
@@ -95,7 +101,7 @@ class Preparer:
     def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
         """Go through all of it; None if there were problems that leave nothing to run."""
         for name in self.scenario.remove:
-            if name not in self.case.components:
+            if name not in self.known:
                 self.note(self.place("scenarios", self.name, "remove"), f"there is no component {name!r} to remove")
         self._find_network()
         for name, table in self.tables.items():
@@ -116,7 +122,7 @@ class Preparer:
             schedule=self._schedule(),
             step_size=clock.step_size,
             stop_time=stop,
-            record=tuple(f"{n}.{v}" for n, p in self.system.components.items() for v in p.description.outputs),
+            record=self._recorded(),
             record_every=max(1, round(self.case.solver.record_interval / clock.step_size)),
             events=events,
             power_flow=flow,
@@ -124,6 +130,43 @@ class Preparer:
         )
 
     # -- components ------------------------------------------------------------------------------
+
+    def _units(self) -> dict[str, ComponentTable]:
+        """Generators ``sg<bus>`` and converters ``gfor<bus>`` of the units table; a share of 0 has none."""
+        self._possible_units: set[str] = set()
+        if self.case.units is None:
+            return {}
+        table, alpha = self.case.units, self._alpha(self.case.units)
+        try:
+            rows = unit_rows(table, self.directory)
+        except InputError as error:
+            self.note(self.place("units", "file"), str(error))
+            return {}
+        components = {}
+        for kind, model, share, extra in (
+            ("sg", table.generator, 1 - alpha, table.generator_parameters),
+            ("gfor", table.converter, alpha, table.converter_parameters),
+        ):
+            for row in rows:
+                self._possible_units.add(f"{kind}{row.label}")
+                if share > 0:
+                    own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
+                    components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=extra | own)
+        return components
+
+    def _alpha(self, table: UnitsTable) -> float:
+        """The converters' share: from the command line, else the scenario, else the table."""
+        for values, where in (
+            (self.overrides, _COMMAND_LINE),
+            (self.scenario.set, self.place("scenarios", self.name, "set")),
+        ):
+            if _ALPHA in values:
+                value = values[_ALPHA]
+                if isinstance(value, bool | str) or not 0 <= value <= 1:
+                    self.note(f"{where} {_ALPHA}", f"alpha = {value!r}; it must be a number from 0 to 1")
+                    return table.alpha
+                return value
+        return table.alpha
 
     def _find_network(self) -> None:
         """The network behind the grid component: the model's own, or the file's table."""
@@ -144,16 +187,11 @@ class Preparer:
                 "the model 'grid' needs a [network] table with buses, lines and loads",
             )
             return None
-        table = self.case.network
         try:
-            return Network(
-                name=f"{self.case.name}_grid",
-                buses=tuple(table.buses),
-                lines=tuple(Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B) for n, t in table.lines.items()),
-                loads=tuple(Load(n, t.bus, t.p, t.q) for n, t in table.loads.items()),
-                ports=tuple(Port(n, t.bus) for n, t in self.tables.items() if t.bus),
-            )
-        except ValueError as error:
+            buses, lines, loads = network_elements(self.case.network, self.directory)
+            ports = [Port(n, t.bus) for n, t in self.tables.items() if t.bus]
+            return Network(f"{self.case.name}_grid", buses, tuple(lines), tuple(loads), tuple(ports))
+        except (ValueError, InputError) as error:
             self.note(self.place("network"), str(error))
             return None
 
@@ -192,11 +230,15 @@ class Preparer:
             self._assign_key(key, value, f"{_COMMAND_LINE} {key}")
 
     def _assign_key(self, key: str, value: Value, where: str) -> None:
-        component, _, variable = key.partition(".")
-        if component in self.tables:
-            self._assign(component, variable, value, where)
-        elif component not in self.case.components:
-            self.note(where, f"there is no component {component!r}; the case has: {', '.join(self.case.components)}")
+        """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""
+        if key == _ALPHA and self.case.units is not None:
+            return  # done before the units were made
+        pattern, _, variable = key.partition(".")
+        for name in fnmatch.filter(self.tables, pattern):
+            self._assign(name, variable, value, where)
+        if not fnmatch.filter(self.known, pattern):
+            some = ", ".join([*self.case.components][:12])
+            self.note(where, f"there is no component {pattern!r}; the case has: {some}")
 
     def _assign(self, name: str, variable: str, value: Value, where: str) -> None:
         plan = self.system.components.get(name)
@@ -255,7 +297,7 @@ class Preparer:
                 self._try_connect(f"{name}.i_{part}", f"{grid}.{name}.i_{part}", where)
 
     def _try_connect(self, source: str, target: str, where: str) -> None:
-        known = set(self.case.components) - set(self.system.components)
+        known = self.known - set(self.system.components)
         if {source.partition(".")[0], target.partition(".")[0]} & known:
             return  # an end is a problem already
         try:
@@ -278,15 +320,25 @@ class Preparer:
             return None
         table = self.case.power_flow
         units = {p.name: p.bus for p in self.network.ports if p.name in self.system.components}
-        if table.slack not in units:
+        slack = units.get(table.slack, table.slack)
+        if slack not in units.values():
             known = ", ".join(units)
-            self.note(self.place("power_flow", "slack"), f"{table.slack!r} is no unit of this scenario; units: {known}")
+            self.note(
+                self.place("power_flow", "slack"),
+                f"{table.slack!r} is neither a unit of this scenario nor a bus with one; units: {known}",
+            )
             return None
         try:
-            return start_from_power_flow(self.system, self.network, table.grid, units, table.slack)
+            return start_from_power_flow(self.system, self.network, table.grid, units, slack)
         except InputError as error:
             self.note(self.place("power_flow"), f"scenario {self.name!r}: {error}")
             return None
+
+    def _recorded(self) -> tuple[str, ...]:
+        """All outputs that fit one of the file's patterns."""
+        outputs = [f"{n}.{v}" for n, plan in self.system.components.items() for v in plan.description.outputs]
+        wanted = {name for pattern in self.case.solver.record for name in fnmatch.filter(outputs, pattern)}
+        return tuple(name for name in outputs if name in wanted)
 
     # -- time ------------------------------------------------------------------------------------
 

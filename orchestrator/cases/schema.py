@@ -37,6 +37,7 @@ class SolverTable(Table):
     record_interval: Seconds = Field(default=0.005, gt=0)
     schedule: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
     groups: list[list[str]] | None = None
+    record: list[str] = ["*"]
 
 
 class ComponentTable(Table):
@@ -50,7 +51,7 @@ class ComponentTable(Table):
 
 
 class PowerFlowTable(Table):
-    """Which component is the grid, and which unit balances it."""
+    """Which component is the grid, and which unit or bus balances it."""
 
     grid: str
     slack: str
@@ -73,9 +74,22 @@ class LoadTable(Table):
 class NetworkTable(Table):
     """A network of the user's own, for the model ``grid``."""
 
-    buses: list[str]
+    buses: list[str] = []
+    lines_file: str | None = None
+    loads_file: str | None = None
     lines: dict[str, LineTable] = {}
     loads: dict[str, LoadTable] = {}
+
+
+class UnitsTable(Table):
+    """Many units from a table, each a generator and a converter that share its rating and power."""
+
+    file: str
+    alpha: float = Field(default=0.0, ge=0, le=1)
+    generator: str
+    converter: str
+    generator_parameters: dict[str, Any] = {}
+    converter_parameters: dict[str, Any] = {}
 
 
 class ConnectionTable(Table):
@@ -180,6 +194,7 @@ class CaseTable(Table):
     solver: SolverTable = SolverTable()
     components: dict[str, ComponentTable]
     network: NetworkTable | None = None
+    units: UnitsTable | None = None
     power_flow: PowerFlowTable | None = None
     connections: list[ConnectionTable] = []
     events: list[EventTable] = []

@@ -27,6 +27,8 @@ def start_from_power_flow(
         The component that is the network.
     units
         Bus of every unit.
+    slack
+        The bus whose units feed what is left.
 
     Raises
     ------

@@ -1,0 +1,48 @@
+/* Functions of a kernel around the code that CasADi generates. Every quantity of an instance lies in
+   one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY and NW stand above, generated. */
+#include <math.h>
+#include <string.h>
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+enum { C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
+
+static void rates(const double *z, const double *x, double *rate) {
+    double w[NW];
+    const double *arg[] = {x, z + U, z, z + C};
+    double *res[] = {rate};
+    derivatives_code(arg, res, 0, w, 0);
+}
+
+EXPORT void initialise(double *z) {
+    double w[NW];
+    const double *arg[] = {z};
+    double *res[] = {z + C, z + X};
+    initialise_code(arg, res, 0, w, 0);
+}
+
+EXPORT void outputs(double *z) {
+    double w[NW];
+    const double *arg[] = {z + X, z + U, z, z + C};
+    double *res[] = {z + Y};
+    outputs_code(arg, res, 0, w, 0);
+}
+
+EXPORT void derivatives(double *z) { rates(z, z + X, z + DX); }
+
+EXPORT void requirements(const double *z, double *r) {
+    double w[NW];
+    const double *arg[] = {z, z + C};
+    double *res[] = {r};
+    requirements_code(arg, res, 0, w, 0);
+}
+
+/* Outputs after a step, or 1 + the index of the first state that is no longer finite. */
+static int finish(double *z) {
+    for (int i = 0; i < NX; ++i)
+        if (!isfinite(z[X + i])) return i + 1;
+    outputs(z);
+    return 0;
+}
