@@ -12,7 +12,7 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
-from fmus.toolchain.kernel import TARGETS
+from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.python_fmu import export
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.prepare import PreparedScenario

@@ -148,11 +148,13 @@ def _modes(
 
 def _warnings(blocks: Blocks, model: LinearModel) -> tuple[str, ...]:
     """Say before a run that the coupling itself is unstable."""
+    coupled = eigenvalues(model).real.max()
+    if coupled <= _COUPLING_UNSTABLE:
+        return ()
     try:
         growth = eigenvalues(continuous(blocks)).real.max()
     except AnalysisError:
         return ()
-    coupled = eigenvalues(model).real.max()
     if coupled - growth <= _COUPLING_UNSTABLE:
         return ()
     return (

@@ -14,28 +14,12 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 `python_kernel` writes the same functions in Python.
 """
 
-import os
-import shutil
-import subprocess
-import sys
-import tempfile
 from pathlib import Path
 
 import casadi as ca
 
-from fmus.toolchain.cache import cache_directory
 from fmus.toolchain.elimination import Elimination, plan_elimination
 from fmus.toolchain.model import Model
-
-TARGETS = {
-    # FMI platform -> (zig target, file name of the shared library)
-    "linux64": ("x86_64-linux-gnu.2.17", "kernel.so"),
-    "win64": ("x86_64-windows-gnu", "kernel.dll"),
-    "darwin64": ("x86_64-macos", "kernel.dylib"),
-}
-
-COMPILER_FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-g0")
-"""No fast-math and no fused operations: the compiled kernel and the Python fallback agree to rounding."""
 
 _C = Path(__file__).with_name("c")
 
@@ -95,49 +79,3 @@ def scalar_function(function: ca.Function, name: str) -> ca.Function:
     inputs = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
     outputs = [ca.densify(e) for e in function.call(inputs)]
     return ca.Function(name, inputs, outputs)
-
-
-def compile_kernel(source: str, platform: str, key: str) -> Path:
-    """Compile C source for one FMI platform, or return what was compiled before.
-
-    Parameters
-    ----------
-    source
-        C code, as `c_source` gives it.
-    platform
-        A key of `TARGETS`.
-    key
-        Hash of everything that determines the result.
-
-    Raises
-    ------
-    ValueError
-        If the platform is unknown.
-    RuntimeError
-        If the compiler fails; its own text is in the message.
-    """
-    if platform not in TARGETS:
-        raise ValueError(f"no kernel target for platform {platform!r}; choose from {', '.join(TARGETS)}")
-    target, file_name = TARGETS[platform]
-    library = cache_directory("kernels") / f"{key}-{platform}" / file_name
-    if library.exists():
-        return library
-    with tempfile.TemporaryDirectory(prefix="gfor_kernel_") as folder:
-        c_file = Path(folder) / "kernel.c"
-        c_file.write_text(source)
-        built = Path(folder) / file_name
-        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *COMPILER_FLAGS]
-        result = subprocess.run(
-            [*command, str(c_file), "-o", str(built), "-lm"],
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=folder,
-        )
-        if result.returncode:
-            raise RuntimeError(f"the C compiler (ziglang) failed for {platform}:\n{result.stderr.strip()}")
-        library.parent.mkdir(parents=True, exist_ok=True)
-        partial = library.with_suffix(f".{os.getpid()}")
-        shutil.copy(built, partial)
-        partial.replace(library)  # atomic: another process may be building the same kernel
-    return library

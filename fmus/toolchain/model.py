@@ -13,6 +13,7 @@ from typing import Literal
 import casadi as ca
 
 from fmus.toolchain.variables import (
+    UNITS,
     CalculatedParameter,
     Input,
     Output,
@@ -108,6 +109,7 @@ class ModelBuilder:
         self._expressions: dict[str, ca.SX] = {}
         self._derivatives: dict[str, ca.SX] = {}
         self._requirements: list[tuple[ca.SX, str]] = []
+        self._opened: list[ca.SX] = []
         self._algebraic: list[tuple[ca.SX, ca.SX]] = []
         self.internal_step = self.parameter(
             "internal_step",
@@ -188,11 +190,16 @@ class ModelBuilder:
     def state(self, name: str, initial: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
         """Declare a continuous state with its initial value, an expression of parameters."""
         full = self._full(name)
+        if f"{unit}/s" not in UNITS:
+            raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
         self._expressions[full] = ca.SX(initial)
         return self._declare(State(full, unit, description, base))
 
     def derivative(self, state: ca.SX, rate: Scalar) -> None:
         """Give the time derivative [unit of the state per second] of a declared state."""
+        declared = self._declared.get(state.name())
+        if declared is None or not isinstance(declared[0], State):
+            raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
         if state.name() in self._derivatives:
             raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
         self._derivatives[state.name()] = ca.SX(rate)
@@ -205,7 +212,9 @@ class ModelBuilder:
 
     def algebraic(self, name: str) -> ca.SX:
         """Return a symbol for a signal that is used before it can be written; `close` gives its value."""
-        return ca.SX.sym(self._full(name))
+        symbol = ca.SX.sym(self._full(name))
+        self._opened.append(symbol)
+        return symbol
 
     def close(self, symbol: ca.SX, value: Scalar) -> None:
         """Give the value of an `algebraic` signal.
@@ -239,20 +248,22 @@ class ModelBuilder:
             kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
             for kind in (Parameter, CalculatedParameter, Input, State, Output)
         }
-        p, c, u, x, _ = (ca.vertcat(*[symbol for _, symbol in entries]) for entries in kinds.values())
+        p, c, u, x, _ = (_stack([symbol for _, symbol in entries]) for entries in kinds.values())
+        algebraic = self._closed_signals()
+        self._check_origins(p)
         missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
         if missing:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
 
         def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
-            stacked = ca.vertcat(*[values[variable.name] for variable, _ in entries])
-            for symbol, value in self._algebraic:
+            stacked = _stack([values[variable.name] for variable, _ in entries])
+            for symbol, value in algebraic:
                 stacked = ca.substitute(stacked, symbol, value)
             return stacked
 
         c_value = self._calculate(kinds[CalculatedParameter], c)
         x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
-        r_value = ca.vertcat(*[value for value, _ in self._requirements])
+        r_value = _stack([value for value, _ in self._requirements])
         arguments = [x, u, p, c]
         return Model(
             name=self.name,
@@ -275,11 +286,59 @@ class ModelBuilder:
         tunable = ca.vertcat(*[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable])
         values: list[ca.SX] = []
         for index, (variable, _) in enumerate(entries):
-            value = ca.substitute(self._expressions[variable.name], c[:index], ca.vertcat(*values))
+            value = self._expressions[variable.name]
+            if values:
+                value = ca.substitute(value, c[:index], ca.vertcat(*values))
             if tunable.numel() and ca.depends_on(value, tunable):
                 raise ValueError(
                     f"model {self.name}: {variable.name!r} is computed once, at initialisation, "
                     "and must not depend on a tunable parameter"
                 )
             values.append(value)
-        return ca.vertcat(*values)
+        return _stack(values)
+
+    def _closed_signals(self) -> list[tuple[ca.SX, ca.SX]]:
+        """Algebraic signals in an order in which each can be substituted once and for all.
+
+        Raises
+        ------
+        ValueError
+            If one was never closed, or several depend on one another in a circle.
+        """
+        declared = ca.vertcat(*self._opened) if self._opened else ca.SX(0, 1)
+        closed = [symbol.name() for symbol, _ in self._algebraic]
+        never = [symbol.name() for symbol in self._opened if symbol.name() not in closed]
+        if never:
+            raise ValueError(f"model {self.name}: signal {', '.join(never)} is used but never closed")
+        waiting = list(self._algebraic)
+        ordered: list[tuple[ca.SX, ca.SX]] = []
+        for _ in range(len(waiting)):
+            for symbol, given in list(waiting):
+                value = given
+                for other, known in ordered:
+                    value = ca.substitute(value, other, known)
+                if not ca.depends_on(value, declared):
+                    ordered.append((symbol, value))
+                    waiting = [entry for entry in waiting if entry[0].name() != symbol.name()]
+        if waiting:
+            names = ", ".join(symbol.name() for symbol, _ in waiting)
+            raise ValueError(f"model {self.name}: signals {names} depend on one another in a circle")
+        return ordered
+
+    def _check_origins(self, p: ca.SX) -> None:
+        """Calculated parameters and initial states come from parameters (and calculated ones) alone."""
+        allowed = {s.name() for s in ca.symvar(p)} | {
+            v.name for v, _ in self._declared.values() if isinstance(v, CalculatedParameter)
+        }
+        for variable, _ in self._declared.values():
+            if isinstance(variable, CalculatedParameter | State):
+                others = {s.name() for s in ca.symvar(self._expressions[variable.name])} - allowed
+                if others:
+                    raise ValueError(
+                        f"model {self.name}: {variable.name!r} must follow from parameters at initialisation, "
+                        f"but depends on {', '.join(sorted(others))}"
+                    )
+
+
+def _stack(entries: list[ca.SX]) -> ca.SX:
+    return ca.SX(ca.vertcat(*entries)) if entries else ca.SX(0, 1)

@@ -7,7 +7,6 @@ files, every bundled module needs a name of its own (all Python-backed FMUs of a
 
 import hashlib
 import json
-import sys
 import uuid
 import zipfile
 from importlib.metadata import version
@@ -16,20 +15,15 @@ from pathlib import Path
 import pythonfmu
 
 from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.compiler import FLAGS, TARGETS, compile_library, host_platform
 from fmus.toolchain.description import model_description
-from fmus.toolchain.kernel import COMPILER_FLAGS, TARGETS, c_source, compile_kernel
+from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.python_kernel import python_source
 
 _NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
 _TIMESTAMP = (2020, 1, 1, 0, 0, 0)
 _SLAVE = Path(__file__).with_name("slave.py")
-
-
-def host_platform() -> str | None:
-    """FMI name of this machine's platform, where a kernel can be compiled for it."""
-    names = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
-    return names.get(sys.platform)
 
 
 def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = None) -> Path:
@@ -53,7 +47,7 @@ def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = 
     Raises
     ------
     ValueError, RuntimeError
-        As `compile_kernel`.
+        As `compile_library`.
     """
     if platforms is None:
         host = host_platform()
@@ -82,9 +76,10 @@ class _Sources:
         self.python = python_source(model)
         self.slave = _SLAVE.read_text(encoding="utf-8")
         self.tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
-        self.kernel_digest = _digest(self.c, *COMPILER_FLAGS)
         description = model_description(model, "", model.name, self.tool).decode()
-        self.digest = _digest(self.c, self.python, self.slave, description, *COMPILER_FLAGS)
+        exporter = Path(__file__).read_text(encoding="utf-8")
+        data = json.dumps(_slave_data(model))
+        self.digest = _digest(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
         self.guid = "{" + str(uuid.uuid5(_NAMESPACE, self.digest)) + "}"
 
 
@@ -106,11 +101,13 @@ def _write(model: Model, target: Path, platforms: tuple[str, ...]) -> None:
         "resources/slavemodule.txt": slave_module.encode(),
         f"resources/{slave_module}.py": sources.slave.encode(),
         f"resources/{kernel_module}.py": sources.python.encode(),
-        "resources/model.json": _slave_data(model, sources, kernel_module),
+        "resources/model.json": json.dumps(
+            _slave_data(model) | {"hash": sources.digest, "kernel_module": kernel_module}, ensure_ascii=False
+        ).encode(),
     }
     for platform in platforms:
-        library = compile_kernel(sources.c, platform, sources.kernel_digest[:32])
-        contents[f"resources/kernel/{platform}/{TARGETS[platform][1]}"] = library.read_bytes()
+        library = compile_library(sources.c, platform)
+        contents[f"resources/kernel/{platform}/kernel{TARGETS[platform][1]}"] = library.read_bytes()
     package = Path(pythonfmu.__file__).parent
     for file in sorted(package.glob("*.py")):
         contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
@@ -124,14 +121,13 @@ def _write(model: Model, target: Path, platforms: tuple[str, ...]) -> None:
             archive.writestr(entry, content)
 
 
-def _slave_data(model: Model, sources: _Sources, kernel_module: str) -> bytes:
+def _slave_data(model: Model) -> dict[str, object]:
+    """What the slave knows of its model."""
     first_input = len(model.parameters) + len(model.calculated)
     start = {index: p.start for index, p in enumerate(model.parameters)}
     start |= {first_input + index: i.start for index, i in enumerate(model.inputs)}
-    data = {
+    return {
         "name": model.name,
-        "hash": sources.digest,
-        "kernel_module": kernel_module,
         "names": list(model.value_references),
         "counts": {
             "parameters": len(model.parameters),
@@ -145,4 +141,3 @@ def _slave_data(model: Model, sources: _Sources, kernel_module: str) -> bytes:
         "requirements": list(model.requirement_texts),
         "internal_step": model.value_references["internal_step"],
     }
-    return json.dumps(data, ensure_ascii=False).encode()

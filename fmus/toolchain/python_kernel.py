@@ -12,7 +12,8 @@ from fmus.toolchain.model import Model
 
 _PYTHON_HEADER = '''"""Pure-Python kernel of {name}: the fallback where no compiled kernel fits the platform."""
 
-from math import atan2, copysign, cos, exp, fabs, floor, isfinite, log, sin, sqrt, tan
+import math
+from math import atan2, copysign, fabs, floor, inf, isfinite, nan
 
 NP, NC, NU, NX, NY = {np}, {nc}, {nu}, {nx}, {ny}
 C = NP
@@ -20,6 +21,40 @@ U = C + NC
 X = U + NU
 Y = X + NX
 DX = Y + NY
+
+
+# Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
+
+
+def divide(a, b):
+    try:
+        return a / b
+    except ZeroDivisionError:
+        return copysign(inf, a) * copysign(1.0, b) if a == a and a != 0.0 else nan
+
+
+def power(a, b):
+    try:
+        return math.pow(a, b)
+    except (ValueError, OverflowError):
+        return nan if a < 0.0 else inf
+
+
+def as_in_c(function, overflow):
+    def evaluate(a):
+        try:
+            return function(a)
+        except (ValueError, OverflowError):
+            return overflow(a)
+
+    return evaluate
+
+
+sqrt = as_in_c(math.sqrt, lambda a: nan)
+log = as_in_c(math.log, lambda a: -inf if a == 0.0 else nan)
+exp = as_in_c(math.exp, lambda a: inf)
+sin, cos, tan = (as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan))
+
 
 '''
 
@@ -92,7 +127,7 @@ def _factorise(z, gh):
                 row[COL[r]] -= l * lu[r]
         for q in range(ROW[i], ROW[i + 1]):
             lu[q] = row[COL[q]]
-        inverse[i] = 1 / row[i]
+        inverse[i] = divide(1.0, row[i])
     return lu, inverse
 
 
@@ -130,9 +165,9 @@ _BINARY = {
     ca.OP_ADD: "{0} + {1}",
     ca.OP_SUB: "{0} - {1}",
     ca.OP_MUL: "{0} * {1}",
-    ca.OP_DIV: "{0} / {1}",
-    ca.OP_POW: "{0} ** {1}",
-    ca.OP_CONSTPOW: "{0} ** {1}",
+    ca.OP_DIV: "divide({0}, {1})",
+    ca.OP_POW: "power({0}, {1})",
+    ca.OP_CONSTPOW: "power({0}, {1})",
     ca.OP_LT: "1.0 if {0} < {1} else 0.0",
     ca.OP_LE: "1.0 if {0} <= {1} else 0.0",
     ca.OP_EQ: "1.0 if {0} == {1} else 0.0",
@@ -148,7 +183,7 @@ _BINARY = {
 _UNARY = {
     ca.OP_ASSIGN: "{0}",
     ca.OP_NEG: "-{0}",
-    ca.OP_INV: "1.0 / {0}",
+    ca.OP_INV: "divide(1.0, {0})",
     ca.OP_SQ: "{0} * {0}",
     ca.OP_TWICE: "2.0 * {0}",
     ca.OP_SQRT: "sqrt({0})",
@@ -204,7 +239,9 @@ def _python_function(name: str, function: ca.Function) -> str:
         else:
             template = _UNARY.get(operation) or _BINARY.get(operation)
             if template is None:
-                raise ValueError(f"{name}: operation {operation} of CasADi has no Python form yet; add it to kernel.py")
+                raise ValueError(
+                    f"{name}: operation {operation} of CasADi has no Python form yet; add it to python_kernel.py"
+                )
             lines.append(f"    w{target[0]} = " + template.format(*[f"w{s}" for s in source]))
     lines.append(f"    return {', '.join(f'o{k}' for k in range(function.n_out()))},")
     return "\n".join(lines)

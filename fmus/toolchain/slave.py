@@ -22,6 +22,7 @@ from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
+MOST_PARTS = 1_000_000  # internal steps in one communication step
 LIBRARIES = {
     ("linux", "x86_64"): "linux64/kernel.so",
     ("win32", "amd64"): "win64/kernel.dll",
@@ -34,7 +35,12 @@ class Slave(Fmi2Slave):
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        resources = Path(kwargs["resources"])
+        try:
+            self._load(Path(kwargs["resources"]))
+        except Exception as error:
+            raise RuntimeError(f"{self.instance_name}: {error}") from error
+
+    def _load(self, resources):
         model = json.loads((resources / "model.json").read_text(encoding="utf-8"))
         self.modelName = model["name"]
         self._names = model["names"]
@@ -126,9 +132,12 @@ class Slave(Fmi2Slave):
             if self._phase != STEPPING:
                 self._report("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
                 return False
-            if step_size != self._step_size:
-                if not (step_size > 0.0 and math.isfinite(step_size)):
-                    self._report(f"communication step size {step_size!r} s; it must exceed 0")
+            if step_size != self._step_size or not step_size > 0.0:
+                longest = MOST_PARTS * self._z[self._internal_step]
+                if not 0.0 < step_size <= longest:
+                    self._report(
+                        f"communication step size {step_size!r} s; it must exceed 0 and be at most {longest:g} s"
+                    )
                     return False
                 self._step_size = step_size
                 self._parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
@@ -169,8 +178,10 @@ class Slave(Fmi2Slave):
         try:
             if self._outputs_stale:
                 self._refresh()
-            if max(vrs, default=0) >= self._first_derivative:
+            if vrs and max(vrs) >= self._first_derivative:
                 self._kernel.derivatives(self._address)
+            if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end
+                raise IndexError("there is no such value reference")
             z = self._z
             return [z[reference] for reference in vrs]
         except Exception as error:
@@ -190,16 +201,19 @@ class Slave(Fmi2Slave):
             self._fail(f"setting value references {list(vrs)} failed: {error!r}")
 
     def get_integer(self, vrs):
-        return [int(value) for value in self._get_discrete(vrs)]
+        return self._get_discrete(vrs, "Integer", int)
 
     def get_boolean(self, vrs):
-        return [value != 0.0 for value in self._get_discrete(vrs)]
+        return self._get_discrete(vrs, "Boolean", bool)
 
-    def _get_discrete(self, vrs):
-        if all(0 <= reference < self._first_calculated for reference in vrs):
-            return [self._z[reference] for reference in vrs]
-        self._fail(f"value references {list(vrs)}: there is no Integer or Boolean variable among them")
-        return [0.0] * len(vrs)
+    def _get_discrete(self, vrs, kind, convert):
+        try:
+            if all(0 <= r < self._first_calculated and self._parameters[r][0] == kind for r in vrs):
+                return [convert(self._z[reference]) for reference in vrs]
+            self._fail(f"value references {list(vrs)}: not all of them are of type {kind}")
+        except Exception as error:
+            self._fail(f"reading value references {list(vrs)} failed: {error!r}")
+        return [convert(0)] * len(vrs)
 
     def set_integer(self, vrs, values):
         self._set_discrete(vrs, values, "Integer")
@@ -259,7 +273,8 @@ class Slave(Fmi2Slave):
         """Everything that this instance is, as bytes: identity, phase, variables."""
         if self._outputs_stale and self._phase < STEPPING:
             self.get_real([])
-        return self._identity + bytes((self._phase, self._parameters_changed)) + bytes(self._z)
+        check_again = self._parameters_changed or self._failure is not None
+        return self._identity + bytes((self._phase, check_again)) + bytes(self._z)
 
     def _set_fmu_state(self, state):
         if len(state) != 18 + ctypes.sizeof(self._z) or state[:16] != self._identity:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.coupling.master import ComponentExchange
+from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 
@@ -77,7 +77,7 @@ class StateAccess:
             self._buffer.write()
 
 
-def linearize_component(exchange: ComponentExchange, time: float, step_size: float) -> ComponentLinearization:
+def linearize_component(exchange: Exchange, time: float, step_size: float) -> ComponentLinearization:
     """Perturb one component around where it is, and put it back."""
     component = exchange.component
     results = [_differences(exchange, time, step_size, size) for size in PERTURBATIONS]
@@ -102,9 +102,7 @@ def linearize_component(exchange: ComponentExchange, time: float, step_size: flo
     )
 
 
-def _differences(
-    exchange: ComponentExchange, time: float, step_size: float, size: float
-) -> tuple[Matrix, Matrix, Matrix]:
+def _differences(exchange: Exchange, time: float, step_size: float, size: float) -> tuple[Matrix, Matrix, Matrix]:
     """Columns of d(x⁺), d(y), d(ẋ) by every state, then every coupled input."""
     component = exchange.component
     states = StateAccess(component)

@@ -6,14 +6,14 @@ from pathlib import Path
 from shutil import rmtree
 from time import perf_counter
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import fmpy
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
+from orchestrator.coupling.loop import Exchange, make_loop
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
@@ -22,23 +22,8 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.component import Component, RealBatch
 
 _INITIAL_PASSES = 20
-_TIMED_EVERY = 100
-"""One communication step in so many is timed call by call, for the statistics."""
-
-
-class ComponentExchange:
-    """The coupled inputs and outputs of one component.
-
-    Attributes
-    ----------
-    inputs, outputs
-        Batches of the connected variables. The outputs' values are a window of the system's vector y.
-    sources
-        For each input the index in y of the output that feeds it.
-    """
-
-    def __init__(self, component: Component, inputs: RealBatch, outputs: RealBatch, sources: NDArray[np.intp]) -> None:
-        self.component, self.inputs, self.outputs, self.sources = component, inputs, outputs, sources
+_LONGEST_STRETCH = 1000
+"""Communication steps done at a stretch, so that an interrupt from the keyboard is heard."""
 
 
 class Master:
@@ -81,8 +66,6 @@ class Master:
         self.index = 0
         self.components: dict[str, Component] = {}
         self._release = ExitStack()
-        self._timed_seconds = dict.fromkeys(system.components, 0.0)
-        self._timed_steps, self._timed_total = 0, 0.0
         try:
             self._instantiate(stop_time)
             self.exchanges = self._connect()
@@ -90,7 +73,7 @@ class Master:
         except BaseException:
             self.close()
             raise
-        self._plan = [[_calls(self.exchanges[name]) for name in group] for group in schedule.groups]
+        self._loop = make_loop([[self.exchanges[name] for name in group] for group in schedule.groups], self.y)
 
     # -- life cycle ------------------------------------------------------------------------------
 
@@ -106,7 +89,7 @@ class Master:
             component.set(plan.parameters)
             component.setup(0.0, stop_time)
 
-    def _connect(self) -> dict[str, ComponentExchange]:
+    def _connect(self) -> dict[str, Exchange]:
         sources = list(dict.fromkeys(c.source for c in self.system.connections))
         sources.sort(key=lambda s: list(self.components).index(s.component))
         self.output_names = tuple(str(s) for s in sources)
@@ -116,11 +99,11 @@ class Master:
             window = [i for i, s in enumerate(sources) if s.component == name]
             feeding = [c for c in self.system.connections if c.target.component == name]
             values = self.y[window[0] : window[-1] + 1] if window else np.zeros(0)
-            exchanges[name] = ComponentExchange(
+            exchanges[name] = Exchange(
                 component,
                 RealBatch(component, [c.target.variable for c in feeding]),
                 RealBatch(component, [sources[i].variable for i in window], values),
-                np.array([sources.index(c.source) for c in feeding], dtype=np.intp),
+                np.array([sources.index(c.source) for c in feeding], dtype=np.int64),
             )
         return exchanges
 
@@ -176,48 +159,10 @@ class Master:
         ComponentError
             With the time of the step that failed; ``index`` counts the steps that were completed.
         """
-        y, step_size, take = self.y, self.clock.step_size, np.take
-        for index in range(self.index, self.index + count):
-            time = index * step_size
-            for group in self._plan:
-                for component, sources, values, set_real, inputs, do_step, pointer, _, _ in group:
-                    if sources is not None:
-                        take(y, sources, out=values, mode="clip")
-                        status = set_real(*inputs)
-                        if status > 1:
-                            component.check(status, "fmi2SetReal", time)
-                    status = do_step(pointer, time, step_size, 1)
-                    if status > 1:
-                        component.check(status, "fmi2DoStep", time)
-                for component, _, _, _, _, _, _, get_real, outputs in group:
-                    if outputs is not None:
-                        status = get_real(*outputs)
-                        if status > 1:
-                            component.check(status, "fmi2GetReal", time)
-            self.index = index + 1
-
-    def _timed_step(self) -> None:
-        """`advance(1)` with a stop-watch on every FMI call."""
-        begin, time, step_size = perf_counter(), self.time, self.clock.step_size
-        for group in self.schedule.groups:
-            for name in group:
-                exchange = self.exchanges[name]
-                component = exchange.component
-                np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
-                start = perf_counter()
-                if len(exchange.sources):
-                    exchange.inputs.write()
-                component.step(time, step_size)
-                self._timed_seconds[name] += perf_counter() - start
-            for name in group:
-                exchange = self.exchanges[name]
-                if exchange.outputs.names:
-                    start = perf_counter()
-                    exchange.outputs.read()
-                    self._timed_seconds[name] += perf_counter() - start
-        self.index += 1
-        self._timed_steps += 1
-        self._timed_total += perf_counter() - begin
+        try:
+            self._loop.advance(self.index, count, self.clock.step_size)
+        finally:
+            self.index += self._loop.completed
 
     # -- runs ------------------------------------------------------------------------------------
 
@@ -238,7 +183,7 @@ class Master:
         due: dict[int, list[Event]] = {}
         for event in events:
             due.setdefault(self.clock.index(event.time, "an event"), []).append(event)
-        first, start = self.index, perf_counter()
+        first, start, before = self.index, perf_counter(), self._loop.seconds()
         stops = sorted({stop, *(i for i in due if first <= i < stop)})
         begun: list[Observer] = []
         try:
@@ -257,20 +202,13 @@ class Master:
         finally:
             for observer in begun:
                 observer.end(self)
-        return self.statistics(self.index - first, perf_counter() - start)
+        return self._statistics(self.index - first, perf_counter() - start, before)
 
     def _run_to(self, target: int, first: int, observers: Iterable[Observer]) -> None:
         """Step to a communication point, stopping only where an observer looks."""
         while self.index < target:
             done = self.index - first
-            stretch = min(
-                [target - self.index, _TIMED_EVERY - done % _TIMED_EVERY]
-                + [o.every - done % o.every for o in observers]
-            )
-            if done % _TIMED_EVERY == 0:
-                self._timed_step()
-                stretch -= 1
-            self.advance(stretch)
+            self.advance(min([target - self.index, _LONGEST_STRETCH, *(o.every - done % o.every for o in observers)]))
             done = self.index - first
             for observer in observers:
                 if done % observer.every == 0:
@@ -281,28 +219,11 @@ class Master:
             self.components[event.component].set(event.settings())
             self.exchanges[event.component].outputs.read()
 
-    def statistics(self, steps: int, seconds: float) -> StepStatistics:
-        """Share of every component, from the timed steps."""
-        total = self._timed_total or 1.0
-        timed = max(1, self._timed_steps)
-        components = tuple(
-            ComponentStatistics(name, steps, spent / timed * steps, spent / total)
-            for name, spent in self._timed_seconds.items()
+    def _statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
+        names = [name for group in self.schedule.groups for name in group]
+        spent = [after - then for after, then in zip(self._loop.seconds(), before, strict=True)]
+        return StepStatistics(
+            steps,
+            seconds,
+            tuple(ComponentStatistics(n, steps, s, s / seconds) for n, s in zip(names, spent, strict=True)),
         )
-        return StepStatistics(steps, seconds, components)
-
-
-def _calls(exchange: ComponentExchange) -> tuple[Any, ...]:
-    """What the inner loop needs of a component, looked up once."""
-    component = exchange.component
-    return (
-        component,
-        exchange.sources if len(exchange.sources) else None,
-        exchange.inputs.values,
-        component.set_real,
-        exchange.inputs.arguments,
-        component.do_step,
-        component.pointer,
-        component.get_real,
-        exchange.outputs.arguments if exchange.outputs.names else None,
-    )

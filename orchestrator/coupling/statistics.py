@@ -22,7 +22,7 @@ class StepStatistics:
     steps, seconds
         Communication steps done, and wall-clock time [s] they took, recording included.
     components
-        Estimated from a sample of timed steps; the clock's own cost is in the coupling's share.
+        In the order of the schedule. What is left of the time is the coupling and the observers.
     """
 
     steps: int

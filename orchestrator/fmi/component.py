@@ -82,6 +82,11 @@ class RealBatch:
     def __init__(self, component: "Component", names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
         variables = component.description.variables
         self.names = tuple(names)
+        unknown = [name for name in self.names if name not in variables]
+        if unknown:
+            raise InputError(
+                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor info` lists them"
+            )
         self.values = np.zeros(len(self.names)) if values is None else values
         self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
         self.arguments = (
@@ -124,6 +129,7 @@ class Component:
         self._fmu: Any = None
         self._initialised = False
         try:
+            self._compare_guid(Path(directory or self._own_directory or ""))
             self._fmu = FMU2Slave(
                 guid=description.guid,
                 unzipDirectory=str(directory or self._own_directory),
@@ -138,6 +144,11 @@ class Component:
         self.pointer = self._fmu.component
         self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
         self._bind_functions()
+
+    def _compare_guid(self, directory: Path) -> None:
+        """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
+        if self.description.guid not in (directory / "modelDescription.xml").read_text(encoding="utf-8"):
+            raise InputError(f"the guid {self.description.guid} is not that of the FMU; read its description again")
 
     def _bind_functions(self) -> None:
         """Function pointers with fixed prototypes: no per-call conversion, unlike fmpy's wrappers."""
@@ -161,7 +172,8 @@ class Component:
             raise ComponentError(self.name, call, name, "; ".join(self._texts(1) or self._texts()), time)
 
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
-        """Call through fmpy; an FMU that logs an error but returns OK is taken at its word."""
+        """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""
+        self._messages.clear()
         try:
             result = function(*arguments)
         except FMICallException as error:
@@ -237,6 +249,8 @@ class Component:
                     f"component {self.name!r}: variable {name!r} is of type {variable.type}, which cannot be set here"
                 )
             setter, convert = setters[variable.type]
+            if convert is int and value != int(value):
+                raise InputError(f"component {self.name!r}: {name} = {value:g}; it must be a whole number")
             self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
 
     def get(self, names: Iterable[str]) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """What an FMU's file declares, read and checked before anything is loaded."""
 
 import zipfile
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -133,6 +134,10 @@ def _model_description_text(path: Path) -> bytes:
             raise FmuFileError(
                 f"{path}: the archive has no modelDescription.xml at its top; an FMU must, so export it again"
             ) from None
+        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+            raise FmuFileError(
+                f"{path}: the archive is damaged ({error}); export it again, or get the file anew"
+            ) from error
 
 
 def _fmi_version(path: Path, text: bytes) -> str:

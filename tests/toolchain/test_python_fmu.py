@@ -2,6 +2,7 @@
 
 import re
 import sys
+import time
 import zipfile
 from xml.etree import ElementTree
 
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from fmus.grid.grid import grid
+from fmus.grid.network import Line, Load, Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.model import ModelBuilder
-from fmus.toolchain.python_fmu import export
+from fmus.toolchain.python_fmu import cached, export
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import read_description
 
@@ -23,6 +26,8 @@ ALL_PATHS_OPEN = {
     "gfor": {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
     | {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9},
 }
+# Outputs that reach some listed states only where a block is left out (time constant 0).
+BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
 LEFT_OUT = {
     "gfor": {"pod_p.enabled": True, "pod_p.T_S1": 0.0, "pod_p.T_S2": 0.0, "pod_p.N_S": 1},
@@ -49,13 +54,14 @@ def initialised(path, parameters=None):
     return component
 
 
-def small(gain=2.0, text="Gain", slope=1.0):
+def small(gain=2.0, text="Gain", slope=1.0, rule="K must exceed 0"):
     m = ModelBuilder("small", "A first-order lag")
     K = m.parameter("K", gain, "pu", text, base="S_n")
     u = m.input("u", "pu", "Input", base="S_n")
     x = m.state("x", 0.0, "pu", "State", base="S_n")
     m.derivative(x, slope * (K * u - x))
     m.output("y", x, "pu", "Output", base="S_n")
+    m.require(K, rule)
     return m.build()
 
 
@@ -65,13 +71,23 @@ def test_fmpy_finds_nothing_to_complain_about(name, fmu_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_equal_models_give_equal_files(name, tmp_path):
+def test_equal_models_give_equal_files_at_any_time(name, tmp_path, monkeypatch):
     one = export(build_model(name), tmp_path / "one")
+    now = time.time()
+    monkeypatch.setattr(time, "time", lambda: now + 1e7)
     two = export(build_model(name), tmp_path / "two")
     assert one.read_bytes() == two.read_bytes()
 
 
-@pytest.mark.parametrize("change", [{"gain": 2.5}, {"text": "Another gain"}, {"slope": 3.0}], ids=lambda c: next(iter(c)))
+CHANGES = [
+    {"gain": 2.5},
+    {"text": "Another gain"},
+    {"slope": 3.0},
+    {"rule": "raise K above 0"},
+]
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=str)
 def test_a_changed_model_has_another_guid(change, tmp_path):
     same = [description_of(export(small(), tmp_path / n, platforms=())).get("guid") for n in "ab"]
     changed = description_of(export(small(**change), tmp_path / "c", platforms=())).get("guid")
@@ -89,14 +105,8 @@ def test_every_real_variable_has_a_declared_unit_and_the_bounds_of_the_model(nam
         (kind,) = variables[parameter.name]
         assert kind.tag == parameter.type
         if parameter.type != "Boolean":
-            assert (kind.get("min"), kind.get("max")) == tuple(
-                None if bound is None else kind.get("start")[:0] + repr(type_of(parameter)(bound))
-                for bound in (parameter.minimum, parameter.maximum)
-            )
-
-
-def type_of(parameter):
-    return int if parameter.type == "Integer" else float
+            bounds = [None if text is None else float(text) for text in (kind.get("min"), kind.get("max"))]
+            assert bounds == [parameter.minimum, parameter.maximum]
 
 
 def unknowns(root, part):
@@ -158,14 +168,13 @@ def test_outputs_and_derivatives_depend_on_what_they_list_and_on_nothing_else(na
     for unknown in listed:
         assert seen[unknown] <= listed[unknown], unknown
     for output in outputs:
-        assert seen[output] == listed[output], output
+        if output not in BEHIND_LEFT_OUT_BLOCKS:
+            assert seen[output] == listed[output], output
         assert set(component.description.feedthrough(output)) == seen[output] & set(inputs)
 
 
 def test_no_two_fmus_bundle_modules_of_the_same_name(fmu_path):
-    own = [
-        {n for n in member_names(fmu_path(name)) if re.fullmatch(r"resources/[^/]+\.py", n)} for name in NAMES
-    ]
+    own = [{n for n in member_names(fmu_path(name)) if re.fullmatch(r"resources/[^/]+\.py", n)} for name in NAMES]
     assert all(len(modules) == 2 for modules in own)
     assert len(set.union(*own)) == 2 * len(NAMES)
 
@@ -221,3 +230,59 @@ def test_compiled_and_python_kernel_agree(name, parameters, fmu_path, monkeypatc
     np.testing.assert_allclose(python[:, :n], compiled[:, :n], rtol=1e-12, atol=1e-12)
     scale = np.abs(compiled[:, n:]).max(initial=1.0)
     np.testing.assert_allclose(python[:, n:], compiled[:, n:], rtol=1e-12, atol=1e-12 * scale)
+
+
+@pytest.fixture(scope="module")
+def stiff_fmu():
+    """A network with line charging, which the implicit integrator steps."""
+    model = grid(
+        Network(
+            name="charged_line",
+            buses=("a", "b"),
+            lines=(Line("L", "a", "b", X=0.1, R=0.01, B=0.02),),
+            loads=(Load("load_a", "a", p_mw=50.0), Load("load_b", "b", p_mw=80.0, q_mvar=10.0)),
+            ports=(Port("one", "a"),),
+        )
+    )
+    assert model.integrator == "sdirk"
+    return cached(model)
+
+
+def drive_stiff(component, steps=100):
+    u, y = RealBatch(component, ["one.i_re", "one.i_im"]), RealBatch(component, component.description.outputs)
+    rows = []
+    for k in range(steps):
+        u.values[:] = 1.3 + 0.2 * np.sin(0.1 * k), 0.1 * np.cos(0.3 * k)
+        u.write()
+        component.step(k * STEP, STEP)
+        rows.append(y.read().copy())
+    return np.array(rows)
+
+
+def test_a_stiff_network_is_valid_and_both_kernels_agree(stiff_fmu, monkeypatch):
+    assert validate_fmu(str(stiff_fmu)) == []
+    results = []
+    for kernel in ("compiled", "python"):
+        monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
+        with initialised(stiff_fmu) as component:
+            results.append(drive_stiff(component))
+            component.set({"load_b.scale": 2.0, "X_L": 0.05})
+            results[-1] = np.vstack([results[-1], drive_stiff(component)])
+    assert 0.1 < np.abs(results[0]).max() < 10
+    np.testing.assert_allclose(results[1], results[0], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("kernel", ["compiled", "python"])
+def test_a_restored_stiff_network_forgets_the_factors_of_other_parameters(stiff_fmu, kernel, monkeypatch):
+    monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
+    with initialised(stiff_fmu) as component, initialised(stiff_fmu) as other:
+        drive_stiff(component)
+        state = component.save_state()
+        future = drive_stiff(component)
+        component.set({"X_L": 0.05})
+        changed = drive_stiff(component)
+        drive_stiff(other, 7)  # another instance between the calls
+        component.restore_state(state)
+        assert np.array_equal(drive_stiff(component), future)
+        component.free_state(state)
+    assert not np.array_equal(changed, future)

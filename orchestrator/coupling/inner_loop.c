@@ -1,0 +1,77 @@
+/* The master's inner loop over FMI 2.0 function pointers: gather inputs, set, step, get, nothing else.
+   `loop.py` describes the same structures to Python. */
+#include <stddef.h>
+#include <stdint.h>
+#ifdef _WIN32
+#include <windows.h>
+#define EXPORT __declspec(dllexport)
+static double seconds(void) {
+    LARGE_INTEGER ticks, frequency;
+    QueryPerformanceCounter(&ticks);
+    QueryPerformanceFrequency(&frequency);
+    return (double)ticks.QuadPart / (double)frequency.QuadPart;
+}
+#else
+#include <time.h>
+#define EXPORT __attribute__((visibility("default")))
+static double seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+#endif
+
+typedef int (*get_set)(void *, const unsigned *, size_t, double *);
+typedef int (*do_step)(void *, double, double, int);
+
+struct call {
+    void *component;
+    get_set set_real, get_real;
+    do_step step;
+    const unsigned *input_references, *output_references;
+    double *inputs, *outputs;
+    const int64_t *sources; /* index in y of what feeds each input */
+    int64_t n_inputs, n_outputs;
+    int64_t group;
+    double spent; /* seconds inside the FMU's functions, summed up */
+};
+
+enum { SET = 1, STEP = 2, GET = 3 };
+
+/* Do `count` communication steps from `index`. Returns 0, or the status of the call that failed with
+   failure = {steps completed, call, SET | STEP | GET}. Calls of one group stand together, in order. */
+EXPORT int advance(struct call *calls, int64_t n, const double *y, int64_t index, int64_t count, double step_size,
+                   int64_t *failure) {
+    for (int64_t k = index; k < index + count; ++k) {
+        const double time = (double)k * step_size;
+        for (int64_t first = 0, last; first < n; first = last) {
+            for (last = first; last < n && calls[last].group == calls[first].group; ++last) {
+                struct call *c = &calls[last];
+                int status;
+                for (int64_t i = 0; i < c->n_inputs; ++i) c->inputs[i] = y[c->sources[i]];
+                const double start = seconds();
+                if (c->n_inputs && (status = c->set_real(c->component, c->input_references, (size_t)c->n_inputs, c->inputs)) > 1) {
+                    failure[0] = k, failure[1] = last, failure[2] = SET;
+                    return status;
+                }
+                if ((status = c->step(c->component, time, step_size, 1)) > 1) {
+                    failure[0] = k, failure[1] = last, failure[2] = STEP;
+                    return status;
+                }
+                c->spent += seconds() - start;
+            }
+            for (int64_t i = first; i < last; ++i) {
+                struct call *c = &calls[i];
+                int status;
+                if (!c->n_outputs) continue;
+                const double start = seconds();
+                if ((status = c->get_real(c->component, c->output_references, (size_t)c->n_outputs, c->outputs)) > 1) {
+                    failure[0] = k, failure[1] = i, failure[2] = GET;
+                    return status;
+                }
+                c->spent += seconds() - start;
+            }
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,173 @@
+"""The inner loop of the master, compiled: one call into C does many communication steps.
+
+Where no library can be compiled for the platform, the same loop runs in Python.
+"""
+
+import ctypes
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.fmi.component import Component, RealBatch
+
+_SOURCE = Path(__file__).with_name("inner_loop.c")
+_FUNCTIONS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
+
+
+class Exchange:
+    """The coupled inputs and outputs of one component.
+
+    Attributes
+    ----------
+    inputs, outputs
+        Batches of the connected variables. The outputs' values are a window of the system's vector y.
+    sources
+        For each input the index in y of the output that feeds it.
+    """
+
+    def __init__(self, component: Component, inputs: RealBatch, outputs: RealBatch, sources: NDArray[np.int64]) -> None:
+        self.component, self.inputs, self.outputs, self.sources = component, inputs, outputs, sources
+
+
+class Loop(Protocol):
+    """Steps a system."""
+
+    def advance(self, index: int, count: int, step_size: float) -> None:
+        """Do communication steps.
+
+        Raises
+        ------
+        ComponentError
+            If a call fails; ``completed`` tells how many steps were done before.
+        """
+
+    completed: int
+
+    def seconds(self) -> list[float]:
+        """Time spent inside each component's FMI calls [s], in the order of the schedule."""
+
+
+class _Call(ctypes.Structure):
+    _fields_ = (
+        ("component", ctypes.c_void_p),
+        ("set_real", ctypes.c_void_p),
+        ("get_real", ctypes.c_void_p),
+        ("step", ctypes.c_void_p),
+        ("input_references", ctypes.c_void_p),
+        ("output_references", ctypes.c_void_p),
+        ("inputs", ctypes.c_void_p),
+        ("outputs", ctypes.c_void_p),
+        ("sources", ctypes.c_void_p),
+        ("n_inputs", ctypes.c_int64),
+        ("n_outputs", ctypes.c_int64),
+        ("group", ctypes.c_int64),
+        ("spent", ctypes.c_double),
+    )
+
+
+@cache
+def _library() -> Any | None:
+    platform = host_platform()
+    if platform is None:
+        return None
+    try:
+        path = compile_library(_SOURCE.read_text(encoding="utf-8"), platform)
+        # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
+        library = ctypes.PyDLL(str(path))
+    except (OSError, RuntimeError):
+        return None
+    address, integer = ctypes.c_void_p, ctypes.c_int64
+    library.advance.argtypes = [address, integer, address, integer, integer, ctypes.c_double, address]
+    return library
+
+
+class CompiledLoop:
+    """Steps a system in C."""
+
+    def __init__(self, library: Any, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> None:
+        self._library, self._y = library, y
+        self._exchanges = [exchange for group in groups for exchange in group]
+        self._calls = (_Call * len(self._exchanges))()
+        self._failure = (ctypes.c_int64 * 3)()
+        self.completed = 0
+        for number, group in enumerate(groups):
+            for exchange in group:
+                self._fill(self._calls[self._exchanges.index(exchange)], exchange, number)
+
+    @staticmethod
+    def _fill(call: _Call, exchange: Exchange, group: int) -> None:
+        def address(function: Any) -> int | None:
+            return ctypes.cast(function, ctypes.c_void_p).value
+
+        component = exchange.component
+        call.component = component.pointer
+        call.set_real, call.get_real = address(component.set_real), address(component.get_real)
+        call.step = address(component.do_step)
+        _, call.input_references, call.n_inputs, call.inputs = exchange.inputs.arguments
+        _, call.output_references, call.n_outputs, call.outputs = exchange.outputs.arguments
+        call.sources = exchange.sources.ctypes.data
+        call.group = group
+
+    def advance(self, index: int, count: int, step_size: float) -> None:
+        status = self._library.advance(
+            ctypes.addressof(self._calls),
+            len(self._exchanges),
+            self._y.ctypes.data,
+            index,
+            count,
+            step_size,
+            ctypes.addressof(self._failure),
+        )
+        self.completed = count
+        if status:
+            self.completed = self._failure[0] - index
+            component = self._exchanges[self._failure[1]].component
+            component.check(status, _FUNCTIONS[self._failure[2]], self._failure[0] * step_size)
+
+    def seconds(self) -> list[float]:
+        return [call.spent for call in self._calls]
+
+
+class PythonLoop:
+    """Steps a system in Python."""
+
+    def __init__(self, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> None:
+        self._groups, self._y = groups, y
+        self._spent = [[0.0] * len(group) for group in groups]
+        self.completed = 0
+
+    def advance(self, index: int, count: int, step_size: float) -> None:
+        self.completed = 0
+        for k in range(index, index + count):
+            time = k * step_size
+            for group, spent in zip(self._groups, self._spent, strict=True):
+                for i, exchange in enumerate(group):
+                    np.take(self._y, exchange.sources, out=exchange.inputs.values, mode="clip")
+                    start = perf_counter()
+                    component = exchange.component
+                    if exchange.inputs.names:
+                        component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
+                    component.step(time, step_size)
+                    spent[i] += perf_counter() - start
+                for i, exchange in enumerate(group):
+                    start = perf_counter()
+                    if exchange.outputs.names:
+                        component = exchange.component
+                        component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
+                    spent[i] += perf_counter() - start
+            self.completed += 1
+
+    def seconds(self) -> list[float]:
+        return [seconds for group in self._spent for seconds in group]
+
+
+def make_loop(groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> Loop:
+    """The compiled loop where there is one, else the loop in Python."""
+    library = _library()
+    return PythonLoop(groups, y) if library is None else CompiledLoop(library, groups, y)

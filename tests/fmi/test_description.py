@@ -1,0 +1,179 @@
+"""Reading an FMU's file: everything it declares, and every way in which a file can be unusable."""
+
+import re
+import zipfile
+
+import fmpy
+import pytest
+
+from fmus.toolchain.catalogue import build_model
+from orchestrator.errors import FmuFileError, InputError
+from orchestrator.fmi.description import read_description
+
+XML = "modelDescription.xml"
+
+
+@pytest.fixture
+def rewritten(fmu_path, tmp_path):
+    """Build an FMU from the converter's, with its model description or its list of files changed."""
+
+    def write(change=None, keep=lambda name: True):
+        target = tmp_path / "changed.fmu"
+        with zipfile.ZipFile(fmu_path("gfor")) as good, zipfile.ZipFile(target, "w") as bad:
+            for name in filter(keep, good.namelist()):
+                content = good.read(name)
+                if name == XML and change is not None:
+                    changed = change(content.decode())
+                    assert changed != content.decode()
+                    content = changed.encode()
+                bad.writestr(name, content)
+        return target
+
+    return write
+
+
+def refused(path, *words):
+    """The error names the file, then says each of the words, in that order."""
+    with pytest.raises(FmuFileError) as caught:
+        read_description(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert re.search(".*".join(words), text, re.DOTALL), text
+    assert isinstance(caught.value, InputError)  # nothing was run: exit code 2
+    assert caught.value.exit_code == 2
+
+
+def test_a_missing_file(tmp_path):
+    refused(tmp_path / "none.fmu", "there is no such file", "give the path of an .fmu")
+
+
+def test_a_folder(tmp_path):
+    refused(tmp_path, "there is no such file", "give the path")
+
+
+def test_a_file_that_is_not_a_zip_archive(tmp_path):
+    path = tmp_path / "text.fmu"
+    path.write_text("this is text")
+    refused(path, "is not an FMU", "zip archive", "export it again")
+
+
+def test_an_archive_that_was_cut_off(fmu_path, tmp_path):
+    path = tmp_path / "half.fmu"
+    content = fmu_path("gfor").read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    refused(path, "is not an FMU", "export it again")
+
+
+def test_an_archive_with_damaged_contents(fmu_path, tmp_path):
+    path = tmp_path / "damaged.fmu"
+    content = bytearray(fmu_path("gfor").read_bytes())
+    with zipfile.ZipFile(fmu_path("gfor")) as archive:
+        start = archive.getinfo(XML).header_offset + 30 + len(XML)
+    content[start + 100 : start + 110] = bytes(10)
+    path.write_bytes(content)
+    refused(path, "export it again")
+
+
+def test_an_archive_without_a_model_description(rewritten):
+    refused(rewritten(keep=lambda name: name != XML), "no modelDescription.xml at its top", "export it again")
+
+
+def test_a_model_description_that_is_not_xml(rewritten):
+    refused(
+        rewritten(lambda text: text[: len(text) // 2]), "modelDescription.xml is not XML", "line", "export it again"
+    )
+
+
+def test_a_model_description_that_is_something_else(rewritten):
+    refused(rewritten(lambda _: "<html/>"), "FMI unknown", "FMI 2.0")
+
+
+@pytest.mark.parametrize("version", ["1.0", "3.0"])
+def test_another_fmi_version(version, rewritten):
+    path = rewritten(lambda text: text.replace('fmiVersion="2.0"', f'fmiVersion="{version}"'))
+    refused(path, f"FMI {re.escape(version)}", "FMI 2.0 co-simulation", "ask for that export")
+
+
+def test_model_exchange_only(rewritten):
+    exchange = '<ModelExchange modelIdentifier="gfor" />'
+    path = rewritten(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
+    refused(path, "Model Exchange only", "FMI 2.0 co-simulation", "ask for that export")
+
+
+def test_no_binary_for_this_platform(rewritten):
+    path = rewritten(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
+    refused(path, "no binary for this platform", fmpy.platform, "only for", f"{fmpy.platform} build")
+
+
+def test_no_binary_at_all(rewritten):
+    path = rewritten(keep=lambda name: not name.startswith("binaries/"))
+    refused(path, "no binary for this platform", "only for: none")
+
+
+def test_a_model_description_that_contradicts_itself(rewritten):
+    path = rewritten(lambda text: re.sub(r'derivative="\d+"', 'derivative="99999"', text, count=1))
+    refused(path, "modelDescription.xml cannot be read", "fmpy validate")
+
+
+# -- a good one --------------------------------------------------------------------------------
+
+
+def test_the_converter_is_read_as_it_was_declared(fmu_path):
+    model, description = build_model("gfor"), read_description(fmu_path("gfor"))
+    assert description.path == fmu_path("gfor")
+    assert description.model_name == description.model_identifier == "gfor"
+    assert re.fullmatch(r"\{[0-9a-f-]{36}\}", description.guid)
+    assert description.inputs == ("v_re", "v_im")
+    assert description.outputs == tuple(o.name for o in model.outputs)
+    assert description.states == tuple(s.name for s in model.states)
+    assert description.parameters == tuple(p.name for p in model.parameters)
+    assert description.states_are_settable
+    assert description.can_save_state
+    assert fmpy.platform in description.platforms
+    for variable in model.variables:
+        info = description.variables[variable.name]
+        assert info.reference == model.value_references[variable.name]
+        assert info.description == variable.text
+        if info.type == "Real":
+            assert info.unit == variable.unit
+
+
+def test_bounds_types_and_variability_of_parameters(fmu_path):
+    variables = read_description(fmu_path("gfor")).variables
+    K, N_S, enabled = (variables[f"pod_p.{name}"] for name in ("K", "N_S", "enabled"))
+    assert (K.type, K.variability, K.minimum, K.maximum, float(K.start)) == ("Real", "tunable", 0.0, 1e5, 200.0)
+    assert (N_S.type, N_S.variability, N_S.minimum, N_S.maximum, int(N_S.start)) == ("Integer", "fixed", 0, 3, 2)
+    assert (enabled.type, enabled.causality, enabled.start) == ("Boolean", "parameter", "false")
+    assert variables["theta_0"].minimum is None
+
+
+def test_direct_feedthrough(fmu_path):
+    converter = read_description(fmu_path("gfor"))
+    assert converter.feedthrough("i_re") == ()  # its current is a state
+    assert converter.feedthrough("p") == ("v_re", "v_im")
+    grid = read_description(fmu_path("two_area_grid"))
+    assert grid.feedthrough("bus_2.v_re") == ("sg1.i_re", "gfor.i_re")
+    assert set(grid.feedthrough("bus_3.v")) == {"sg2.i_re", "sg2.i_im"}
+
+
+def test_undeclared_dependencies_mean_all_inputs(rewritten):
+    path = rewritten(lambda text: re.sub(r' dependencies="[^"]*"', "", text))
+    description = read_description(path)
+    assert description.output_dependencies["i_re"] is None
+    assert description.feedthrough("i_re") == ("v_re", "v_im")
+
+
+def test_states_are_settable_only_where_it_is_declared(rewritten):
+    path = rewritten(lambda text: re.sub(r"<VendorAnnotations>.*</VendorAnnotations>", "", text, flags=re.DOTALL))
+    description = read_description(path)
+    assert not description.states_are_settable
+    assert description.states == read_description(path).states != ()
+
+
+def test_state_saving_is_read_from_its_capability_flag(rewritten):
+    path = rewritten(lambda text: text.replace('canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"'))
+    assert not read_description(path).can_save_state
+
+
+def test_a_path_may_be_given_as_text(fmu_path):
+    assert read_description(str(fmu_path("gfor"))) == read_description(fmu_path("gfor"))
