@@ -237,8 +237,8 @@ def _print_run(console: Console, case: Case, results: Sequence[RunResult]) -> No
 def _print_electromechanical(console: Console, case: Case, results: Sequence[ModesResult]) -> None:
     if any(r.electromechanical for r in results):
         title = case.table.reference.title if case.table.reference else None
-        console.print(tables.electromechanical_modes(results, title))
-        if case.table.reference and any(r.reference for r in results):
+        console.print(tables.named_modes(results, title))
+        if case.table.reference and any(r.references for r in results):
             console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
 
 

@@ -1,5 +1,6 @@
 """One study: a case, what to compute of each scenario, and what comes out."""
 
+import fnmatch
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,7 +10,7 @@ import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
 from orchestrator.analysis.linearization import Blocks, LinearModel, compose, continuous
-from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated
+from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated, most_opposed
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
@@ -36,19 +37,28 @@ class ModesResult:
 
     Attributes
     ----------
-    electromechanical
-        The mode in which the case's electromechanical states take part most; None if none is in range.
-    reference
-        Somebody else's figures for it, where their conditions hold.
+    named
+        The modes that the case looks for by their shape, as far as they are in range.
+    references
+        Somebody else's figures for them, where their conditions hold.
     """
 
     prepared: PreparedScenario
     operating_point: OperatingPoint
     model: LinearModel
     modes: list[Mode]
-    electromechanical: Mode | None
-    reference: ReferenceModeTable | None
+    named: dict[str, Mode]
+    references: dict[str, ReferenceModeTable]
     warnings: tuple[str, ...]
+
+    @property
+    def electromechanical(self) -> Mode | None:
+        """The first of the named modes."""
+        return next(iter(self.named.values()), None)
+
+    def name_of(self, mode: Mode) -> str | None:
+        """Name of a mode, if it has one."""
+        return next((name for name, named in self.named.items() if named is mode), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,10 +150,27 @@ def _modes(
     blocks = Blocks(master)
     model = compose(blocks, master.schedule)
     modes = find_modes(model, *frequency_range)
-    states = [s for s in case.table.analysis.electromechanical_states if s in model.names]
-    electromechanical = most_associated(modes, states) if states else None
-    reference = _reference(case, prepared)
-    return ModesResult(prepared, point, model, modes, electromechanical, reference, _warnings(blocks, model)), blocks
+    named = _named_modes(case, model, modes)
+    return ModesResult(
+        prepared, point, model, modes, named, _references(case, prepared), _warnings(blocks, model)
+    ), blocks
+
+
+def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
+    """The modes whose shape the case describes."""
+
+    def states(patterns: Sequence[str]) -> list[str]:
+        return [name for name in model.names if any(fnmatch.fnmatch(name, p) for p in patterns)]
+
+    found = {}
+    for table in case.table.analysis.modes:
+        if table.against is not None:
+            mode = most_opposed(modes, *(states(side) for side in table.against))
+        else:
+            mode = most_associated(modes, states(table.states)) if states(table.states) else None
+        if mode is not None:
+            found[table.name] = mode
+    return found
 
 
 def _warnings(blocks: Blocks, model: LinearModel) -> tuple[str, ...]:
@@ -164,12 +191,11 @@ def _warnings(blocks: Blocks, model: LinearModel) -> tuple[str, ...]:
     )
 
 
-def _reference(case: Case, prepared: PreparedScenario) -> ReferenceModeTable | None:
+def _references(case: Case, prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:
     table = case.table.reference
-    if table is None:
-        return None
-    holds = all(_same(prepared.values.get(name), value) for name, value in table.when.items())
-    return table.modes.get(prepared.name) if holds else None
+    if table is None or not all(_same(prepared.values.get(name), value) for name, value in table.when.items()):
+        return {}
+    return table.modes.get(prepared.name, {})
 
 
 def _same(value: Any, wanted: Any) -> bool:
@@ -230,7 +256,7 @@ def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> 
                         "imag": m.eigenvalue.imag,
                         "frequency_hz": m.frequency_hz,
                         "damping_percent": m.damping_percent,
-                        "electromechanical": m is r.electromechanical,
+                        "name": r.name_of(m),
                         "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
                     }
                     for m in r.modes

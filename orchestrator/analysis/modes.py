@@ -82,6 +82,23 @@ def most_associated(modes: Iterable[Mode], states: Iterable[str]) -> Mode | None
     return max(modes, key=lambda mode: mode.participation_of(wanted), default=None)
 
 
+def most_opposed(modes: Iterable[Mode], side: Iterable[str], other: Iterable[str]) -> Mode | None:
+    """The mode in which two groups of states take part most while swinging against each other.
+
+    The measure is the geometric mean of the groups' participation; modes in which the groups'
+    summed shapes are less than 90° apart do not count.
+    """
+    side, other = tuple(side), tuple(other)
+
+    def opposition(mode: Mode) -> float:
+        one, two = (sum(mode.shape[name] for name in names) for names in (side, other))
+        apart = (one * two.conjugate()).real < 0
+        return float(np.sqrt(mode.participation_of(side) * mode.participation_of(other))) if apart else 0.0
+
+    best = max(modes, key=opposition, default=None)
+    return best if best is not None and opposition(best) > 0 else None
+
+
 def _continuous(values: NDArray[np.complex128], model: LinearModel) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     if model.step_size is None:
         return values.astype(complex), np.ones(len(values), dtype=bool)

@@ -150,16 +150,24 @@ class RingDownTable(Table):
     start: Seconds
 
 
-class AnalysisTable(Table):
-    """What an electromechanical mode is here, and where its ring-down is read."""
+class NamedModeTable(Table):
+    """A mode told by its shape: where some states take part most, or where two groups swing against each other."""
 
-    electromechanical_states: list[str] = []
+    name: str
+    states: list[str] = []
+    against: tuple[list[str], list[str]] | None = None
+
+
+class AnalysisTable(Table):
+    """Which modes are looked for by name, and where the first one's ring-down is read."""
+
+    modes: list[NamedModeTable] = []
     ring_down: RingDownTable | None = None
 
 
 class ReferenceModeTable(Table):
-    real: float
-    imag: float
+    real: float | None = None
+    imag: float | None = None
     frequency_hz: float
     damping_percent: float
 
@@ -170,7 +178,7 @@ class ReferenceTable(Table):
     title: str
     source: str
     when: dict[str, Value] = {}
-    modes: dict[str, ReferenceModeTable]
+    modes: dict[str, dict[str, ReferenceModeTable]]
 
 
 class PanelTable(Table):

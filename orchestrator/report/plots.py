@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.cases.schema import PlotTable
+from orchestrator.cases.schema import PlotTable, ReferenceModeTable
 from orchestrator.report.signals import signal
 
 if TYPE_CHECKING:
@@ -57,47 +57,47 @@ def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -
     return True
 
 
-def plot_eigenvalues(results: Sequence["ModesResult"], path: Path, highest_hz: float = 1.0) -> None:
+def plot_eigenvalues(results: Sequence["ModesResult"], title: str, path: Path) -> None:
     """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
+    named = [m.frequency_hz for r in results for m in r.named.values()]
+    highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
+    shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         axis = figure.subplots()
         for index, result in enumerate(results):
-            shown = [m for m in result.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3]
+            modes = shown[id(result)]
             axis.scatter(
-                [m.eigenvalue.real for m in shown],
-                [m.frequency_hz for m in shown],
+                [m.eigenvalue.real for m in modes],
+                [m.frequency_hz for m in modes],
                 marker="x",
-                s=[70 if m is result.electromechanical else 30 for m in shown],
-                linewidths=[2.0 if m is result.electromechanical else 1.0 for m in shown],
+                s=[70 if result.name_of(m) else 30 for m in modes],
+                linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
                 color=_colour(index),
                 label=result.prepared.title,
                 zorder=3,
             )
-            if result.reference:
-                axis.scatter(
-                    result.reference.real,
-                    result.reference.imag / (2 * np.pi),
-                    marker="o",
-                    s=110,
-                    facecolors="none",
-                    edgecolors=_colour(index),
-                    zorder=3,
-                )
-        left = (
-            min(-1.5, *(1.15 * m.eigenvalue.real for r in results for m in r.modes if m.eigenvalue.real > -3))
-            if results
-            else -1.5
-        )
+            for reference in result.references.values():
+                at = _real_and_hz(reference)
+                axis.scatter(*at, marker="o", s=110, facecolors="none", edgecolors=_colour(index), zorder=3)
+        left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
         axis.set_xlim(left, 0.35)
         axis.set_ylim(0, highest_hz)
         _damping_rays(axis, left, highest_hz)
         axis.axvline(0, color="#888888", linewidth=0.8)
         axis.set_xlabel("Real part [1/s]")
         axis.set_ylabel("Frequency [Hz]")
-        axis.set_title("Modes; large: electromechanical, circles: reference", loc="left")
+        axis.set_title(title, loc="left")
         figure.legend(loc="outside lower center", ncols=3)
         _save(figure, path)
+
+
+def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
+    """Real part [1/s] and frequency [Hz], from the damping ratio where the source gives no eigenvalue."""
+    if reference.real is not None:
+        return reference.real, reference.frequency_hz
+    ratio = reference.damping_percent / 100
+    return float(-ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz), reference.frequency_hz
 
 
 def _damping_rays(axis: Any, left: float, highest_hz: float) -> None:

@@ -31,7 +31,9 @@ def save_study(case: Case, results: Sequence["RunResult"], folder: Path) -> list
         path = folder / f"{table.name}.png"
         if plot_signals(table, results, path):
             plots.append(path)
-    plot_eigenvalues([r.modes for r in results], folder / "eigenvalues.png")
+    circles = f"; circles: {case.table.reference.title}" if case.table.reference else ""
+    title = f"Modes (large: electromechanical{circles})"
+    plot_eigenvalues([r.modes for r in results], title, folder / "eigenvalues.png")
     return [*plots, folder / "eigenvalues.png"]
 
 
@@ -43,7 +45,7 @@ def _mode_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
             "imag [rad/s]": f"{m.eigenvalue.imag:.8g}",
             "frequency [Hz]": f"{m.frequency_hz:.6g}",
             "damping [%]": f"{m.damping_percent:.6g}",
-            "electromechanical": m is r.electromechanical,
+            "name": r.name_of(m) or "",
             "participation": "; ".join(f"{name} {factor:.4f}" for name, factor in m.participation[:6]),
         }
         for r in results
@@ -73,16 +75,16 @@ def _summary(case: Case, results: Sequence["RunResult"]) -> dict[str, Any]:
 
 
 def summary_of(result: "RunResult") -> dict[str, Any]:
-    """Figures of one scenario: steady state, electromechanical mode, reference, ring-down, speed, failure."""
-    modes, mode, ref = result.modes, result.modes.electromechanical, result.modes.reference
+    """Figures of one scenario: steady state, named modes, references, ring-down, speed, failure."""
+    modes = result.modes
     seen, stats = result.ring_down, result.statistics
     return {
         "name": modes.prepared.name,
         "title": modes.prepared.title,
         "residual": modes.operating_point.residual,
         "states": modes.model.number_of_states,
-        "electromechanical_mode": _mode_summary(mode),
-        "reference": ref.model_dump() if ref else None,
+        "modes": {name: _mode_summary(mode) for name, mode in modes.named.items()},
+        "references": {name: table.model_dump(exclude_none=True) for name, table in modes.references.items()},
         "ring_down": _mode_summary(seen),
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,

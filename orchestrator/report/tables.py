@@ -33,49 +33,45 @@ def steady_states(results: Sequence["ModesResult"]) -> Table:
     return table
 
 
-def electromechanical_modes(results: Sequence["ModesResult"], reference_title: str | None) -> Table:
-    """One electromechanical mode a scenario, beside somebody else's figures where there are any."""
-    compared = any(r.reference for r in results)
+def named_modes(results: Sequence["ModesResult"], reference_title: str | None) -> Table:
+    """The modes that a case looks for, beside somebody else's figures where there are any."""
+    names = list(dict.fromkeys(name for r in results for name in [*r.named, *r.references]))
+    compared = any(r.references for r in results)
     columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
     if compared:
-        columns += [f"{reference_title}: mode", "f [Hz]", "Damping [%]"]
-    table = _table("Electromechanical mode", *columns)
-    for r in results:
-        mode = r.electromechanical
-        if mode is None:
-            table.add_row(r.prepared.title, "none in range")
-            continue
-        row = [
-            r.prepared.title,
-            eigenvalue_text(mode.eigenvalue),
-            f"{mode.frequency_hz:.3f}",
-            f"{mode.damping_percent:.2f}",
-        ]
-        if compared and r.reference:
-            ref = r.reference
-            row += [
-                eigenvalue_text(complex(ref.real, ref.imag), 2),
-                f"{ref.frequency_hz:.2f}",
-                f"{ref.damping_percent:.2f}",
-            ]
-        table.add_row(*row)
+        columns += [f"{reference_title}: f [Hz]", "Damping [%]"]
+    table = _table("Electromechanical modes" if len(names) > 1 else "Electromechanical mode", *columns)
+    for name in names:
+        for r in results:
+            mode, reference = r.named.get(name), r.references.get(name)
+            row = [f"{name}: {r.prepared.title}" if len(names) > 1 else r.prepared.title]
+            if mode is None:
+                row += ["none in range", "", ""]
+            else:
+                row += [eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
+            if reference is not None:
+                row += [f"{reference.frequency_hz:.2f}", f"{reference.damping_percent:.2f}"]
+            table.add_row(*row)
+        table.add_section()
     return table
 
 
 def all_modes(result: "ModesResult") -> Table:
-    """Every mode of a scenario in the range, least damped first; the electromechanical one is marked."""
+    """Every mode of a scenario in the range, least damped first; those with a name are marked."""
     states, residual = result.model.number_of_states, result.operating_point.residual
     title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
     table = _table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
+    table.add_column("Name")
     table.add_column("Most associated states (participation)", overflow="fold")
     for mode in result.modes:
-        named = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
+        associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
         table.add_row(
             eigenvalue_text(mode.eigenvalue),
             f"{mode.frequency_hz:.4f}",
             f"{mode.damping_percent:.2f}",
-            named,
-            style="bold" if mode is result.electromechanical else None,
+            result.name_of(mode) or "",
+            associated,
+            style="bold" if result.name_of(mode) else None,
         )
     return table
 

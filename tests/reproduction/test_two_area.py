@@ -40,7 +40,9 @@ def test_with_saturation_the_damping_is_the_papers_within_a_tenth_of_a_point(sce
     assert mode.damping_percent == pytest.approx(damping, abs=0.15)
 
 
-@pytest.mark.parametrize("row", FIGURES["independent"], ids=lambda r: f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}")
+@pytest.mark.parametrize(
+    "row", FIGURES["independent"], ids=lambda r: f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}"
+)
 def test_every_mode_of_the_independent_linearisation_is_found(row):
     overrides = {"grid.X_L": row["X_L"], "sg1.governor.enabled": row["governor_on_sg1"]}
     modes = compute_modes(*prepare(row["scenario"], overrides)).modes

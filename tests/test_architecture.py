@@ -1,0 +1,241 @@
+"""Who may import whom, and a few habits that a reader relies on."""
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
+
+FLOORS = (
+    ("orchestrator.errors",),
+    ("orchestrator.fmi",),
+    ("orchestrator.coupling",),
+    ("orchestrator.analysis", "orchestrator.cases"),
+    ("orchestrator.report",),
+    ("orchestrator.study",),
+    ("orchestrator.cli",),
+)
+"""Lowest first; those on one floor do not know each other."""
+
+
+def modules():
+    """Name → syntax tree of every module of the packages."""
+    found = {}
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            found[name] = ast.parse(path.read_text(encoding="utf-8"), str(path))
+    return found
+
+
+MODULES = modules()
+
+
+def imported_names(tree, *, typing):
+    """Dotted names that a module imports anywhere; those for type checkers only where ``typing``."""
+    names = set()
+    pending = [tree]
+    while pending:
+        node = pending.pop()
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING") and not typing:
+            pending += node.orelse
+            continue
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"relative import of {node.module}"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+        pending += ast.iter_child_nodes(node)
+    return names
+
+
+def imports(*, typing=True):
+    """Module → modules of the packages that it imports."""
+    graph = {}
+    for name, tree in MODULES.items():
+        targets = imported_names(tree, typing=typing)
+        graph[name] = {t if t in MODULES else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)} - {name}
+        unknown = graph[name] - set(MODULES)
+        assert not unknown, f"{name} imports {unknown}, which does not exist"
+    return graph
+
+
+def within(name, *packages):
+    return any(name == package or name.startswith(f"{package}.") for package in packages)
+
+
+def floor(name):
+    (found,) = [level for level, packages in enumerate(FLOORS) if within(name, *packages)]
+    return found
+
+
+def part(name):
+    """The package of its floor that a module belongs to."""
+    return next(package for packages in FLOORS for package in packages if within(name, package))
+
+
+def breaches(allowed):
+    """Imports, as text, for which ``allowed(importer, imported)`` does not hold."""
+    edges = [(importer, imported) for importer, targets in imports(typing=False).items() for imported in targets]
+    assert len(edges) > 50
+    return [f"{importer} imports {imported}" for importer, imported in sorted(edges) if not allowed(importer, imported)]
+
+
+def test_the_imports_are_read():
+    """The tools of this file see what is known to be there."""
+    graph = imports()
+    assert "fmus.toolchain.model" in graph["gfor_fmu.converter"]
+    assert "orchestrator.coupling.master" in graph["orchestrator.coupling.observers"]
+    assert "orchestrator.coupling.master" not in imports(typing=False)["orchestrator.coupling.observers"]
+    assert "pandapower" in imported_names(MODULES["orchestrator.cases.power_flow"], typing=False)
+
+
+def test_every_module_of_the_orchestrator_is_on_a_floor():
+    for name in MODULES:
+        if within(name, "orchestrator") and name != "orchestrator":
+            assert floor(name) >= 0
+
+
+def test_the_toolchain_knows_no_model():
+    assert not breaches(lambda a, b: within(b, "fmus.toolchain") if within(a, "fmus.toolchain") else True)
+
+
+def test_models_know_neither_the_converter_nor_the_orchestrator():
+    assert not breaches(lambda a, b: within(b, "fmus") if within(a, "fmus") else True)
+
+
+def test_the_converter_is_made_from_the_toolchain_alone():
+    assert not breaches(lambda a, b: within(b, "fmus.toolchain", "gfor_fmu") if within(a, "gfor_fmu") else True)
+
+
+def test_the_orchestrator_imports_downwards_only():
+    def downwards(a, b):
+        if not (within(a, "orchestrator") and within(b, "orchestrator")):
+            return True
+        return floor(b) < floor(a) or part(a) == part(b)
+
+    assert not breaches(downwards)
+
+
+def test_the_orchestrator_knows_fmus_and_never_equations():
+    """Cases and the command line build models of the catalogue; the inner loop borrows the compiler."""
+    importers = {"orchestrator.cases", "orchestrator.cli"}
+
+    def allowed(a, b):
+        if not within(a, "orchestrator") or within(b, "orchestrator"):
+            return True
+        if a == "orchestrator.coupling.loop":
+            return b == "fmus.toolchain.compiler"
+        return within(a, *importers) and not within(b, "gfor_fmu")
+
+    assert not breaches(allowed)
+
+
+def test_reports_know_studies_for_type_checkers_only():
+    everything = imports()
+    knowing = {name for name, targets in everything.items() if "orchestrator.study" in targets} - {"orchestrator.cli"}
+    assert knowing
+    assert all(within(name, "orchestrator.report") for name in knowing)
+
+
+def test_there_is_no_cycle():
+    graph, state = imports(typing=False), {}
+
+    def visit(name, path):
+        if state.get(name) == "done":
+            return
+        assert name not in path, " → ".join([*path[path.index(name) :], name])
+        for target in sorted(graph[name]):
+            visit(target, [*path, name])
+        state[name] = "done"
+
+    for name in graph:
+        visit(name, [])
+    assert set(state) == set(MODULES)
+
+
+@pytest.mark.parametrize(
+    ("library", "users"),
+    [
+        ("pythonfmu", {"fmus.toolchain.python_fmu", "fmus.toolchain.slave"}),
+        ("fmpy", {"orchestrator.fmi.component", "orchestrator.fmi.description", "orchestrator.coupling.master"}),
+        ("pandapower", {"orchestrator.cases.power_flow"}),
+        ("pint", {"orchestrator.cases.units"}),
+        ("argparse", {"orchestrator.cli"}),
+    ],
+)
+def test_a_library_is_used_in_one_place(library, users):
+    found = {
+        name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree, typing=True))
+    }
+    assert found == users
+
+
+def test_equations_are_written_in_models_only():
+    for name, tree in MODULES.items():
+        if within(name, "orchestrator"):
+            assert not any(within(n, "casadi") for n in imported_names(tree, typing=True)), name
+
+
+def test_the_slave_needs_nothing_but_python_and_pythonfmu():
+    """It is copied into FMUs and runs where no package of this project is installed."""
+    names = imported_names(MODULES["fmus.toolchain.slave"], typing=True)
+    foreign = {name for name in names if name.split(".")[0] not in sys.stdlib_module_names}
+    assert foreign
+    assert all(within(name, "pythonfmu") for name in foreign)
+
+
+# -- habits ----------------------------------------------------------------------------------------
+
+
+def test_errors_are_raised_by_a_name_of_their_own():
+    for name, tree in MODULES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Raise) and node.exc is not None:
+                raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+                assert ast.unparse(raised) not in ("Exception", "BaseException"), f"{name}, line {node.lineno}"
+
+
+def test_no_error_is_caught_without_saying_which():
+    handlers = [(name, n) for name, tree in MODULES.items() for n in ast.walk(tree) if isinstance(n, ast.ExceptHandler)]
+    assert len(handlers) > 10
+    for name, node in handlers:
+        assert node.type is not None, f"{name}, line {node.lineno}: bare except"
+
+
+TEXT = {".py", ".toml", ".md", ".json", ".csv", ".c", ".yml", ".yaml", ".txt", ".cfg"}
+OF_A_MACHINE = re.compile(r"(?<![\w./-])(?:/(?:home|root|Users|work|tmp|opt|mnt|var)/\w|[A-Z]:\\\w)")
+
+
+def text_files():
+    """Files of the project, without what tools leave behind."""
+    tops = [*PACKAGES, "tests"]
+    files = [p for p in ROOT.iterdir() if p.is_file()]
+    files += [p for top in tops for p in (ROOT / top).rglob("*") if p.is_file()]
+    return [p for p in files if p.suffix in TEXT and "__pycache__" not in p.parts]
+
+
+def test_no_file_holds_a_path_of_some_machine():
+    files = text_files()
+    assert len(files) > 80
+    found = [
+        f"{path.relative_to(ROOT)}, line {number}: {line.strip()}"
+        for path in files
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if OF_A_MACHINE.search(line) and path != Path(__file__)
+    ]
+    assert not found
+
+
+@pytest.mark.parametrize("text", ["x = '" + "/home" + "/me/file'", '"' + "C:" + '\\temp"', "see " + "/tmp" + "/a"])
+def test_a_path_of_some_machine_is_recognised(text):
+    assert OF_A_MACHINE.search(text)
+
+
+@pytest.mark.parametrize("text", ["fmus/toolchain", "https://example.org/home/x", "results/tmp/x", "1/s", "a/work/b"])
+def test_what_only_looks_like_one(text):
+    assert not OF_A_MACHINE.search(text)
