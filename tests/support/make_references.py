@@ -1,0 +1,86 @@
+"""Reference trajectories of the FMU folders, integrated without any FMU: ``python -m tests.support.make_references``.
+
+The models' CasADi equations are integrated by SciPy's Radau method (rtol 1e-10, atol 1e-12), from their
+steady state, with inputs that step once.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from fmus.toolchain.catalogue import build_model
+
+ROOT = Path(__file__).parents[2]
+STEP_TIME, STOP_TIME, INTERVAL = 0.01, 0.3, 0.002
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a reference trajectory is of: a model, its parameters, its inputs before and after the step."""
+
+    model: str
+    file: str
+    parameters: dict[str, float]
+    before: dict[str, float]
+    after: dict[str, float]
+    outputs: tuple[str, ...]
+
+    @property
+    def path(self) -> Path:
+        return ROOT / self.file
+
+
+_DIP = 0.97 * np.exp(2j * np.pi / 180)
+_BUS = ({"v_re": 1.0, "v_im": 0.0}, {"v_re": float(_DIP.real), "v_im": float(_DIP.imag)})
+_FOLDER = "fmus/synchronous_generator"
+_GENERATOR = ("i_re", "i_im", "omega", "delta", "v_t", "E_fd", "P_m")
+REFERENCES = (
+    Reference(
+        "gfor", "gfor_fmu/reference.csv", {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
+        *_BUS, ("i_re", "i_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
+    ),
+    Reference("synchronous_generator_ac4a", f"{_FOLDER}/reference_ac4a.csv", {"P_0": 0.8}, *_BUS, _GENERATOR),
+    Reference("synchronous_generator_st1", f"{_FOLDER}/reference_st1.csv", {"P_0": 0.78}, *_BUS, _GENERATOR),
+    Reference("synchronous_generator_st4b", f"{_FOLDER}/reference_st4b.csv", {"P_0": 0.9}, *_BUS, _GENERATOR),
+    Reference(
+        "two_area_grid", "fmus/grid/reference.csv", {"X_L": 0.1},
+        {"sg1.i_re": 27.0, "sg2.i_re": 39.0}, {"sg1.i_re": 26.5, "sg1.i_im": -0.5, "sg2.i_re": 39.0},
+        ("bus_2.v_re", "bus_2.v_im", "bus_3.v_re", "bus_3.v_im", "L.p"),
+    ),
+)  # fmt: skip
+
+
+def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
+    """Column names and rows: time, inputs held from that time on, outputs."""
+    model = build_model(reference.model)
+    p = np.array([reference.parameters.get(v.name, v.start) for v in model.parameters])
+    c, x = model.initialise(p)
+    names = [v.name for v in model.outputs]
+    x, rows = np.array(x).ravel(), []
+    times = np.arange(round(STOP_TIME / INTERVAL) + 1) * INTERVAL
+    change = round(STEP_TIME / INTERVAL)
+    for inputs, span in ((reference.before, times[: change + 1]), (reference.after, times[change:])):
+        u = np.array([inputs.get(v.name, 0.0) for v in model.inputs])
+        solution = solve_ivp(
+            lambda t, x, u=u: np.array(model.derivatives(x, u, p, c)).ravel(),
+            (span[0], span[-1]), x, "Radau", t_eval=span, rtol=1e-10, atol=1e-12,
+        )  # fmt: skip
+        assert solution.success, solution.message
+        x = solution.y[:, -1]
+        for time, state in zip(span, solution.y.T, strict=True):
+            y = np.array(model.outputs_function(state, u, p, c)).ravel()
+            rows.append([time, *u, *(y[names.index(n)] for n in reference.outputs)])
+    del rows[change]  # at the step itself the row after it counts
+    return ["time", *(v.name for v in model.inputs), *reference.outputs], np.array(rows)
+
+
+def main() -> None:
+    for reference in REFERENCES:
+        columns, rows = integrate(reference)
+        np.savetxt(reference.path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""The tables of variables in the leaflets of the FMU folders: ``python -m tests.support.variable_table`` renews them."""
+
+import re
+from pathlib import Path
+
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.model import Model
+from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
+
+ROOT = Path(__file__).parents[2]
+LEAFLETS = {
+    "gfor": ROOT / "gfor_fmu" / "README.md",
+    "synchronous_generator_ac4a": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "synchronous_generator_st1": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "synchronous_generator_st4b": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "two_area_grid": ROOT / "fmus" / "grid" / "README.md",
+}
+KINDS = {
+    Input: "input",
+    Output: "output",
+    Parameter: "parameter",
+    CalculatedParameter: "calculated",
+    State: "state",
+}
+
+
+def variable_table(model: Model) -> str:
+    """All variables of a model as a Markdown table."""
+    rows = ["| Name | Kind | Unit | Start | Range | Description | Source |", "|---|---|---|---|---|---|---|"]
+    for kind in KINDS:
+        rows += [_row(v) for v in model.variables if type(v) is kind]
+    return "\n".join(rows)
+
+
+def _row(v: Variable) -> str:
+    start, bounds, source, kind = "", "", "", KINDS[type(v)]
+    if isinstance(v, Parameter):
+        kind = "tunable" if v.tunable else "parameter"
+        source = v.source
+        start = str(bool(v.start)).lower() if v.type == "Boolean" else f"{v.start:g}"
+        if v.minimum is not None or v.maximum is not None:
+            bounds = " … ".join("" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)).strip()
+    elif isinstance(v, Input):
+        start = f"{v.start:g}"
+    return f"| `{v.name}` | {kind} | {v.unit} | {start} | {bounds} | {v.text.replace('|', 'abs ')} | {source} |"
+
+
+def section(name: str) -> str:
+    """The generated part of a leaflet, markers included."""
+    table = variable_table(build_model(name))
+    return f"<!-- variables:{name} -->\n{table}\n<!-- /variables:{name} -->"
+
+
+def renew(text: str, name: str) -> str:
+    """A leaflet's text with one table made anew."""
+    pattern = re.compile(rf"<!-- variables:{name} -->.*?<!-- /variables:{name} -->", re.DOTALL)
+    if not pattern.search(text):
+        raise ValueError(f"the leaflet has no section for {name}")
+    return pattern.sub(lambda _: section(name), text)
+
+
+def main() -> None:
+    for name, path in LEAFLETS.items():
+        path.write_text(renew(path.read_text(encoding="utf-8"), name), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
