@@ -1,4 +1,4 @@
-"""Tables of variables in the leaflets of the FMU folders; ``python -m tests.support.variable_table`` renews them."""
+"""Tables of variables in the leaflets of the FMU folders: `python -m tests.support.variable_table` renews them.
 
 A leaflet keeps each table between ``<!-- variables:MODEL -->`` and ``<!-- /variables -->``.
 """
