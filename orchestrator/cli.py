@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -128,8 +129,8 @@ def _seconds(text: str) -> float:
         value = to_unit(_value(text), "s")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-    if not value > 0:
-        raise argparse.ArgumentTypeError(f"{text!r} must exceed 0")
+    if not (value > 0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text!r} must exceed 0 and be finite")
     return value
 
 
@@ -186,6 +187,12 @@ def _modes(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
     folder = options.out or Path("results") / case.name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"--out {folder}: results cannot be written there: {error.strerror}; choose another folder"
+        ) from error
     console = _console(stderr=options.json)
     results: list[RunResult] = []
     with _progress_bar(console) as bar:

@@ -110,7 +110,7 @@ def _differences(exchange: Exchange, time: float, step_size: float, size: float)
     rates = RealBatch(component, declared if all(d in component.description.variables for d in declared) else [])
     x_0, u_0 = states.read(), exchange.inputs.values.copy()
     outputs = RealBatch(component, exchange.outputs.names)
-    inputs = RealBatch(component, exchange.inputs.names)
+    single = [RealBatch(component, [name]) for name in (*component.description.states, *exchange.inputs.names)]
     n = len(x_0)
     z_0 = np.concatenate([x_0, u_0])
     columns: list[tuple[Matrix, Matrix, Matrix]] = []
@@ -120,13 +120,8 @@ def _differences(exchange: Exchange, time: float, step_size: float, size: float)
             step = size * max(1.0, abs(value))
             ends = []
             for sign in (+1.0, -1.0):
-                z = z_0.copy()
-                z[k] += sign * step
-                if k < n:
-                    states.write(z[:n])
-                else:
-                    inputs.values[:] = z[n:]
-                    inputs.write()
+                single[k].values[0] = value + sign * step
+                single[k].write()
                 y = outputs.read().copy() if outputs.names else np.zeros(0)
                 rate = rates.read().copy() if rates.names else np.zeros(n)
                 component.step(time, step_size)

@@ -133,10 +133,11 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
             removed = False
             for detail in error.errors():
                 location = _location(raw, detail["loc"])
-                problem = Problem(_place(text, location), _schema_message(detail))
-                if problem not in problems:
-                    problems.append(problem)
-                removed |= _take_out(raw, location)
+                known = any(p.place == _place(text, location) for p in problems)
+                if not (known and detail["type"] == "missing"):  # missing because it was wrong and taken out
+                    problem = Problem(_place(text, location), _schema_message(detail))
+                    problems += [] if problem in problems else [problem]
+                removed |= _take_out(raw, location, detail["type"])
             if not removed:
                 break
     raise CaseError(str(path), problems)
@@ -157,11 +158,21 @@ def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
     return tuple(path)
 
 
-def _take_out(raw: Any, location: Sequence[str | int]) -> bool:
-    for part in location[:-1]:
+def _take_out(raw: Any, location: Sequence[str | int], fault: str) -> bool:
+    """Remove a wrong entry; where something is missing in a list's element, the whole element."""
+    path = list(location)
+    if fault == "missing" or fault.startswith("union_tag"):
+        while path and not isinstance(path[-1], int):
+            path.pop()
+    for part in path[:-1]:
         raw = raw[part]
-    if isinstance(raw, dict) and location and location[-1] in raw:
-        del raw[location[-1]]
+    if not path:
+        return False
+    if isinstance(raw, dict) and path[-1] in raw:
+        del raw[path[-1]]
+        return True
+    if isinstance(raw, list) and isinstance(path[-1], int) and path[-1] < len(raw):
+        del raw[path[-1]]
         return True
     return False
 
@@ -172,6 +183,10 @@ def _schema_message(detail: Any) -> str:
             return "this key is unknown; check its spelling, or remove it"
         case "missing":
             return "this key is missing; add it"
+        case "union_tag_invalid":
+            return f"type {detail['ctx']['tag']!r} is unknown; choose from {detail['ctx']['expected_tags']}"
+        case "union_tag_not_found":
+            return "the key 'type' is missing; it says what kind of event this is"
         case _:
             seen = detail.get("input")
             shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""

@@ -41,7 +41,8 @@ def network_elements(table: NetworkTable, directory: Path) -> tuple[tuple[str, .
             bus = bus_name(row["bus"])
             loads.append(Load(f"load_{row['bus']}", bus, _number(row, "p_mw"), _number(row, "q_mvar")))
     buses = dict.fromkeys(table.buses)
-    buses |= dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
+    if not buses:  # nothing to check the lines' ends against: they are the list
+        buses = dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
     return tuple(buses), lines, loads
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from orchestrator.errors import InputError
 
 BASE_MVA = 100.0
+_TOLERANCE = 1e-8
+"""Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +91,34 @@ def solve_power_flow(
             raise InputError(
                 f"power flow: bus {bus!r} cannot have two voltages ({wanted}); give its units the same v_0"
             )
+    _check_connected(buses, lines, slack_bus)
     voltages = _pandapower_voltages(buses, lines, loads, at_bus, slack_bus)
-    return _shares(voltages, lines, loads, at_bus, slack_bus)
+    flow = _shares(voltages, lines, loads, at_bus, slack_bus)
+    if not flow.residual <= _TOLERANCE:
+        raise InputError(
+            f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
+            "check for very small reactances"
+        )
+    return flow
+
+
+def _check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: str) -> None:
+    """Every bus needs a way to the slack bus."""
+    neighbours: dict[str, set[str]] = {bus: set() for bus in buses}
+    for line in lines:
+        neighbours[line.from_bus].add(line.to_bus)
+        neighbours[line.to_bus].add(line.from_bus)
+    reached, waiting = {slack_bus}, [slack_bus]
+    while waiting:
+        found = neighbours[waiting.pop()] - reached
+        waiting += found
+        reached |= found
+    islands = [bus for bus in buses if bus not in reached]
+    if islands:
+        raise InputError(
+            f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
+            "connect them with a line, or remove them"
+        )
 
 
 def _pandapower_voltages(

@@ -3,7 +3,7 @@
 import difflib
 import fnmatch
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from orchestrator.cases.values import convert, flatten
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import BranchChange, Event, LoadChange, ParameterChange, ReferenceChange
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
-from orchestrator.coupling.system import System
+from orchestrator.coupling.system import Endpoint, System
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 
@@ -113,13 +113,14 @@ class Preparer:
         clock = self._clock(step_size)
         stop = stop_time if stop_time is not None else self.case.solver.stop_time
         events = self._events(clock, stop)
+        schedule = self._schedule()
         if self.problems or clock is None:
             return None
         return PreparedScenario(
             name=self.name,
             title=self.scenario.title or self.name,
             system=self.system,
-            schedule=self._schedule(),
+            schedule=schedule,
             step_size=clock.step_size,
             stop_time=stop,
             record=self._recorded(),
@@ -306,6 +307,12 @@ class Preparer:
             self.note(where, str(error))
 
     def _check_inputs(self) -> None:
+        for wire in self.system.connections:
+            if wire.target.variable in self.system.components[wire.target.component].inputs:
+                self.note(
+                    self.place("components", wire.target.component, "inputs"),
+                    f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other",
+                )
         for endpoint in self.system.unconnected_inputs():
             self.note(
                 self.place("components", endpoint.component),
@@ -350,6 +357,15 @@ class Preparer:
             return None
 
     def _schedule(self) -> Schedule:
+        """The case's schedule, checked against its components."""
+        schedule = self._chosen_schedule()
+        try:
+            schedule.check(set(self.system.components))
+        except InputError as error:
+            self.note(self.place("solver", "groups"), str(error))
+        return schedule
+
+    def _chosen_schedule(self) -> Schedule:
         """The file's groups; else devices and then the grid, or every component in a group of its own."""
         names = tuple(self.system.components)
         if self.case.solver.schedule == "jacobi":
@@ -371,38 +387,48 @@ class Preparer:
             event = _event(table)
             if event.component in self.scenario.remove:
                 continue
-            if self._check_event(event, where) and clock is not None:
+            checked = self._checked(event, where)
+            if checked is not None and clock is not None:
                 try:
                     clock.index(event.time, "the event")
                 except InputError as error:
                     self.note(where, str(error))
-                events.append(event)
+                events.append(checked)
         if clock is not None:
             try:
                 clock.index(stop, "the stop")
             except InputError as error:
-                self.note(self.place("solver", "stop_time"), str(error))
+                self.note(
+                    "--stop" if stop != self.case.solver.stop_time else self.place("solver", "stop_time"), str(error)
+                )
         return tuple(event for event in events if event.time < stop)
 
-    def _check_event(self, event: Event, where: str) -> bool:
+    def _checked(self, event: Event, where: str) -> Event | None:
+        """The event with its values in the variables' units; None if something is wrong with it."""
         plan = self.system.components.get(event.component)
         if plan is None:
             if event.component not in self.tables:
-                self.note(where, f"there is no component {event.component!r}")
-            return False
+                self.note(where, f"there is no component {event.component!r}; the case has: {', '.join(self.tables)}")
+            return None
+        fed = {c.target: c.source for c in self.system.connections}
         before = len(self.problems)
         for variable, value in event.settings().items():
             info = plan.description.variables.get(variable)
             if info is None:
                 self.note(where, f"component {event.component!r} has no variable {variable!r} for this event to set")
+            elif source := fed.get(Endpoint(event.component, variable)):
+                self.note(where, f"{event.component}.{variable} is fed by {source}; change that one's source")
             elif info.causality != "input" and info.variability != "tunable":
+                kind = f"{info.variability} {info.causality}"
                 self.note(
                     where,
-                    f"{event.component}.{variable} is {info.variability}; only tunable parameters change during a run",
+                    f"{event.component}.{variable} is a {kind}; only tunable parameters and open inputs can change",
                 )
             else:
-                self._convert(info, value, where)
-        return len(self.problems) == before
+                converted = self._convert(info, value, where)
+                if isinstance(event, ParameterChange) and converted is not None:
+                    event = replace(event, value=converted)
+        return event if len(self.problems) == before else None
 
 
 def _event(table: EventTable) -> Event:
@@ -414,5 +440,5 @@ def _event(table: EventTable) -> Event:
         case ReferenceChangeTable():
             return ReferenceChange(table.time, table.component, table.reference, table.delta)
         case ParameterChangeTable():
-            value = table.value if isinstance(table.value, bool) else float(table.value)
+            value: Any = table.value  # brought to the variable's type and unit by the check
             return ParameterChange(table.time, table.component, table.parameter, value)

@@ -17,7 +17,7 @@ def _in(unit: str) -> Callable[[Any], Any]:
     return convert
 
 
-Seconds = Annotated[float, BeforeValidator(_in("s"))]
+Seconds = Annotated[float, BeforeValidator(_in("s")), Field(allow_inf_nan=False)]
 PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
 Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
@@ -200,7 +200,7 @@ class CaseTable(Table):
     title: str = ""
     source: str = ""
     solver: SolverTable = SolverTable()
-    components: dict[str, ComponentTable]
+    components: dict[str, ComponentTable] = Field(min_length=1)
     network: NetworkTable | None = None
     units: UnitsTable | None = None
     power_flow: PowerFlowTable | None = None

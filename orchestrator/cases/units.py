@@ -1,9 +1,13 @@
 """Numbers with units, as people write them in a case file: ``"1350 MW"``, ``"100 us"``."""
 
+import re
 from functools import cache
 from typing import Any
 
 import pint
+
+_QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*")
+_POWERS = {"W", "VA", "var"}
 
 
 @cache
@@ -32,16 +36,27 @@ def to_unit(value: float | int | str, unit: str) -> float:
     """
     if isinstance(value, int | float):
         return float(value)
-    try:
-        quantity = _registry().Quantity(value)
-    except Exception as error:  # pint lets its parser's errors through
-        raise ValueError(f"{value!r} is not a number with a unit") from error
-    if not hasattr(quantity, "units"):
-        return float(quantity)
+    parts = _QUANTITY.fullmatch(value)
+    if parts is None:
+        raise ValueError(f"{value!r} is not a number with a unit; write it like '0.9 GW', with a decimal point")
+    number, given = float(parts["number"]), parts["unit"]
+    if not given:
+        return number
+    needed = "a plain number" if unit in ("", "1") else unit
     declared = "dimensionless" if unit in ("", "1") else unit
-    if quantity.dimensionless and declared != "dimensionless" and str(quantity.units) == "dimensionless":
-        return float(quantity.magnitude)
+    if {_kind(given), _kind(unit)} & _POWERS and _kind(given) != _kind(unit):
+        raise ValueError(f"{value!r} is in {given}, but {needed} is needed")  # one dimension, three quantities
+    if "Hz" in given and "rad" in unit:
+        raise ValueError(f"{value!r} is in {given}, but {needed} is needed; 1 Hz is 2π rad/s")
     try:
-        return float(quantity.to(declared).magnitude)
+        factor = float(_registry().Quantity(1, given).to(declared).magnitude)
     except pint.DimensionalityError as error:
-        raise ValueError(f"{value!r} is in {quantity.units:~}, but {unit or 'a plain number'} is needed") from error
+        raise ValueError(f"{value!r} is in {given}, but {needed} is needed") from error
+    except Exception as error:  # pint lets its parser's errors through
+        raise ValueError(f"{value!r}: the unit {given!r} is unknown") from error
+    return float(f"{number * factor:.15g}")  # "100 us" is 1e-4 s and not 9.999999999999999e-05
+
+
+def _kind(unit: str) -> str:
+    """``MW`` → ``W``: a unit of power without its prefix."""
+    return next((power for power in sorted(_POWERS, key=len, reverse=True) if unit.endswith(power)), unit)

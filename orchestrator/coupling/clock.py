@@ -1,5 +1,6 @@
 """Time as an integer number of communication steps: it never drifts and events hit their step exactly."""
 
+import math
 from dataclasses import dataclass
 
 from orchestrator.errors import InputError
@@ -18,8 +19,8 @@ class Clock:
     step_size: float
 
     def __post_init__(self) -> None:
-        if not self.step_size > 0:
-            raise InputError(f"communication step size {self.step_size!r} s: it must exceed 0")
+        if not (self.step_size > 0 and math.isfinite(self.step_size)):
+            raise InputError(f"communication step size {self.step_size!r} s: it must exceed 0 and be finite")
 
     def time(self, index: int) -> float:
         """Time [s] of a communication point."""
@@ -33,6 +34,8 @@ class Clock:
         InputError
             If the time lies between two communication points, or before 0.
         """
+        if not math.isfinite(time):
+            raise InputError(f"{what} at {time} s is not a time; give a finite number of seconds")
         index = round(time / self.step_size)
         if index < 0 or abs(time - self.time(index)) > 1e-6 * self.step_size:
             raise InputError(

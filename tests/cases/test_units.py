@@ -1,6 +1,7 @@
 """Quantities as people write them, in the unit that is declared for them."""
 
 import math
+import re
 
 import pytest
 
@@ -59,10 +60,10 @@ def test_a_unit_that_does_not_fit_is_named_beside_the_one_that_is_needed(value, 
 def test_a_text_that_is_no_quantity(value):
     with pytest.raises(ValueError) as caught:  # noqa: PT011 - the words are compared below
         to_unit(value, "s")
-    assert str(caught.value) == f"{value!r} is not a number with a unit"
+    assert str(caught.value).startswith(repr(value))
+    assert re.search("is not a number with a unit|is unknown", str(caught.value))
 
 
-@pytest.mark.xfail(strict=True, reason="pint drops the comma and multiplies across the blank: 0.9 GW becomes 0 MW")
 @pytest.mark.parametrize("value", ["0,9 GW", "1,5 GW", "1 350 MW", "1.350,5 MW"])
 def test_a_decimal_comma_or_a_blank_inside_a_number_is_refused_or_understood(value):
     meant = {"0,9 GW": 900.0, "1,5 GW": 1500.0, "1 350 MW": 1350.0, "1.350,5 MW": 1350.5}[value]
@@ -73,7 +74,6 @@ def test_a_decimal_comma_or_a_blank_inside_a_number_is_refused_or_understood(val
     assert converted == pytest.approx(meant)
 
 
-@pytest.mark.xfail(strict=True, reason="pint takes a hertz for a radian per second")
 def test_a_frequency_is_not_taken_for_an_angular_frequency():
     try:
         converted = to_unit("50 Hz", "rad/s")
