@@ -1,0 +1,94 @@
+"""Parameter conversion and governor of the synchronous generator, against their defining formulas."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from fmus.synchronous_generator.conversion import AxisData, classical, exact
+from fmus.synchronous_generator.data import GovernorData
+from fmus.synchronous_generator.governors import ieeeg1
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.model import ModelBuilder
+
+OMEGA_B = 2 * np.pi * 50
+AXES = {"SG1 d": (2.135, 0.34, 0.269, 0.234, 6.47, 0.022), "SG2 q": (1.7, 0.55, 0.25, 0.2, 0.4, 0.05)}
+
+
+def operational_reactance(s, X, X_l, b):
+    """X(s) of the circuit: leakage, then magnetising reactance and two rotor branches side by side."""
+    branches = [float(ca.DM(v)) for v in (b.X_1, b.R_1, b.X_2, b.R_2)]
+    sn = s / OMEGA_B
+    admittance = 1 / (X - X_l) + sn / (branches[1] + sn * branches[0]) + sn / (branches[3] + sn * branches[2])
+    return X_l + 1 / admittance
+
+
+@pytest.mark.parametrize("data", AXES.values(), ids=AXES)
+def test_exact_conversion_gives_the_standard_operational_reactance(data):
+    X, X1, X2, X_l, T10, T20 = data
+    b = exact(AxisData(*map(ca.SX, (X, X1, X2, X_l, T10, T20))), ca.SX(OMEGA_B))
+    T1, T2 = T10 * X1 / X, T20 * X2 / X1
+    for s in (0.3j, 5j, 40 + 200j, 3000j):
+        wanted = X * (1 + s * T1) * (1 + s * T2) / ((1 + s * T10) * (1 + s * T20))
+        assert operational_reactance(s, X, X_l, b) == pytest.approx(wanted, rel=1e-10)
+
+
+@pytest.mark.parametrize("data", AXES.values(), ids=AXES)
+def test_classical_conversion_gives_the_subtransient_reactance_at_high_frequency(data):
+    X, X1, X2, X_l, T10, T20 = data
+    b = classical(AxisData(*map(ca.SX, (X, X1, X2, X_l, T10, T20))), ca.SX(OMEGA_B))
+    assert operational_reactance(1e9j, X, X_l, b) == pytest.approx(X2, rel=1e-4)
+    assert operational_reactance(1e-9j, X, X_l, b) == pytest.approx(X, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("T", "K"),
+    [
+        ((0, 0, 0.1, 0.3, 7, 0.6, 0), (0.3, 0, 0.3, 0, 0.4, 0, 0, 0)),
+        ((7.5, 2.8, 0.1, 0.25, 7.5, 7.5, 0.4), (0.22, 0, 0, 0.22, 0.14, 0.14, 0.14, 0.14)),
+    ],
+)
+def test_governor_is_its_block_diagram(T, K):
+    m = ModelBuilder("governor", "IEEEG1 alone")
+    w = m.input("w", "pu", "Speed", base="f_n", start=1.0)
+    m.output("P_m", ieeeg1(m, w, ca.SX(0.7), GovernorData(20.0, T, K, "")), "pu", "Mechanical power", base="S_n")
+    model = m.build()
+    p = np.array([v.start for v in model.parameters])
+    c, x = model.initialise(p)
+    assert float(model.outputs_function(x, [1.0], p, c)[0]) == pytest.approx(0.7)
+    A, B, C, D = (np.array(block) for block in model.jacobians()(x, [1.0], p, c))
+    for s in (0.1j, 3.6j, 40j):
+        found = (C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[0, 0]
+        signal, wanted = -20 * (1 + s * T[1]) / (1 + s * T[0]) / (1 + s * T[2]), 0
+        for stage in range(4):
+            signal /= 1 + s * T[3 + stage]
+            wanted += (K[2 * stage] + K[2 * stage + 1]) * signal
+        assert found == pytest.approx(wanted, rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["gfor", *(f"synchronous_generator_{e}" for e in ("ac4a", "st1", "st4b"))])
+def test_any_dispatch_starts_in_steady_state(name):
+    model = build_model(name)
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        start = {"P_0": rng.uniform(-0.3, 0.95), "Q_0": rng.uniform(-0.3, 0.3)}
+        start |= {"v_0": rng.uniform(0.95, 1.05), "theta_0": rng.uniform(-3, 3)}
+        p = np.array([start.get(v.name, v.start) for v in model.parameters])
+        c, x = model.initialise(p)
+        u = [start["v_0"] * np.cos(start["theta_0"]), start["v_0"] * np.sin(start["theta_0"])]
+        rates = np.array(model.derivatives(x, u, p, c))
+        assert np.abs(rates).max() < 1e-8  # [1/s]; the network's own rates are near 1e4 times the rounding error
+        y = dict(
+            zip((o.name for o in model.outputs), np.array(model.outputs_function(x, u, p, c)).ravel(), strict=True)
+        )
+        assert (y["p"], y["q"]) == pytest.approx((start["P_0"], start["Q_0"]), abs=1e-12)
+
+
+def test_saturation_passes_through_its_two_points():
+    model = build_model("synchronous_generator_st4b")
+    factor = next(k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor")
+    names = [v.name for v in model.parameters]
+    for flux, s in ((1.0, 0.1275), (1.2, 0.2706)):
+        values = {"v_0": flux, "P_0": 0.0, "Q_0": 0.0, "machine.saturation": 1.0}
+        p = np.array([values.get(n, v.start) for n, v in zip(names, model.parameters, strict=True)])
+        c, _ = model.initialise(p)
+        assert float(c[factor]) == pytest.approx(1 + s)

@@ -1,0 +1,95 @@
+"""The paper's second table: 30 figures of the IEEE 118-bus system, from 29 or 57 coupled FMUs."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import eigenvalues
+from orchestrator.cases.case import load_case
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.schedule import jacobi
+from orchestrator.study import compute_modes, run_scenario
+
+pytestmark = pytest.mark.reproduction
+
+SCENARIOS = ("base", "gfor", "pod_p", "pod_q", "pod_pq")
+# An independent monolithic linearisation of the same data: (Hz, damping %) of the least damped modes.
+INDEPENDENT = {
+    "base": [(0.6669, 5.775), (0.8907, 6.832), (0.8287, 6.917), (1.1092, 8.359), (1.0482, 8.438), (0.9846, 8.98)],
+    "gfor": [(0.7173, 7.52), (0.9339, 7.95), (0.8743, 8.046), (1.1194, 8.434), (1.0714, 8.678), (1.0157, 9.658)],
+}
+
+
+def prepare(scenario, overrides=None, **arguments):
+    case = load_case("ieee118")
+    (ready,) = case.prepare([scenario], overrides, **arguments)
+    return case, ready
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_three_critical_modes_are_the_papers(scenario):
+    result = compute_modes(*prepare(scenario), (0.3, 1.3))
+    assert set(result.references) == {"1-2", "3-4", "5-6"}
+    for name, reference in result.references.items():
+        assert result.named[name].frequency_hz == pytest.approx(reference.frequency_hz, abs=0.02), name
+        assert result.named[name].damping_percent == pytest.approx(reference.damping_percent, abs=0.4), name
+    assert len({id(mode) for mode in result.named.values()}) == 3
+    assert result.operating_point.residual < 1e-8
+    assert result.prepared.power_flow.residual < 1e-9
+    assert not result.warnings
+    for frequency, damping in INDEPENDENT.get(scenario, []):
+        nearest = min(abs(m.frequency_hz - frequency) + abs(m.damping_percent - damping) / 10 for m in result.modes)
+        assert nearest < 2e-3
+
+
+def test_the_power_flow_gives_the_published_reactive_powers():
+    _, ready = prepare("base")
+    path = Path(load_case("ieee118").path).with_name("units.csv")
+    with path.open() as file:
+        units = list(csv.DictReader(file))
+    for row in units:
+        power = ready.power_flow.powers[f"sg{row['bus']}"] * float(row["rating_mva"])
+        assert power.real == pytest.approx(float(row["p_mw"]), abs=0.01)
+        assert power.imag == pytest.approx(float(row["q_mvar"]), abs=0.3)  # its voltages are given to five digits
+
+
+@pytest.mark.slow
+def test_another_share_of_converters_moves_every_mode():
+    quarter, half = (
+        compute_modes(*prepare("gfor", {"units.alpha": alpha}), (0.3, 1.3)).named["1-2"] for alpha in (0.25, 0.5)
+    )
+    assert half.damping_percent > quarter.damping_percent + 1
+    assert len(prepare("gfor", {"units.alpha": 1.0})[1].system.components) == 29
+
+
+@pytest.mark.slow
+def test_which_coupling_is_stable_is_known_before_any_run():
+    case, ready = prepare("gfor")
+    with Master(ready.system, ready.schedule, ready.step_size) as master:
+        blocks = Blocks(master)
+        growth = {
+            "gauss-seidel 100 us": eigenvalues(compose(blocks, ready.schedule)).real.max(),
+            "jacobi 100 us": eigenvalues(compose(blocks, jacobi(tuple(master.components)))).real.max(),
+            "gauss-seidel 500 us": eigenvalues(compose(Blocks(master, 5e-4), ready.schedule)).real.max(),
+        }
+    assert growth["gauss-seidel 100 us"] < 1e-2
+    assert growth["jacobi 100 us"] > 100
+    assert growth["gauss-seidel 500 us"] > 100
+    (warning,) = compute_modes(case, prepare("gfor", step_size=5e-4)[1]).warnings
+    assert "numerically unstable" in warning
+    assert "shorter step" in warning
+
+
+@pytest.mark.slow
+def test_an_undisturbed_run_stays_and_a_load_step_rings_with_the_mode():
+    _, still = prepare("gfor", stop_time=1.0)
+    case, ready = prepare("gfor", stop_time=8.0)
+    drift = run_scenario(case, still).dataset
+    assert max(float(abs(drift[n] - drift[n][0]).max()) for n in drift.data_vars) < 1e-8
+    result = run_scenario(case, ready)
+    mode, seen = result.modes.named["1-2"], result.ring_down
+    assert seen.frequency_hz == pytest.approx(mode.frequency_hz, abs=0.02)
+    assert seen.damping_percent == pytest.approx(mode.damping_percent, abs=1.0)
