@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmus.grid.network import Line, Load
-from orchestrator.cases.schema import NetworkTable, UnitsTable
+from orchestrator.cases.schema import ComponentTable, NetworkTable, UnitsTable
 from orchestrator.errors import InputError
+
+UNIT_KINDS = ("sg", "gfor")
+"""Beginnings of the names of a unit's generator and converter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,18 @@ def unit_rows(table: UnitsTable, directory: Path) -> list[UnitRow]:
             )
         rows.append(unit)
     return rows
+
+
+def unit_components(table: UnitsTable, alpha: float, rows: Sequence[UnitRow]) -> dict[str, ComponentTable]:
+    """Generators ``sg<bus>`` and converters ``gfor<bus>`` that share each unit's rating and power 1 − α to α."""
+    shares = (1 - alpha, alpha)
+    models = ((table.generator, table.generator_parameters), (table.converter, table.converter_parameters))
+    components = {}
+    for kind, share, (model, common) in zip(UNIT_KINDS, shares, models, strict=True):
+        for row in rows if share > 0 else ():
+            own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
+            components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=common | own)
+    return components
 
 
 def bus_name(label: str) -> str:

@@ -11,16 +11,12 @@ from typing import Any
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, network_of
 from fmus.toolchain.python_fmu import cached
-from orchestrator.cases.network_data import network_elements, unit_rows
+from orchestrator.cases.event_tables import event_of
+from orchestrator.cases.network_data import UNIT_KINDS, network_elements, unit_components, unit_rows
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import (
-    BranchChangeTable,
     CaseTable,
     ComponentTable,
-    EventTable,
-    LoadChangeTable,
-    ParameterChangeTable,
-    ReferenceChangeTable,
     ScenarioTable,
     UnitsTable,
     Value,
@@ -28,7 +24,7 @@ from orchestrator.cases.schema import (
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.cases.values import convert, flatten
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import BranchChange, Event, LoadChange, ParameterChange, ReferenceChange
+from orchestrator.coupling.events import Event, ParameterChange
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.system import Endpoint, System
 from orchestrator.errors import InputError, Problem
@@ -143,17 +139,8 @@ class Preparer:
         except InputError as error:
             self.note(self.place("units", "file"), str(error))
             return {}
-        components = {}
-        for kind, model, share, extra in (
-            ("sg", table.generator, 1 - alpha, table.generator_parameters),
-            ("gfor", table.converter, alpha, table.converter_parameters),
-        ):
-            for row in rows:
-                self._possible_units.add(f"{kind}{row.label}")
-                if share > 0:
-                    own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
-                    components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=extra | own)
-        return components
+        self._possible_units = {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
+        return unit_components(table, alpha, rows)
 
     def _alpha(self, table: UnitsTable) -> float:
         """The converters' share: from the command line, else the scenario, else the table."""
@@ -384,7 +371,7 @@ class Preparer:
         events = []
         for index, table in enumerate(tables):
             where = self.place("scenarios", self.name, "events", index) if own else self.place("events", index)
-            event = _event(table)
+            event = event_of(table)
             if event.component in self.scenario.remove:
                 continue
             checked = self._checked(event, where)
@@ -429,16 +416,3 @@ class Preparer:
                 if isinstance(event, ParameterChange) and converted is not None:
                     event = replace(event, value=converted)
         return event if len(self.problems) == before else None
-
-
-def _event(table: EventTable) -> Event:
-    match table:
-        case LoadChangeTable():
-            return LoadChange(table.time, table.component, table.load, table.scale)
-        case BranchChangeTable():
-            return BranchChange(table.time, table.component, table.line, table.X, table.R)
-        case ReferenceChangeTable():
-            return ReferenceChange(table.time, table.component, table.reference, table.delta)
-        case ParameterChangeTable():
-            value: Any = table.value  # brought to the variable's type and unit by the check
-            return ParameterChange(table.time, table.component, table.parameter, value)
