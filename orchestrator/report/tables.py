@@ -10,6 +10,9 @@ from orchestrator.fmi.description import FmuDescription
 if TYPE_CHECKING:
     from orchestrator.study import ModesResult, RunResult
 
+_SHARES_SHOWN = 5
+"""FMUs whose share of a run's time is shown, largest first."""
+
 
 def _table(title: str, *columns: str, left: int = 1) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
@@ -119,7 +122,9 @@ def run_statistics(results: Sequence["RunResult"]) -> Table:
     for r in results:
         if r.statistics:
             s = r.statistics
-            shares = ", ".join(f"{c.name} {c.share:.0%}" for c in s.components)
+            largest = sorted(s.components, key=lambda c: -c.share)[:_SHARES_SHOWN]
+            shares = ", ".join(f"{c.name} {c.share:.0%}" for c in largest)
+            shares += f" … {len(s.components)} in all" if len(s.components) > _SHARES_SHOWN else ""
             table.add_row(
                 r.modes.prepared.title,
                 str(s.steps),
