@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from orchestrator.analysis.critical_modes import find_critical_modes, growth_rate, nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
-from orchestrator.analysis.linearization import Blocks, LinearModel, compose, continuous
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated, most_opposed
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.case import Case
@@ -98,11 +100,22 @@ class RunResult:
 
 
 def compute_modes(
-    case: Case, prepared: PreparedScenario, frequency_range: tuple[float, float] = (0.1, 2.0)
+    case: Case,
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = (0.1, 2.0),
+    critical: float | None = None,
 ) -> ModesResult:
-    """Initialise a scenario's FMUs, verify their steady state, and linearise around it."""
+    """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
+
+    Parameters
+    ----------
+    frequency_range
+        [Hz]
+    critical
+        Damping ratio below which modes are looked for, by sparse search; None for the full spectrum.
+    """
     with _master(prepared) as master:
-        return _modes(case, prepared, master, frequency_range)[0]
+        return _modes(case, prepared, master, frequency_range, critical)
 
 
 def run_scenario(
@@ -118,8 +131,8 @@ def run_scenario(
     recorder = Recorder(prepared.record, prepared.record_every)
     statistics, failure = None, None
     with _master(prepared) as master:
-        modes, blocks = _modes(case, prepared, master, frequency_range)
-        shifts = _shifts(master, modes.electromechanical, blocks)
+        modes = _modes(case, prepared, master, frequency_range)
+        shifts = _shifts(master, modes.electromechanical)
         try:
             statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
         except CosimError as error:
@@ -144,16 +157,21 @@ def _master(prepared: PreparedScenario) -> Master:
 
 
 def _modes(
-    case: Case, prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float]
-) -> tuple[ModesResult, Blocks]:
+    case: Case,
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+) -> ModesResult:
     point = find_operating_point(master)
-    blocks = Blocks(master)
-    model = compose(blocks, master.schedule)
-    modes = find_modes(model, *frequency_range)
+    model = compose(Blocks(master), master.schedule)
+    modes = (
+        find_modes(model, *frequency_range)
+        if critical is None
+        else find_critical_modes(model, *frequency_range, critical)
+    )
     named = _named_modes(case, model, modes)
-    return ModesResult(
-        prepared, point, model, modes, named, _references(case, prepared), _warnings(blocks, model)
-    ), blocks
+    return ModesResult(prepared, point, model, modes, named, _references(case, prepared), _warnings(master, model))
 
 
 def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
@@ -173,19 +191,19 @@ def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str,
     return found
 
 
-def _warnings(blocks: Blocks, model: LinearModel) -> tuple[str, ...]:
+def _warnings(master: Master, model: LinearModel) -> tuple[str, ...]:
     """Say before a run that the coupling itself is unstable."""
-    coupled = eigenvalues(model).real.max()
-    if coupled <= _COUPLING_UNSTABLE:
+    coupled = growth_rate(model)
+    if coupled is None or coupled <= _COUPLING_UNSTABLE:
         return ()
     try:
-        growth = eigenvalues(continuous(blocks)).real.max()
+        growth = eigenvalues(continuous(Blocks(master, derivatives=True))).real.max()
     except AnalysisError:
         return ()
     if coupled - growth <= _COUPLING_UNSTABLE:
         return ()
     return (
-        f"the coupling is numerically unstable: with a communication step of {blocks.step_size:g} s the step map grows "
+        f"the coupling is numerically unstable: with a communication step of {model.step_size:g} s the step map grows "
         f"at {coupled:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s; take a shorter step or the "
         "Gauss-Seidel schedule, devices before the grid",
     )
@@ -202,12 +220,12 @@ def _same(value: Any, wanted: Any) -> bool:
     return value is not None and bool(np.isclose(float(value), float(wanted)))
 
 
-def _shifts(master: Master, mode: Mode | None, blocks: Blocks) -> list[ModeShift]:
+def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:
     """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
     if mode is None:
         return []
     try:
-        exact = _closest(continuous(blocks), mode.eigenvalue)
+        exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
     except AnalysisError:
         return []
     schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
@@ -215,13 +233,9 @@ def _shifts(master: Master, mode: Mode | None, blocks: Blocks) -> list[ModeShift
     for step_size in STEP_SIZES:
         at_step = Blocks(master, step_size)
         for name, schedule in sorted(schedules.items()):
-            shifts.append(ModeShift(name, step_size, exact, _closest(compose(at_step, schedule), exact)))
+            value = nearest_eigenvalue(compose(at_step, schedule), exact)
+            shifts.append(ModeShift(name, step_size, exact, value))
     return shifts
-
-
-def _closest(model: LinearModel, eigenvalue: complex) -> complex:
-    values = eigenvalues(model)
-    return complex(values[np.argmin(np.abs(values - eigenvalue))])
 
 
 def _ring_down(case: Case, modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:

@@ -23,6 +23,7 @@ from pythonfmu.enums import Fmi2Status
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 MOST_PARTS = 1_000_000  # internal steps in one communication step
+LONG = 64  # from here on it pays to see whether value references follow each other
 LIBRARIES = {
     ("linux", "x86_64"): "linux64/kernel.so",
     ("win32", "amd64"): "win64/kernel.dll",
@@ -178,6 +179,10 @@ class Slave(Fmi2Slave):
         try:
             if self._outputs_stale:
                 self._refresh()
+            if len(vrs) > LONG and vrs[-1] < self._first_derivative:
+                first, end = vrs[0], vrs[0] + len(vrs)
+                if first >= 0 and vrs == list(range(first, end)):
+                    return self._z[first:end]  # such as all states at once
             if vrs and max(vrs) >= self._first_derivative:
                 self._kernel.derivatives(self._address)
             if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end

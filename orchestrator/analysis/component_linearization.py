@@ -1,15 +1,14 @@
 """Linear model of one running FMU over one communication step, by perturbation of its states and inputs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.analysis.linear_model import Matrix
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
-
-Matrix = NDArray[np.float64]
 
 PERTURBATIONS = (1e-5, 2e-5)
 """Central differences are taken with both, relative to max(1, |value|); they should agree."""
@@ -26,7 +25,7 @@ class ComponentLinearization:
     A, B, C, D
         Of the step map, shapes (n, n), (n, m), (p, n), (p, m).
     A_c, B_c
-        Of the continuous model, from the FMU's own derivatives; None where it declares none.
+        Of the continuous model, from the FMU's own derivatives; None where it declares none or they were not asked for.
     disagreement
         Largest difference of an element of A, B, C or D between the two perturbation sizes.
     """
@@ -69,24 +68,34 @@ class StateAccess:
         self._buffer = RealBatch(component, description.states)
 
     def read(self) -> Matrix:
-        return self.batch.read().copy() if self.batch.names else np.zeros(0)
+        return self.batch.read().copy()
 
     def write(self, values: Matrix) -> None:
-        if self.batch.names:
-            self._buffer.values[:] = values
-            self._buffer.write()
+        self._buffer.values[:] = values
+        self._buffer.write()
 
 
-def linearize_component(exchange: Exchange, time: float, step_size: float) -> ComponentLinearization:
-    """Perturb one component around where it is, and put it back."""
+def linearize_component(
+    exchange: Exchange, time: float, step_size: float, *, derivatives: bool = False
+) -> ComponentLinearization:
+    """Perturb one component around where it is, and put it back.
+
+    Parameters
+    ----------
+    derivatives
+        Also difference the FMU's own derivatives, if it declares them; it costs a third more.
+    """
     component = exchange.component
-    results = [_differences(exchange, time, step_size, size) for size in PERTURBATIONS]
     names = component.description.states
+    rates = [f"der({s})" for s in names] if derivatives else []
+    rates = rates if all(r in component.description.variables for r in rates) else []
     n = len(names)
-    has_derivatives = all(f"der({s})" in component.description.variables for s in names)
-    (after, outputs, rates), p = results[0], len(exchange.outputs.names)
-    pairs = list(zip(*results, strict=True))[:2]
-    disagreement = max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs)
+    # The derivatives need no second size: they are differenced over no step.
+    (after, outputs, slopes), (after_2, outputs_2, _) = (
+        _differences(exchange, time, step_size, size, rates if size == PERTURBATIONS[0] else [])
+        for size in PERTURBATIONS
+    )
+    pairs = ((after, after_2), (outputs, outputs_2))
     return ComponentLinearization(
         component.name,
         names,
@@ -94,44 +103,42 @@ def linearize_component(exchange: Exchange, time: float, step_size: float) -> Co
         exchange.outputs.names,
         A=after[:, :n],
         B=after[:, n:],
-        C=outputs[:, :n].reshape(p, n),
+        C=outputs[:, :n],
         D=outputs[:, n:],
-        A_c=rates[:, :n] if has_derivatives else None,
-        B_c=rates[:, n:] if has_derivatives else None,
-        disagreement=disagreement,
+        A_c=slopes[:, :n] if len(rates) == n and derivatives else None,
+        B_c=slopes[:, n:] if len(rates) == n and derivatives else None,
+        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs),
     )
 
 
-def _differences(exchange: Exchange, time: float, step_size: float, size: float) -> tuple[Matrix, Matrix, Matrix]:
-    """Columns of d(x⁺), d(y), d(ẋ) by every state, then every coupled input."""
+def _differences(
+    exchange: Exchange, time: float, step_size: float, size: float, rates: Sequence[str]
+) -> tuple[Matrix, Matrix, Matrix]:
+    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every coupled input."""
     component = exchange.component
     states = StateAccess(component)
-    declared = [f"der({s})" for s in component.description.states]
-    rates = RealBatch(component, declared if all(d in component.description.variables for d in declared) else [])
-    x_0, u_0 = states.read(), exchange.inputs.values.copy()
-    outputs = RealBatch(component, exchange.outputs.names)
-    single = [RealBatch(component, [name]) for name in (*component.description.states, *exchange.inputs.names)]
-    n = len(x_0)
-    z_0 = np.concatenate([x_0, u_0])
-    columns: list[tuple[Matrix, Matrix, Matrix]] = []
+    z_0 = np.concatenate([states.read(), exchange.inputs.values])
+    perturbed = [RealBatch(component, [name]) for name in (*component.description.states, *exchange.inputs.names)]
+    after, outputs, slopes = (
+        RealBatch(component, names) for names in (component.description.states, exchange.outputs.names, rates)
+    )
+    columns = tuple(np.zeros((len(z_0), len(batch.names))) for batch in (after, outputs, slopes))
     saved = component.save_state()
     try:
         for k, value in enumerate(z_0):
             step = size * max(1.0, abs(value))
-            ends = []
             for sign in (+1.0, -1.0):
-                single[k].values[0] = value + sign * step
-                single[k].write()
-                y = outputs.read().copy() if outputs.names else np.zeros(0)
-                rate = rates.read().copy() if rates.names else np.zeros(n)
+                perturbed[k].values[0] = value + sign * step
+                perturbed[k].write()
+                for batch, column in zip((outputs, slopes), columns[1:], strict=True):
+                    column[k] += sign * batch.read()
                 component.step(time, step_size)
-                ends.append((states.read(), y, rate))
+                columns[0][k] += sign * after.read()
                 component.restore_state(saved)
-            columns.append(tuple((a - b) / (2 * step) for a, b in zip(*ends, strict=True)))
+            for column in columns:
+                column[k] /= 2 * step
     finally:
         component.restore_state(saved)
         component.free_state(saved)
-    widths = (n, len(outputs.names), n)
-    return tuple(  # type: ignore[return-value]
-        np.column_stack([c[i] for c in columns]) if columns else np.zeros((width, 0)) for i, width in enumerate(widths)
-    )
+    after_columns, output_columns, slope_columns = (column.T for column in columns)
+    return after_columns, output_columns, slope_columns

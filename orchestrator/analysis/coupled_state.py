@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.component_linearization import Matrix, StateAccess
+from orchestrator.analysis.component_linearization import StateAccess
+from orchestrator.analysis.linear_model import Matrix
 from orchestrator.coupling.master import Master
 
 

@@ -5,44 +5,19 @@ travel one step late, that output as well: an output with direct feed-through fr
 older than itself is memory that the exchange adds. Everything else follows from the states.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
 
 import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
 
-from orchestrator.analysis.component_linearization import Matrix, linearize_component
+from orchestrator.analysis.component_linearization import linearize_component
+from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import AnalysisError
 
-
-@dataclass(frozen=True)
-class LinearModel:
-    """z⁺ = A·z around an operating point.
-
-    Attributes
-    ----------
-    A
-        Step map, shape (n, n), or for ``step_size`` None the continuous matrix [1/s].
-    names
-        ``component.state`` for states, ``component.output (held)`` for what the exchange remembers.
-    step_size
-        Communication step [s]; None for a continuous model.
-    disagreement
-        Largest difference between the two perturbation sizes, in elements of the components' matrices.
-    """
-
-    A: Matrix
-    names: tuple[str, ...]
-    step_size: float | None
-    disagreement: float
-
-    @property
-    def number_of_states(self) -> int:
-        """States of the components, without what the exchange remembers."""
-        return sum(not name.endswith(HELD) for name in self.names)
-
-
-HELD = " (held)"
+Indices = NDArray[np.int64]
 
 
 class Blocks:
@@ -54,12 +29,14 @@ class Blocks:
         A running system at its operating point. It is left as it was.
     step_size
         Communication step to linearise over [s]; by default the master's own.
+    derivatives
+        Whether `continuous` will be asked for as well.
     """
 
-    def __init__(self, master: Master, step_size: float | None = None) -> None:
+    def __init__(self, master: Master, step_size: float | None = None, *, derivatives: bool = False) -> None:
         self.step_size = step_size or master.clock.step_size
         self.components = {
-            name: linearize_component(exchange, master.time, self.step_size)
+            name: linearize_component(exchange, master.time, self.step_size, derivatives=derivatives)
             for name, exchange in master.exchanges.items()
         }
         self.sources = {name: exchange.sources for name, exchange in master.exchanges.items()}
@@ -105,27 +82,36 @@ def linearize(master: Master, step_size: float | None = None, schedule: Schedule
 
 
 def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
-    """Walk once through the schedule with every quantity written as a row over z."""
+    """Walk once through the schedule, giving every output a place in w each time that it is renewed.
+
+    Raises
+    ------
+    AnalysisError
+        If direct feed-through closes a loop.
+    """
     windows, names = blocks.state_windows(), blocks.state_names()
     held = _held_outputs(blocks, schedule)
-    n, memory = len(names), [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
-    z = np.eye(n + len(memory))
-    x = z[:n].copy()
-    y = np.zeros((len(blocks.output_names), n + len(memory)))
-    y[memory] = z[n:]
-    order = [name for group in schedule.groups for name in group]
-    _settle_outputs(blocks, windows, x, y, [name for name in order if name not in held])
+    memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
+    n, p = len(names), len(blocks.output_names)
+    equations = _Equations(n + len(memory), 2 * p)
+    newest = np.arange(p)  # where in w the newest value of every output stands
+    _check_feedthrough(blocks, [name for name in blocks.components if name not in held])
+    for name, c in blocks.components.items():
+        if name not in held:
+            equations.output(newest[blocks.window[name]], windows[name], c.C, newest[blocks.sources[name]], c.D)
+    for k, i in enumerate(memory):
+        equations.output(newest[i : i + 1], slice(n + k, n + k + 1), np.eye(1), newest[:0], np.zeros((1, 0)))
     for group in schedule.groups:
-        inputs = {name: y[blocks.sources[name]] for name in group}
+        inputs = {name: newest[blocks.sources[name]].copy() for name in group}
         for name in group:
-            c = blocks.components[name]
-            x[windows[name]] = c.A @ x[windows[name]] + c.B @ inputs[name]
-        for name in group:
-            c = blocks.components[name]
-            y[blocks.window[name]] = c.C @ x[windows[name]] + c.D @ inputs[name]
-    A = np.vstack([x, y[memory]])
+            c, x, u = blocks.components[name], windows[name], inputs[name]
+            equations.next_state(x, x, c.A, u, c.B)
+            newest[blocks.window[name]] = p + np.arange(p)[blocks.window[name]]
+            equations.output(newest[blocks.window[name]], x, c.C @ c.A, u, c.C @ c.B + c.D)
+    for k, i in enumerate(memory):
+        equations.next_state(slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1))
     all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in memory))
-    return LinearModel(A, all_names, blocks.step_size, blocks.disagreement)
+    return equations.model(all_names, blocks.step_size, blocks.disagreement)
 
 
 def continuous(blocks: Blocks) -> LinearModel:
@@ -136,38 +122,65 @@ def continuous(blocks: Blocks) -> LinearModel:
     AnalysisError
         If a component does not give its derivatives, or direct feed-through closes a loop.
     """
-    windows, names = blocks.state_windows(), blocks.state_names()
     silent = [name for name, c in blocks.components.items() if c.A_c is None]
     if silent:
         raise AnalysisError(
             f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made"
         )
-    x = np.eye(len(names))
-    y = np.zeros((len(blocks.output_names), len(names)))
-    _settle_outputs(blocks, windows, x, y, list(blocks.components))
-    A = np.zeros_like(x)
+    windows, names = blocks.state_windows(), blocks.state_names()
+    _check_feedthrough(blocks, list(blocks.components))
+    equations = _Equations(len(names), len(blocks.output_names))
     for name, c in blocks.components.items():
-        assert c.A_c is not None
-        assert c.B_c is not None
-        A[windows[name]] = c.A_c @ x[windows[name]] + c.B_c @ y[blocks.sources[name]]
-    return LinearModel(A, tuple(names), None, blocks.disagreement)
+        if c.A_c is not None and c.B_c is not None:
+            equations.next_state(windows[name], windows[name], c.A_c, blocks.sources[name], c.B_c)
+        own = np.arange(len(blocks.output_names))[blocks.window[name]]
+        equations.output(own, windows[name], c.C, blocks.sources[name], c.D)
+    return equations.model(names, None, blocks.disagreement)
 
 
-def _settle_outputs(blocks: Blocks, windows: dict[str, slice], x: Matrix, y: Matrix, names: list[str]) -> None:
-    """Write y = C·x + D·u for the named components, those without open feed-through first."""
+class _Equations:
+    """Collects the blocks of z⁺ = F·z + G·w, w = H·z + K·w."""
+
+    def __init__(self, n: int, m: int) -> None:
+        self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
+        self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {name: [] for name in self._shapes}
+
+    def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
+        """z⁺[rows] = A·z[states] + B·w."""
+        n = self._shapes["F"][0]
+        self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
+        self._add("G", np.arange(n)[rows], w, B)
+
+    def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
+        """w[rows] = C·z[states] + D·w."""
+        self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
+        self._add("K", rows, w, D)
+
+    def _add(self, name: str, rows: Indices, columns: Indices, block: Matrix) -> None:
+        i, k = np.nonzero(block)
+        self._parts[name].append((rows[i], columns[k], block[i, k]))
+
+    def model(self, names: Iterable[str], step_size: float | None, disagreement: float) -> LinearModel:
+        F, G, H, K = (self._matrix(name) for name in self._shapes)
+        return LinearModel(F, G, H, K, tuple(names), step_size, disagreement)
+
+    def _matrix(self, name: str) -> sp.csr_array:
+        rows, columns, values = (np.concatenate(part) for part in zip(*self._parts[name], strict=True))
+        return sp.coo_array((values, (rows, columns)), shape=self._shapes[name]).tocsr()
+
+
+def _check_feedthrough(blocks: Blocks, names: list[str]) -> None:
+    """No output of the named components may depend on itself within one instant."""
     waiting = list(names)
     while waiting:
-        pending = {i for name in waiting for i in range(len(y))[blocks.window[name]]}
+        pending = {i for name in waiting for i in range(len(blocks.output_names))[blocks.window[name]]}
         ready = [name for name in waiting if not pending & _feedthrough_sources(blocks, name)]
         if not ready:
             raise AnalysisError(
                 f"direct feed-through closes an algebraic loop through {', '.join(waiting)}; "
                 "one of them must give an output that does not depend directly on its inputs"
             )
-        for name in ready:
-            c = blocks.components[name]
-            y[blocks.window[name]] = c.C @ x[windows[name]] + c.D @ y[blocks.sources[name]]
-            waiting.remove(name)
+        waiting = [name for name in waiting if name not in ready]
 
 
 def _feedthrough_sources(blocks: Blocks, name: str) -> set[int]:

@@ -1,13 +1,14 @@
 """Modes of a linear model: eigenvalues, damping ratio, frequency, participation factors, mode shapes."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linearization import LinearModel
+from orchestrator.analysis.linear_model import LinearModel
 
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this belongs to what decays within one step, not to a mode."""
@@ -44,20 +45,67 @@ class Mode:
     def damping_percent(self) -> float:
         return 100 * self.damping_ratio
 
+    @cached_property
+    def by_component(self) -> dict[str, float]:
+        """Participation of every component as a whole: the sum over its states, largest first."""
+        return self.by_group(lambda state: state.partition(".")[0])
+
+    def by_group(self, group_of: Callable[[str], str | None]) -> dict[str, float]:
+        """Participation of groups of states, largest first; states whose group is None are left out."""
+        sums: dict[str, float] = {}
+        for state, factor in self.participation:
+            group = group_of(state)
+            if group is not None:
+                sums[group] = sums.get(group, 0.0) + factor
+        return dict(sorted(sums.items(), key=lambda entry: -entry[1]))
+
+    def swing(self, states: Iterable[str], least: float = 0.1) -> tuple[list[str], list[str]]:
+        """Which of some states, such as all speeds, swing together and which against them.
+
+        Returns
+        -------
+        Those less than 90° from the largest, and the others; each largest first. What moves less than
+        ``least`` of the largest is left out.
+        """
+        moving = sorted((s for s in states if s in self.shape), key=lambda s: -abs(self.shape[s]))
+        if not moving or abs(self.shape[moving[0]]) == 0:
+            return [], []
+        leader = self.shape[moving[0]]
+        moving = [s for s in moving if abs(self.shape[s]) >= least * abs(leader)]
+        together = [s for s in moving if (self.shape[s] * leader.conjugate()).real > 0]
+        return together, [s for s in moving if s not in together]
+
     def participation_of(self, states: Iterable[str]) -> float:
         """Sum of the factors of some states."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
 
 
+@dataclass(frozen=True)
+class Spectrum:
+    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first."""
+
+    eigenvalues: NDArray[np.complex128]
+    modes: list[Mode]
+
+    @property
+    def growth_rate(self) -> float:
+        """Largest real part [1/s]."""
+        return float(self.eigenvalues.real.max(initial=-np.inf))
+
+
 def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
     """All eigenvalues [rad/s] without eigenvectors; ln(μ)/H for a step map."""
-    values = np.asarray(np.linalg.eigvals(model.A), dtype=complex)
-    return _continuous(values, model)[0]
+    return to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)[0]
 
 
 def find_modes(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
-    """Modes with a frequency in a range, one of each conjugate pair, least damped first.
+    """Modes with a frequency in a range; see `find_spectrum`."""
+    return find_spectrum(model, lowest_hz, highest_hz).modes
+
+
+def find_spectrum(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> Spectrum:
+    """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
     Parameters
     ----------
@@ -67,12 +115,17 @@ def find_modes(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2
         Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
     """
     values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
-    lambdas, alive = _continuous(values, model)
+    lambdas, alive = to_continuous(values, model.step_size)
     left, right = left[:, alive], right[:, alive]
     chosen = [
         k for k, value in enumerate(lambdas) if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
     ]
-    modes = [_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
+    modes = [make_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
+    return Spectrum(lambdas, least_damped_first(modes))
+
+
+def least_damped_first(modes: Iterable[Mode]) -> list[Mode]:
+    """Sorted by damping ratio, then frequency."""
     return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
 
 
@@ -99,14 +152,20 @@ def most_opposed(modes: Iterable[Mode], side: Iterable[str], other: Iterable[str
     return best if best is not None and opposition(best) > 0 else None
 
 
-def _continuous(values: NDArray[np.complex128], model: LinearModel) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    if model.step_size is None:
+def to_continuous(
+    values: NDArray[np.complex128], step_size: float | None
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+    """Eigenvalues λ [rad/s] from those of a model's matrix, and which of these are modes at all."""
+    if step_size is None:
         return values.astype(complex), np.ones(len(values), dtype=bool)
     alive = np.abs(values) > _DEAD
-    return np.log(values[alive].astype(complex)) / model.step_size, alive
+    return np.log(values[alive].astype(complex)) / step_size, alive
 
 
-def _mode(value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]) -> Mode:
+def make_mode(
+    value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]
+) -> Mode:
+    """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,)."""
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()
     order = np.argsort(-factors)

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.analysis.component_linearization import Matrix
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.linearization import HELD, Blocks, compose
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.errors import AnalysisError
+
+_SHIFT = 1e-7
+"""Far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode."""
 
 
 @dataclass(frozen=True)
@@ -92,11 +95,10 @@ def _largest(change: Matrix) -> float:
 
 
 def _newton_correction(master: Master, n: int, change: Matrix) -> Matrix:
-    """Least-norm solution of (I − A)·dx = change: the common angle, along which nothing changes, stays."""
+    """Solve (I − A)·dx = change; what the exchange remembers follows from the states."""
     model = compose(Blocks(master), gauss_seidel(master.schedule.groups))
-    extra = [i for i, name in enumerate(model.names) if name.endswith(HELD)]
-    A = model.A[:n, :n]
-    if extra:  # held outputs are functions of the states at a fixed point: eliminate them
-        memory = model.A[n:, n:]
-        A = A + model.A[:n, n:] @ np.linalg.solve(np.eye(len(extra)) - memory, model.A[n:, :n])
-    return np.asarray(np.linalg.lstsq(np.eye(n) - A, change, rcond=1e-13)[0], dtype=float)
+    right = np.zeros(len(model.names))
+    right[:n] = change
+    # A turn of all angles changes nothing, so I − A is singular. The shift keeps the solution from moving along it.
+    solution: Matrix = -model.shifted(1 + _SHIFT).solve(right)[:n]
+    return solution

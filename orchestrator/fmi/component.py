@@ -99,12 +99,14 @@ class RealBatch:
 
     def read(self) -> NDArray[np.float64]:
         """Fetch the values from the FMU."""
-        self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
+        if self.names:
+            self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
         return self.values
 
     def write(self) -> None:
         """Send the values to the FMU."""
-        self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
+        if self.names:
+            self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
 
 
 class Component:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.linearization import HELD, Blocks, compose, continuous
+from orchestrator.analysis.linear_model import HELD
+from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import eigenvalues
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
@@ -87,7 +88,7 @@ def test_continuous_model_from_fmus_equals_exact_jacobians(scenario, values):
     ready = prepared(scenario, **values)
     exact, names = exact_continuous(ready)
     with running(ready) as master:
-        model = continuous(Blocks(master))
+        model = continuous(Blocks(master, derivatives=True))
     assert list(model.names) == names
     scale = np.abs(exact).max(axis=1, keepdims=True)
     assert np.abs((model.A - exact) / scale).max() < 1e-7

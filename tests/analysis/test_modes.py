@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from orchestrator.analysis.linearization import LinearModel
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import find_modes, most_associated
 
 OMEGA, ZETA = 2 * np.pi * 0.7, 0.08
@@ -12,7 +12,7 @@ OSCILLATOR = np.array([[0.0, 1.0], [-(OMEGA**2), -2 * ZETA * OMEGA]])
 
 
 def model(A: np.ndarray, step_size: float | None, prefix: str = "x") -> LinearModel:
-    return LinearModel(A, tuple(f"{prefix}{k}" for k in range(len(A))), step_size, 0.0)
+    return LinearModel.from_matrix(A, tuple(f"{prefix}{k}" for k in range(len(A))), step_size)
 
 
 @pytest.mark.parametrize("step_size", [None, 1e-4, 5e-3])

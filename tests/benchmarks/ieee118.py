@@ -214,7 +214,7 @@ def print_linearisation(case: Case, prepared: PreparedScenario) -> None:
         f"  instances {parts.instances:.2f} s, steady state {parts.steady_state:.2f} s, blocks {parts.blocks:.2f} s, "
         f"compose {parts.compose:.2f} s, eigenvalues alone {parts.eigenvalues:.2f} s"
     )
-    print("  the rest: eigenvectors, the named modes' shapes, and the eigenvalues once more for the warnings")
+    print("  the rest: eigenvectors and the named modes' shapes")
     print(
         f"  step map alone: blocks and compose {ours:.2f} s; brute force {brute:.1f} s, extrapolated from "
         f"{BRUTE_FORCE_SAMPLE} states; brute force / ours = {brute / ours:.1f}; with two perturbation sizes, as blocks "

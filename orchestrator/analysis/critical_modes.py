@@ -1,0 +1,215 @@
+"""The critical modes of a large system, without its full spectrum: sparse shift-and-invert search.
+
+Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ finds the eigenvalues nearest to σ. All that lie
+nearer than the farthest one found are then known, so that discs around a few points cover the region in which
+critical modes lie: a range of frequencies, from well into instability to a damping that nobody worries about.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.modes import Mode, find_modes, least_damped_first, make_mode, to_continuous
+from orchestrator.errors import AnalysisError
+
+_DENSE = 200
+"""Up to so many states the full spectrum is cheaper."""
+
+_STRETCH = 1.35
+"""The range is first cut into stretches whose ends have this ratio: the region is a wedge, so discs grow upwards."""
+
+_AT_A_TIME = (20, 80)
+"""Eigenvalues looked for around one point: first, and at most where they do not reach far enough. Many equal units
+have many equal local modes, so that a small number may never get past such a crowd."""
+
+_SMALLEST = 1e-4
+"""A cell of the region is not cut below this size, relative to its place."""
+
+_UNSTABLE_MARGIN = 0.1
+"""How far into instability the region reaches: to this negative damping ratio."""
+
+
+def find_critical_modes(
+    model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0, damping_ratio: float = 0.2
+) -> list[Mode]:
+    """Modes of a frequency range with less than a given damping, least damped first.
+
+    Parameters
+    ----------
+    model
+        Step map or continuous matrix, of any size.
+    lowest_hz, highest_hz
+        Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
+    damping_ratio
+        Modes with less than this are found, all of them; between 0 and 0.9. Negative damping is searched to −0.1.
+
+    Raises
+    ------
+    AnalysisError
+        If the range is not one, or Arnoldi's method does not converge.
+    """
+    if not (0 < lowest_hz < highest_hz and 0 < damping_ratio <= 0.9):
+        raise AnalysisError(
+            f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping_ratio:g} is none; "
+            "the frequencies must rise from above 0, and the damping ratio lie between 0 and 0.9"
+        )
+    if len(model.names) <= _DENSE:
+        found = find_modes(model, lowest_hz, highest_hz)
+    else:
+        beyond = 1 + _SMALLEST  # a cell does not own its upper edges
+        found = _search(model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping_ratio * beyond)
+    wanted = (m for m in found if lowest_hz <= m.frequency_hz <= highest_hz)
+    return least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping_ratio)
+
+
+def growth_rate(model: LinearModel) -> float | None:
+    """Growth [1/s] of what grows fastest in a step map, or None if Arnoldi's method tells nothing from the rest.
+
+    A numerically unstable coupling stands out: |μ| is clearly above the crowd of slow modes at 1, and a few
+    dozen steps show it. That nothing stands out says that no such thing is there.
+    """
+    if model.step_size is None:
+        raise AnalysisError("the growth of a step map was asked for, but the model is continuous")
+    if len(model.names) <= _DENSE:
+        values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+        return float(values.real.max())
+    n = len(model.names)
+    step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        mu = spla.eigs(step, k=2, ncv=20, maxiter=50, tol=1e-6, v0=start, return_eigenvectors=False)
+    except spla.ArpackNoConvergence:
+        return None
+    return float(np.log(np.abs(mu).max()) / model.step_size)
+
+
+def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
+    """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone.
+
+    Raises
+    ------
+    AnalysisError
+        If Arnoldi's method does not converge.
+    """
+    if len(model.names) <= _DENSE:
+        values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+        return complex(values[np.argmin(np.abs(values - wanted))])
+    values = _Search(model, wanted).nearest(2)
+    return complex(values[np.argmin(np.abs(values - wanted))])
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A part of the region: Im λ from ``low`` to ``high`` [rad/s], damping ratio from ``least`` to ``most``."""
+
+    low: float
+    high: float
+    least: float
+    most: float
+
+    @property
+    def corners(self) -> list[complex]:
+        return [
+            complex(-ratio / np.sqrt(1 - ratio**2) * omega, omega)
+            for omega in (self.low, self.high)
+            for ratio in (self.least, self.most)
+        ]
+
+    @property
+    def centre(self) -> complex:
+        return complex(np.mean(self.corners))
+
+    @property
+    def radius(self) -> float:
+        return max(abs(corner - self.centre) for corner in self.corners)
+
+    def holds(self, value: complex) -> bool:
+        """A cell owns its lower edges, and not the upper ones."""
+        return self.low <= value.imag < self.high and self.least <= -value.real / abs(value) < self.most
+
+    def halves(self) -> tuple["_Cell", "_Cell"]:
+        """Cut across the longer side."""
+        if self.high - self.low > (self.most - self.least) * self.high:
+            middle = float(np.sqrt(self.low * self.high))
+            return replace(self, high=middle), replace(self, low=middle)
+        between = (self.least + self.most) / 2
+        return replace(self, most=between), replace(self, least=between)
+
+
+def _search(model: LinearModel, lowest: float, highest: float, damping_ratio: float) -> list[Mode]:
+    """Cover the region with discs: more eigenvalues around a point where few do not reach, else smaller cells."""
+    modes: list[Mode] = []
+    edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()
+    waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping_ratio) for low, high in pairwise(edges)]
+    while waiting:
+        cell = waiting.pop()
+        if cell.radius < _SMALLEST * abs(cell.centre):
+            raise AnalysisError(
+                f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
+            )
+        search = _Search(model, cell.centre)
+        values = search.reaching(cell.radius)
+        if values is None:
+            waiting += cell.halves()
+        else:
+            modes += search.modes([k for k, value in enumerate(values) if cell.holds(value)])
+    return modes
+
+
+class _Search:
+    """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``."""
+
+    def __init__(self, model: LinearModel, centre: complex) -> None:
+        self._model, self.centre = model, centre
+        self._sigma = np.exp(centre * model.step_size) if model.step_size else centre
+        self._solver = model.shifted(self._sigma)
+        self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+        self._right = np.zeros((len(model.names), 0), dtype=complex)
+
+    def nearest(self, count: int) -> NDArray[np.complex128]:
+        """The nearest eigenvalues λ."""
+        nu, self._right = self._arnoldi(self._solver.solve, count)
+        self._values = self._to_lambda(nu)
+        return self._values
+
+    def reaching(self, radius: float) -> NDArray[np.complex128] | None:
+        """So many eigenvalues that none nearer than ``radius`` is missing; None if those are too many."""
+        count, most = _AT_A_TIME
+        while count <= most:
+            values = self.nearest(count)
+            if np.abs(values - self.centre).max() > radius:
+                return values
+            count *= 2
+        return None
+
+    def modes(self, chosen: Sequence[int]) -> list[Mode]:
+        """Modes of some of the values that were found last."""
+        if not chosen:
+            return []
+        nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
+        partners = self._to_lambda(nu.conj())
+        names = self._model.names
+        return [
+            make_mode(self._values[k], left[:, np.argmin(np.abs(partners - self._values[k]))], self._right[:, k], names)
+            for k in chosen
+        ]
+
+    def _to_lambda(self, nu: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return to_continuous(self._sigma + 1 / nu, self._model.step_size)[0]
+
+    def _arnoldi(self, solve: Callable[[Vector], Vector], count: int) -> tuple[Vector, Vector]:
+        n = len(self._model.names)
+        start = np.random.default_rng(0).standard_normal(n).astype(complex)  # the same search gives the same answer
+        inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
+        try:
+            nu, vectors = spla.eigs(inverse, k=count, ncv=max(40, 2 * count + 10), v0=start)
+        except spla.ArpackNoConvergence as error:
+            raise AnalysisError(
+                f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
+            ) from error
+        return nu, vectors

@@ -1,0 +1,98 @@
+"""A linear model of a coupled system, kept as sparse equations of its parts.
+
+z⁺ = F·z + G·w and w = H·z + K·w (ż for z⁺ where the model is continuous): z holds the states, w the outputs on
+their way between components. The matrix A = F + G·(I − K)⁻¹·H that this comes down to is dense in large parts;
+the equations are not, which is what a search for a few eigenvalues of a large system lives on.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+Vector = NDArray[Any]
+
+HELD = " (held)"
+
+
+@dataclass(frozen=True)
+class ShiftedSolver:
+    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
+
+    solve: Callable[[Vector], Vector]
+    solve_adjoint: Callable[[Vector], Vector]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """z⁺ = A·z around an operating point.
+
+    Attributes
+    ----------
+    F, G, H, K
+        Sparse matrices, shapes (n, n), (n, m), (m, n), (m, m); I − K is regular.
+    names
+        ``component.state`` for states, ``component.output (held)`` for what the exchange remembers; length n.
+    step_size
+        Communication step [s]; None for a continuous model, whose A is in 1/s.
+    disagreement
+        Largest difference between the two perturbation sizes, in elements of the components' matrices.
+    """
+
+    F: sp.csr_array
+    G: sp.csr_array
+    H: sp.csr_array
+    K: sp.csr_array
+    names: tuple[str, ...]
+    step_size: float | None
+    disagreement: float
+
+    @classmethod
+    def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
+        """The model of one matrix, with no outputs under way."""
+        n = len(A)
+        G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
+        return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)
+
+    @cached_property
+    def A(self) -> Matrix:
+        """The whole matrix, dense, shape (n, n)."""
+        A: Matrix = self.F.toarray() + self.G @ self._settle(self.H.toarray())
+        return A
+
+    def apply(self, z: Vector) -> Vector:
+        """A·z, without A."""
+        result: Vector = self.F @ z + self.G @ self._settle(self.H @ z)
+        return result
+
+    @cached_property
+    def _settle(self) -> Callable[[Any], Any]:
+        """W = (I − K)⁻¹·b."""
+        m = self.K.shape[0]
+        return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b
+
+    @property
+    def number_of_states(self) -> int:
+        """States of the components, without what the exchange remembers."""
+        return sum(not name.endswith(HELD) for name in self.names)
+
+    def shifted(self, sigma: complex) -> ShiftedSolver:
+        """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""
+        n, m = self.G.shape
+        identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
+        whole = sp.block_array([[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc")
+        factors = spla.splu(whole)
+        kind = whole.dtype
+
+        def solve(b: Vector, transposed: str = "N") -> Any:
+            right = np.zeros(n + m, dtype=kind)
+            right[:n] = b
+            return factors.solve(right, transposed)[:n]
+
+        return ShiftedSolver(solve, lambda b: solve(b, "H"))

@@ -1,0 +1,87 @@
+"""The sparse search against the full spectrum, on systems too large for the shortcut through dense matrices."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+
+from orchestrator.analysis.critical_modes import find_critical_modes, growth_rate, nearest_eigenvalue
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import eigenvalues, find_modes
+from orchestrator.errors import AnalysisError
+
+RNG = np.random.default_rng(3)
+
+
+def oscillators(frequencies, damping, overdamped=60):
+    """A coordinate change of many oscillators and of what decays without swinging."""
+    blocks = [
+        [[0, 1], [-((2 * np.pi * f) ** 2), -4 * np.pi * f * z]] for f, z in zip(frequencies, damping, strict=True)
+    ]
+    A = scipy.linalg.block_diag(*blocks, *([[-d]] for d in np.linspace(0.05, 40, overdamped)))
+    T = np.eye(len(A)) + 0.1 * RNG.standard_normal((len(A), len(A))) / np.sqrt(len(A))
+    return T @ A @ np.linalg.inv(T)
+
+
+# local modes in a crowd, two inter-area modes, one of them unstable, and one beyond each limit
+FREQUENCIES = [*np.linspace(1.05, 1.15, 90), 0.31, 0.72, 0.05, 3.0]
+DAMPING = [*np.linspace(0.08, 0.12, 90), -0.02, 0.05, 0.05, 0.05]
+MATRIX = oscillators(FREQUENCIES, DAMPING)
+
+
+def model(step_size=None):
+    A = MATRIX if step_size is None else scipy.linalg.expm(MATRIX * step_size)
+    return LinearModel.from_matrix(A, tuple(f"x{k}" for k in range(len(A))), step_size)
+
+
+@pytest.mark.parametrize("step_size", [None, 1e-3])
+def test_every_critical_mode_is_found_once_with_its_participation(step_size):
+    system = model(step_size)
+    found, full = find_critical_modes(system), find_modes(system)
+    assert len(found) == len(full) == 92
+    assert found[0].damping_ratio == pytest.approx(-0.02, abs=1e-8)
+    for one, other in zip(found, full, strict=True):
+        assert one.eigenvalue == pytest.approx(other.eigenvalue, abs=1e-7)
+        assert dict(one.participation) == pytest.approx(dict(other.participation), abs=1e-6)
+
+
+def test_only_modes_below_the_damping_asked_for():
+    found = find_critical_modes(model(), 0.1, 2.0, damping_ratio=0.06)
+    assert [round(m.frequency_hz, 2) for m in found] == [0.31, 0.72]
+
+
+def test_the_nearest_eigenvalue():
+    assert nearest_eigenvalue(model(1e-3), 4.4j) == pytest.approx(
+        2 * np.pi * 0.72 * complex(-0.05, np.sqrt(1 - 0.05**2)), abs=1e-6
+    )
+
+
+def test_an_unstable_step_map_stands_out_and_a_stable_one_does_not():
+    growth = growth_rate(model(1e-3))  # the unstable mode grows at 0.04 1/s: nothing stands out
+    assert growth is None or growth < 0.1
+    A = scipy.linalg.expm(MATRIX * 1e-3)
+    unstable = scipy.linalg.block_diag(A, 1.05 * np.array([[-0.6, 0.8], [-0.8, -0.6]]))
+    names = tuple(f"x{k}" for k in range(len(unstable)))
+    assert growth_rate(LinearModel.from_matrix(unstable, names, 1e-3)) == pytest.approx(np.log(1.05) / 1e-3, rel=1e-3)
+
+
+def test_equations_with_outputs_under_way_mean_their_matrix():
+    n, m = 250, 12
+    F, G, H = (sp.random_array(shape, density=0.02, rng=RNG) for shape in ((n, n), (n, m), (m, n)))
+    K = sp.csr_array(np.tril(0.3 * RNG.standard_normal((m, m)), -1))
+    system = LinearModel(*(sp.csr_array(x) for x in (F, G, H, K)), tuple(f"x{k}" for k in range(n)), None, 0.0)
+    A = F.toarray() + G.toarray() @ np.linalg.solve(np.eye(m) - K.toarray(), H.toarray())
+    b = RNG.standard_normal(n)
+    assert np.allclose(system.A, A, atol=1e-12)
+    assert np.allclose(system.apply(b), A @ b, atol=1e-12)
+    solver = system.shifted(0.3 + 2j)
+    shifted = A - (0.3 + 2j) * np.eye(n)
+    assert np.allclose(shifted @ solver.solve(b), b, atol=1e-9)
+    assert np.allclose(shifted.conj().T @ solver.solve_adjoint(b), b, atol=1e-9)
+    assert nearest_eigenvalue(system, 0.4 + 0.1j) == pytest.approx(min(eigenvalues(system), key=lambda v: abs(v - 0.4 - 0.1j)))
+
+
+@pytest.mark.parametrize("arguments", [(2.0, 0.1, 0.2), (0.0, 2.0, 0.2), (0.1, 2.0, 0.0), (0.1, 2.0, 1.2)])
+def test_a_search_over_nothing_is_refused(arguments):
+    with pytest.raises(AnalysisError, match="is none"):
+        find_critical_modes(model(), *arguments)
