@@ -23,8 +23,9 @@ from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.report import tables
-from orchestrator.report.study_files import save_run, save_study, summary_of
-from orchestrator.study import ModesResult, RunResult, compute_modes, modes_json, run_scenario
+from orchestrator.report.study_files import save_modes, save_run, save_study, summary_of
+from orchestrator.study.modes import ModesResult, compute_modes, modes_json
+from orchestrator.study.run import RunResult, run_scenario
 
 EXAMPLES = """\
 examples:
@@ -85,6 +86,15 @@ def _parser() -> argparse.ArgumentParser:
         metavar="LO:HI",
         help="frequencies shown [Hz] (default: 0.1:2)",
     )
+    modes.add_argument(
+        "--critical",
+        type=_percent,
+        nargs="?",
+        const=0.2,
+        metavar="PERCENT",
+        help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
+    )
+    modes.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
 
@@ -134,6 +144,17 @@ def _seconds(text: str) -> float:
     return value
 
 
+def _percent(text: str) -> float:
+    """Damping [%] as a ratio."""
+    try:
+        value = float(text.removesuffix("%"))
+    except ValueError:
+        value = math.nan
+    if not 0 < value <= 90:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a damping in percent between 0 and 90, such as 20")
+    return value / 100
+
+
 def _range(text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     try:
@@ -172,7 +193,11 @@ def _prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]
 
 def _modes(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
-    results = [compute_modes(case, prepared, options.range) for prepared in scenarios]
+    if options.critical is not None and not options.range[0] > 0:
+        raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
+    folder = _folder(options.out) if options.out else None
+    results = [compute_modes(case, prepared, options.range, options.critical) for prepared in scenarios]
+    plots = save_modes(case, results, folder) if folder else []
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
         return 0
@@ -180,19 +205,16 @@ def _modes(options: argparse.Namespace) -> int:
     for result in results:
         console.print(tables.all_modes(result), "")
     _print_electromechanical(console, case, results)
+    if folder:
+        console.print(f"Modes in {folder}: modes.csv, participation.csv, mode_shapes.csv, "
+                      f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
     _print_warnings(results)
     return 0
 
 
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
-    folder = options.out or Path("results") / case.name
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"--out {folder}: results cannot be written there: {error.strerror}; choose another folder"
-        ) from error
+    folder = _folder(options.out or Path("results") / case.name)
     console = _console(stderr=options.json)
     results: list[RunResult] = []
     with _progress_bar(console) as bar:
@@ -213,7 +235,8 @@ def _run(options: argparse.Namespace) -> int:
         print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
     else:
         _print_run(console, case, results)
-        console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, step_size.csv, summary.json, "
+        console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
+                      f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
     if results and results[-1].failure:
         Console(stderr=True, soft_wrap=True, highlight=False).print(
@@ -222,6 +245,17 @@ def _run(options: argparse.Namespace) -> int:
         )
         return 1
     return 0
+
+
+def _folder(path: Path) -> Path:
+    """The folder for results, made before anything is computed."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"--out {path}: results cannot be written there: {error.strerror}; choose another folder"
+        ) from error
+    return path
 
 
 def _console(*, stderr: bool = False) -> Console:
@@ -247,6 +281,8 @@ def _print_electromechanical(console: Console, case: Case, results: Sequence[Mod
         console.print(tables.named_modes(results, title))
         if case.table.reference and any(r.references for r in results):
             console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
+    if any(r.swing and (r.named or r.modes) for r in results):
+        console.print("", tables.mode_shapes(results), "")
 
 
 def _print_warnings(results: Sequence[ModesResult]) -> None:

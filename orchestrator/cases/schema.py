@@ -159,9 +159,11 @@ class NamedModeTable(Table):
 
 
 class AnalysisTable(Table):
-    """Which modes are looked for by name, and where the first one's ring-down is read."""
+    """Which modes are looked for by name, who swings in them, and where the first one's ring-down is read."""
 
     modes: list[NamedModeTable] = []
+    swing: list[str] = ["*.machine.omega"]
+    areas: dict[str, list[str]] = {}
     ring_down: RingDownTable | None = None
 
 

@@ -1,15 +1,23 @@
 """Everything a study leaves in its output folder."""
 
+import cmath
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.case import Case
-from orchestrator.report.plots import plot_eigenvalues, plot_signals
+from orchestrator.report.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
+from orchestrator.report.plots import plot_signals
 from orchestrator.report.storage import save_dataset, save_json, save_table
 
 if TYPE_CHECKING:
-    from orchestrator.study import ModesResult, RunResult
+    from orchestrator.study.modes import ModesResult
+    from orchestrator.study.run import RunResult
+
+
+_LEAST_PARTICIPATION = 1e-3
+"""Smaller factors are left out of the files."""
 
 
 def save_run(result: "RunResult", folder: Path) -> None:
@@ -19,11 +27,26 @@ def save_run(result: "RunResult", folder: Path) -> None:
     save_table(_mode_rows([result.modes]), scenario / "modes.csv")
 
 
+def save_modes(case: Case, results: Sequence["ModesResult"], folder: Path) -> list[Path]:
+    """Write modes, participation and shapes of all scenarios; return the plots."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_table(_mode_rows(results), folder / "modes.csv")
+    save_table(_participation_rows(results), folder / "participation.csv")
+    save_table(_shape_rows(results), folder / "mode_shapes.csv")
+    reference = case.table.reference
+    circles = f"; circles: {reference.title}" if reference and any(r.references for r in results) else ""
+    plots = [folder / "eigenvalues.png"]
+    plot_eigenvalues(results, f"Modes (large: electromechanical{circles})", plots[0])
+    for plot, name in ((plot_participation, "participation.png"), (plot_mode_shapes, "mode_shapes.png")):
+        if plot(results, folder / name):
+            plots.append(folder / name)
+    return plots
+
+
 def save_study(case: Case, results: Sequence["RunResult"], folder: Path) -> list[Path]:
     """Write what concerns all scenarios together; return the plots."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text, encoding="utf-8")
-    save_table(_mode_rows([r.modes for r in results]), folder / "modes.csv")
     save_table(_shift_rows(results), folder / "step_size.csv")
     save_json(_summary(case, results), folder / "summary.json")
     plots = []
@@ -31,10 +54,7 @@ def save_study(case: Case, results: Sequence["RunResult"], folder: Path) -> list
         path = folder / f"{table.name}.png"
         if plot_signals(table, results, path):
             plots.append(path)
-    circles = f"; circles: {case.table.reference.title}" if case.table.reference else ""
-    title = f"Modes (large: electromechanical{circles})"
-    plot_eigenvalues([r.modes for r in results], title, folder / "eigenvalues.png")
-    return [*plots, folder / "eigenvalues.png"]
+    return [*plots, *save_modes(case, [r.modes for r in results], folder)]
 
 
 def _mode_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
@@ -51,6 +71,48 @@ def _mode_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
         for r in results
         for m in r.modes
     ]
+
+
+def _participation_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
+    """Participation by state, by component and by area in every mode."""
+    return [
+        {
+            "scenario": r.prepared.name,
+            "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}",
+            "name": r.name_of(m) or "",
+            "of": kind,
+            "element": element,
+            "participation": f"{factor:.6g}",
+        }
+        for r in results
+        for m in r.modes
+        for kind, factors in (("state", dict(m.participation)), ("component", m.by_component), ("area", r.by_area(m)))
+        for element, factor in factors.items()
+        if factor >= _LEAST_PARTICIPATION
+    ]
+
+
+def _shape_rows(results: Sequence["ModesResult"]) -> list[dict[str, Any]]:
+    """Magnitude and angle of the states that swing, relative to the mode's largest of them."""
+    rows = []
+    for r in results:
+        for m in r.modes:
+            largest = max((m.shape[s] for s in r.swing), key=abs, default=0)
+            rows += [
+                {
+                    "scenario": r.prepared.name,
+                    "frequency [Hz]": f"{m.frequency_hz:.6g}",
+                    "damping [%]": f"{m.damping_percent:.6g}",
+                    "name": r.name_of(m) or "",
+                    "state": state,
+                    "magnitude": f"{abs(m.shape[state] / largest):.6g}",
+                    "angle [deg]": f"{math.degrees(cmath.phase(m.shape[state] / largest)):.4g}",
+                }
+                for state in r.swing
+                if largest
+            ]
+    return rows
 
 
 def _shift_rows(results: Sequence["RunResult"]) -> list[dict[str, Any]]:

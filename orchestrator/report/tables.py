@@ -1,17 +1,18 @@
 """Tables for a terminal, with rich."""
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
 from orchestrator.fmi.description import FmuDescription
 
 if TYPE_CHECKING:
-    from orchestrator.study import ModesResult, RunResult
+    from orchestrator.study.modes import ModesResult
+    from orchestrator.study.run import RunResult
 
-_SHARES_SHOWN = 5
-"""FMUs whose share of a run's time is shown, largest first."""
+_ITEMS_SHOWN = 5
+"""How many of a long list are shown, largest first."""
 
 
 def _table(title: str, *columns: str, left: int = 1) -> Table:
@@ -79,6 +80,37 @@ def all_modes(result: "ModesResult") -> Table:
     return table
 
 
+def mode_shapes(results: Sequence["ModesResult"]) -> Table:
+    """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
+    table = Table(title="Mode shapes", title_justify="left", title_style="bold", header_style="bold")
+    columns = ["Mode", "Swing together", "Against", "Participation by component"]
+    columns += ["By area"] if any(r.areas for r in results) else []
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    names = list(dict.fromkeys(name for r in results for name in r.named))
+    entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
+    if not names:
+        entries = [(f"{mode.frequency_hz:.3f} Hz", r, mode) for r in results for mode in r.modes]
+    for label, r, mode in entries:
+        sides = [_some(side, str) for side in r.swing_of(mode)]
+        row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}", *sides]
+        row.append(_some(mode.by_component.items(), _share))
+        row += [_some(r.by_area(mode).items(), _share)] if len(columns) > 4 else []
+        table.add_row(*row)
+    return table
+
+
+def _some(items: Iterable[Any], text: Callable[[Any], str]) -> str:
+    """The first few of many."""
+    items = list(items)
+    shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
+    return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
+
+
+def _share(entry: tuple[str, float]) -> str:
+    return f"{entry[0]} {entry[1]:.0%}"
+
+
 def ring_downs(results: Sequence["RunResult"]) -> Table:
     """Frequency and damping of the simulated response against the eigenvalue."""
     table = _table(
@@ -122,15 +154,13 @@ def run_statistics(results: Sequence["RunResult"]) -> Table:
     for r in results:
         if r.statistics:
             s = r.statistics
-            largest = sorted(s.components, key=lambda c: -c.share)[:_SHARES_SHOWN]
-            shares = ", ".join(f"{c.name} {c.share:.0%}" for c in largest)
-            shares += f" … {len(s.components)} in all" if len(s.components) > _SHARES_SHOWN else ""
+            shares = sorted(((c.name, c.share) for c in s.components), key=lambda entry: -entry[1])
             table.add_row(
                 r.modes.prepared.title,
                 str(s.steps),
                 f"{s.steps_per_second:,.0f}",
                 f"{s.share_in_fmus:.0%}",
-                shares,
+                _some(shares, _share),
             )
     return table
 

@@ -27,7 +27,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.system import System
 from orchestrator.fmi.description import FmuDescription, read_description
-from orchestrator.study import compute_modes
+from orchestrator.study.modes import compute_modes
 
 STEPS, REPEATS = 5_000, 3
 BRUTE_FORCE_SAMPLE = 20

@@ -12,7 +12,7 @@ import time
 
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
-from orchestrator.study import compute_modes
+from orchestrator.study.modes import compute_modes
 
 STEPS = 50_000
 

@@ -10,7 +10,8 @@ from orchestrator.analysis.modes import eigenvalues
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import jacobi
-from orchestrator.study import compute_modes, run_scenario
+from orchestrator.study.modes import compute_modes
+from orchestrator.study.run import run_scenario
 
 pytestmark = pytest.mark.reproduction
 

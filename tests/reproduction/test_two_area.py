@@ -8,7 +8,8 @@ import pytest
 
 from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
-from orchestrator.study import compute_modes, run_scenario
+from orchestrator.study.modes import compute_modes
+from orchestrator.study.run import run_scenario
 from tests.support.exact import exact_continuous
 
 pytestmark = pytest.mark.reproduction

@@ -1,33 +1,28 @@
-"""One study: a case, what to compute of each scenario, and what comes out."""
+"""The modes of a scenario: steady state, linear model, modes with names, and what they say of the coupling."""
 
 import fnmatch
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+import math
+from cmath import phase
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
-from orchestrator.analysis.critical_modes import find_critical_modes, growth_rate, nearest_eigenvalue
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
+from orchestrator.analysis.critical_modes import find_critical_modes, growth_rate
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated, most_opposed
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
+from orchestrator.cases.areas import areas_of
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.observers import Observer
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.coupling.schedule import jacobi
-from orchestrator.coupling.statistics import StepStatistics
-from orchestrator.errors import AnalysisError, CosimError
-from orchestrator.report.signals import signal
-from orchestrator.report.storage import trajectory_dataset
+from orchestrator.errors import AnalysisError
 
-STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
-"""Communication steps [s] for which the shift of the electromechanical mode is reported."""
+_NAMING_RANGE = (0.1, 2.0)
+"""Frequencies [Hz] among which the modes with names are looked for."""
 
 _COUPLING_UNSTABLE = 1.0
 """A step map's growth rate above the continuous system's by more than this [1/s] is the coupling's doing."""
@@ -43,6 +38,10 @@ class ModesResult:
         The modes that the case looks for by their shape, as far as they are in range.
     references
         Somebody else's figures for them, where their conditions hold.
+    swing
+        States that show who swings against whom, mostly speeds.
+    areas
+        Area of every component that has one.
     """
 
     prepared: PreparedScenario
@@ -52,6 +51,8 @@ class ModesResult:
     named: dict[str, Mode]
     references: dict[str, ReferenceModeTable]
     warnings: tuple[str, ...]
+    swing: tuple[str, ...]
+    areas: dict[str, str]
 
     @property
     def electromechanical(self) -> Mode | None:
@@ -62,41 +63,14 @@ class ModesResult:
         """Name of a mode, if it has one."""
         return next((name for name, named in self.named.items() if named is mode), None)
 
+    def by_area(self, mode: Mode) -> dict[str, float]:
+        """Participation of every area, largest first; components without an area are left out."""
+        return mode.by_group(lambda state: self.areas.get(state.partition(".")[0]))
 
-@dataclass(frozen=True, slots=True)
-class ModeShift:
-    """How far a communication step moves the electromechanical mode from the continuous system's [rad/s]."""
-
-    schedule: str
-    step_size: float
-    continuous: complex
-    eigenvalue: complex
-
-    @property
-    def shift(self) -> float:
-        return abs(self.eigenvalue - self.continuous)
-
-
-@dataclass
-class RunResult:
-    """A scenario's modes and its simulated response.
-
-    Attributes
-    ----------
-    dataset
-        What was recorded, up to the failure if there was one.
-    ring_down
-        The electromechanical mode as identified from the response.
-    failure
-        The error that ended the run before its time.
-    """
-
-    modes: ModesResult
-    dataset: xr.Dataset
-    statistics: StepStatistics | None = None
-    ring_down: IdentifiedMode | None = None
-    shifts: list[ModeShift] = field(default_factory=list)
-    failure: CosimError | None = None
+    def swing_of(self, mode: Mode) -> tuple[list[str], list[str]]:
+        """Components that swing together in a mode, and those that swing against them; each largest first."""
+        together, against = mode.swing(self.swing)
+        return [s.partition(".")[0] for s in together], [s.partition(".")[0] for s in against]
 
 
 def compute_modes(
@@ -112,66 +86,50 @@ def compute_modes(
     frequency_range
         [Hz]
     critical
-        Damping ratio below which modes are looked for, by sparse search; None for the full spectrum.
+        Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
+        knows too little to give modes their names.
     """
-    with _master(prepared) as master:
-        return _modes(case, prepared, master, frequency_range, critical)
+    with running(prepared) as master:
+        return modes_of(case, prepared, master, frequency_range, critical)
 
 
-def run_scenario(
-    case: Case,
-    prepared: PreparedScenario,
-    frequency_range: tuple[float, float] = (0.1, 2.0),
-    observers: Sequence[Observer] = (),
-) -> RunResult:
-    """Compute the modes of a scenario and its response to the case's events.
-
-    A component that fails in the middle ends the run; what was recorded until then is in the result.
-    """
-    recorder = Recorder(prepared.record, prepared.record_every)
-    statistics, failure = None, None
-    with _master(prepared) as master:
-        modes = _modes(case, prepared, master, frequency_range)
-        shifts = _shifts(master, modes.electromechanical)
-        try:
-            statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
-        except CosimError as error:
-            failure = error
-    dataset = trajectory_dataset(recorder, case, prepared)
-    ring_down = None if failure else _ring_down(case, modes, dataset)
-    return RunResult(modes, dataset, statistics, ring_down, shifts, failure)
-
-
-def run_study(
-    case: Case,
-    scenarios: Sequence[PreparedScenario],
-    observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None,
-) -> Iterator[RunResult]:
-    """Run scenarios one after another; each result is there as soon as it is computed."""
-    for prepared in scenarios:
-        yield run_scenario(case, prepared, observers=observe(prepared) if observe else ())
-
-
-def _master(prepared: PreparedScenario) -> Master:
+def running(prepared: PreparedScenario) -> Master:
+    """The scenario's FMUs, initialised."""
     return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time)
 
 
-def _modes(
+def modes_of(
     case: Case,
     prepared: PreparedScenario,
     master: Master,
     frequency_range: tuple[float, float],
     critical: float | None = None,
 ) -> ModesResult:
+    """Steady state and modes of a running system; see `compute_modes`."""
     point = find_operating_point(master)
     model = compose(Blocks(master), master.schedule)
-    modes = (
-        find_modes(model, *frequency_range)
-        if critical is None
-        else find_critical_modes(model, *frequency_range, critical)
+    low, high = frequency_range
+    if critical is None:
+        # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
+        everything = find_modes(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
+        modes = [mode for mode in everything if low <= mode.frequency_hz <= high]
+        named = {
+            name: mode for name, mode in _named_modes(case, model, everything).items() if any(mode is m for m in modes)
+        }
+    else:
+        modes, named = find_critical_modes(model, low, high, critical), {}
+    analysis = case.table.analysis
+    return ModesResult(
+        prepared=prepared,
+        operating_point=point,
+        model=model,
+        modes=modes,
+        named=named,
+        references=_references(case, prepared),
+        warnings=_warnings(master, model),
+        swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
+        areas=areas_of(analysis.areas, prepared.system),
     )
-    named = _named_modes(case, model, modes)
-    return ModesResult(prepared, point, model, modes, named, _references(case, prepared), _warnings(master, model))
 
 
 def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
@@ -220,39 +178,6 @@ def _same(value: Any, wanted: Any) -> bool:
     return value is not None and bool(np.isclose(float(value), float(wanted)))
 
 
-def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:
-    """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
-    if mode is None:
-        return []
-    try:
-        exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
-    except AnalysisError:
-        return []
-    schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
-    shifts = []
-    for step_size in STEP_SIZES:
-        at_step = Blocks(master, step_size)
-        for name, schedule in sorted(schedules.items()):
-            value = nearest_eigenvalue(compose(at_step, schedule), exact)
-            shifts.append(ModeShift(name, step_size, exact, value))
-    return shifts
-
-
-def _ring_down(case: Case, modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
-    table, mode = case.table.analysis.ring_down, modes.electromechanical
-    if table is None or mode is None:
-        return None
-    recorded = signal(dataset, table.signal)
-    if recorded is None:
-        return None
-    window = recorded.sel(time=slice(table.start, None))
-    try:
-        found = identify_modes(window["time"].values, window.values)
-    except AnalysisError:
-        return None
-    return nearest(found, mode.eigenvalue)
-
-
 def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> Mapping[str, Any]:
     """The machine-readable form of `gfor modes`."""
     return {
@@ -272,6 +197,12 @@ def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> 
                         "damping_percent": m.damping_percent,
                         "name": r.name_of(m),
                         "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
+                        "components": {c: f for c, f in m.by_component.items() if f >= 1e-4},
+                        "areas": r.by_area(m),
+                        "shape": [
+                            {"state": s, "magnitude": abs(m.shape[s]), "angle_deg": math.degrees(phase(m.shape[s]))}
+                            for s in r.swing
+                        ],
                     }
                     for m in r.modes
                 ],

@@ -1,0 +1,128 @@
+"""A run: the modes of a scenario, its response to the events, and what links the two."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import xarray as xr
+
+from orchestrator.analysis.critical_modes import nearest_eigenvalue
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
+from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.analysis.modes import Mode
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.schedule import jacobi
+from orchestrator.coupling.statistics import StepStatistics
+from orchestrator.errors import AnalysisError, CosimError
+from orchestrator.report.signals import signal
+from orchestrator.report.storage import trajectory_dataset
+from orchestrator.study.modes import ModesResult, modes_of, running
+
+STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
+"""Communication steps [s] for which the shift of the electromechanical mode is reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeShift:
+    """How far a communication step moves the electromechanical mode from the continuous system's [rad/s]."""
+
+    schedule: str
+    step_size: float
+    continuous: complex
+    eigenvalue: complex
+
+    @property
+    def shift(self) -> float:
+        return abs(self.eigenvalue - self.continuous)
+
+
+@dataclass
+class RunResult:
+    """A scenario's modes and its simulated response.
+
+    Attributes
+    ----------
+    dataset
+        What was recorded, up to the failure if there was one.
+    ring_down
+        The electromechanical mode as identified from the response.
+    failure
+        The error that ended the run before its time.
+    """
+
+    modes: ModesResult
+    dataset: xr.Dataset
+    statistics: StepStatistics | None = None
+    ring_down: IdentifiedMode | None = None
+    shifts: list[ModeShift] = field(default_factory=list)
+    failure: CosimError | None = None
+
+
+def run_scenario(
+    case: Case,
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = (0.1, 2.0),
+    observers: Sequence[Observer] = (),
+) -> RunResult:
+    """Compute the modes of a scenario and its response to the case's events.
+
+    A component that fails in the middle ends the run; what was recorded until then is in the result.
+    """
+    recorder = Recorder(prepared.record, prepared.record_every)
+    statistics, failure = None, None
+    with running(prepared) as master:
+        modes = modes_of(case, prepared, master, frequency_range)
+        shifts = _shifts(master, modes.electromechanical)
+        try:
+            statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
+        except CosimError as error:
+            failure = error
+    dataset = trajectory_dataset(recorder, case, prepared)
+    ring_down = None if failure else _ring_down(case, modes, dataset)
+    return RunResult(modes, dataset, statistics, ring_down, shifts, failure)
+
+
+def run_study(
+    case: Case,
+    scenarios: Sequence[PreparedScenario],
+    observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None,
+) -> Iterator[RunResult]:
+    """Run scenarios one after another; each result is there as soon as it is computed."""
+    for prepared in scenarios:
+        yield run_scenario(case, prepared, observers=observe(prepared) if observe else ())
+
+
+def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:
+    """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
+    if mode is None:
+        return []
+    try:
+        exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
+    except AnalysisError:
+        return []
+    schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
+    shifts = []
+    for step_size in STEP_SIZES:
+        at_step = Blocks(master, step_size)
+        for name, schedule in sorted(schedules.items()):
+            value = nearest_eigenvalue(compose(at_step, schedule), exact)
+            shifts.append(ModeShift(name, step_size, exact, value))
+    return shifts
+
+
+def _ring_down(case: Case, modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
+    table, mode = case.table.analysis.ring_down, modes.electromechanical
+    if table is None or mode is None:
+        return None
+    recorded = signal(dataset, table.signal)
+    if recorded is None:
+        return None
+    window = recorded.sel(time=slice(table.start, None))
+    try:
+        found = identify_modes(window["time"].values, window.values)
+    except AnalysisError:
+        return None
+    return nearest(found, mode.eigenvalue)
