@@ -414,3 +414,51 @@ def test_without_a_folder_results_go_below_the_current_one(gfor, tmp_path, monke
     assert code == 0
     assert "Results in results/small: " in out
     assert (tmp_path / "results" / "small" / "two" / "trajectory.nc").exists()
+
+
+def test_modes_leaves_participation_shapes_and_plots(gfor, tmp_path):
+    folder = tmp_path / "modes"
+    code, out, _ = gfor("modes", "two_area", "--scenario", "base", "--scenario", "pod_p", "--out", folder)
+    assert code == 0
+    assert "area_1" in out
+    for name in ("eigenvalues.png", "participation.png", "mode_shapes.png"):
+        assert (folder / name).stat().st_size > 5_000
+    with (folder / "participation.csv").open(encoding="utf-8") as file:
+        rows = [r for r in csv.DictReader(file) if r["scenario"] == "base" and r["name"] == "electromechanical"]
+    by = {
+        kind: {r["element"]: float(r["participation"]) for r in rows if r["of"] == kind}
+        for kind in ("component", "area")
+    }
+    assert by["component"]["sg1"] > by["component"]["sg2"] > 0.2
+    assert by["area"]["area_1"] == pytest.approx(by["component"]["sg1"], rel=1e-5)
+    with (folder / "mode_shapes.csv").open(encoding="utf-8") as file:
+        shape = {r["state"]: r for r in csv.DictReader(file) if r["scenario"] == "base" and r["name"]}
+    assert float(shape["sg1.machine.omega"]["magnitude"]) == 1
+    assert abs(float(shape["sg2.machine.omega"]["angle [deg]"])) > 150
+
+
+def test_critical_modes_alone(gfor):
+    code, out, _ = gfor("modes", "two_area", "--scenario", "gfor", "--scenario", "pod_p", "--critical", "15", "--json")
+    assert code == 0
+    with_pod_off, with_pod_on = json.loads(out)["scenarios"]
+    (mode,) = with_pod_off["modes"]
+    assert mode["damping_percent"] == pytest.approx(10.6, abs=0.1)
+    assert max(mode["components"], key=mode["components"].get) == "sg1"
+    assert with_pod_on["modes"] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [(("--critical", "120"), "between 0 and 90"), (("--critical", "--range", "0:2"), "begins above 0")],
+)
+def test_a_search_over_nothing_is_refused(gfor, arguments, word):
+    code, _, err = gfor("modes", "two_area", *arguments)
+    assert code == 2
+    assert word in err
+
+
+def test_a_mode_out_of_range_leaves_its_name_to_no_other(gfor):
+    _, out, _ = gfor("modes", "two_area", "--scenario", "base", "--range", "1:2", "--json")
+    (scenario,) = json.loads(out)["scenarios"]
+    assert scenario["modes"]
+    assert all(mode["name"] is None for mode in scenario["modes"])

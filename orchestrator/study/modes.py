@@ -113,9 +113,8 @@ def modes_of(
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
         everything = find_modes(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
         modes = [mode for mode in everything if low <= mode.frequency_hz <= high]
-        named = {
-            name: mode for name, mode in _named_modes(case, model, everything).items() if any(mode is m for m in modes)
-        }
+        candidates = _named_modes(case, model, everything)
+        named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         modes, named = find_critical_modes(model, low, high, critical), {}
     analysis = case.table.analysis

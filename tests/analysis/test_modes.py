@@ -67,3 +67,30 @@ def test_mode_shape_shows_who_swings_against_whom():
     ratio = mode.shape["x2"] / mode.shape["x0"]
     assert ratio == pytest.approx(-0.5, abs=1e-6)
     assert max(abs(v) for v in mode.shape.values()) == pytest.approx(1)
+
+
+def coupled_pair():
+    """Two areas: swings of a.x and a.y against b.x, with c at rest."""
+    A = np.zeros((6, 6))
+    k = 30.0
+    stiffness = np.array([[-k, k, 0], [k / 2, -k / 2, 0], [0, 0, -400.0]])
+    A[:3, 3:], A[3:, :3], A[3:, 3:] = np.eye(3), stiffness, -0.1 * np.eye(3)
+    names = ("a.angle", "b.angle", "c.angle", "a.speed", "b.speed", "c.speed")
+    return max(find_modes(LinearModel.from_matrix(A, names, None), 0.5, 2), key=lambda m: m.frequency_hz)
+
+
+def test_participation_of_components_and_groups_is_the_sum_over_their_states():
+    mode = coupled_pair()
+    factors = dict(mode.participation)
+    assert mode.by_component["a"] == pytest.approx(factors["a.angle"] + factors["a.speed"])
+    assert list(mode.by_component) == ["a", "b", "c"]
+    assert sum(mode.by_component.values()) == pytest.approx(1)
+    areas = {"a": "north", "b": "north"}
+    assert mode.by_group(lambda state: areas.get(state.partition(".")[0])) == pytest.approx({"north": 1.0})
+
+
+def test_swing_tells_both_sides_and_leaves_out_what_does_not_move():
+    mode = coupled_pair()
+    assert mode.swing(["b.speed", "a.speed", "c.speed"]) == (["a.speed"], ["b.speed"])
+    assert mode.swing(["b.speed", "a.speed"], least=0.6) == (["a.speed"], [])
+    assert mode.swing([]) == ([], [])
