@@ -21,9 +21,13 @@ class ComponentLinearization:
     Attributes
     ----------
     states, inputs, outputs
-        Names; inputs and outputs are the connected ones.
+        Names; inputs and outputs are the connected ones, and after them the inputs that were asked for.
     A, B, C, D
         Of the step map, shapes (n, n), (n, m), (p, n), (p, m).
+    observed
+        Names of the outputs that were asked for.
+    C_o, D_o
+        Their rows, shapes (q, n), (q, m).
     A_c, B_c
         Of the continuous model, from the FMU's own derivatives; None where it declares none or they were not asked for.
     disagreement
@@ -38,6 +42,9 @@ class ComponentLinearization:
     B: Matrix
     C: Matrix
     D: Matrix
+    observed: tuple[str, ...]
+    C_o: Matrix
+    D_o: Matrix
     A_c: Matrix | None
     B_c: Matrix | None
     disagreement: float
@@ -76,12 +83,20 @@ class StateAccess:
 
 
 def linearize_component(
-    exchange: Exchange, time: float, step_size: float, *, derivatives: bool = False
+    exchange: Exchange,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
+    *,
+    derivatives: bool = False,
 ) -> ComponentLinearization:
     """Perturb one component around where it is, and put it back.
 
     Parameters
     ----------
+    inputs, observed
+        Tunable parameters or open inputs, and outputs, that matter beside the connected ones.
     derivatives
         Also difference the FMU's own derivatives, if it declares them; it costs a third more.
     """
@@ -89,22 +104,27 @@ def linearize_component(
     names = component.description.states
     rates = [f"der({s})" for s in names] if derivatives else []
     rates = rates if all(r in component.description.variables for r in rates) else []
-    n = len(names)
+    n, p = len(names), len(exchange.outputs.names)
+    entries = (*exchange.inputs.names, *inputs)
+    exits = (*exchange.outputs.names, *observed)
     # The derivatives need no second size: they are differenced over no step.
     (after, outputs, slopes), (after_2, outputs_2, _) = (
-        _differences(exchange, time, step_size, size, rates if size == PERTURBATIONS[0] else [])
+        _differences(component, entries, exits, time, step_size, size, rates if size == PERTURBATIONS[0] else [])
         for size in PERTURBATIONS
     )
     pairs = ((after, after_2), (outputs, outputs_2))
     return ComponentLinearization(
         component.name,
         names,
-        exchange.inputs.names,
+        entries,
         exchange.outputs.names,
         A=after[:, :n],
         B=after[:, n:],
-        C=outputs[:, :n],
-        D=outputs[:, n:],
+        C=outputs[:p, :n],
+        D=outputs[:p, n:],
+        observed=tuple(observed),
+        C_o=outputs[p:, :n],
+        D_o=outputs[p:, n:],
         A_c=slopes[:, :n] if len(rates) == n and derivatives else None,
         B_c=slopes[:, n:] if len(rates) == n and derivatives else None,
         disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs),
@@ -112,16 +132,20 @@ def linearize_component(
 
 
 def _differences(
-    exchange: Exchange, time: float, step_size: float, size: float, rates: Sequence[str]
+    component: Component,
+    inputs: Sequence[str],
+    exits: Sequence[str],
+    time: float,
+    step_size: float,
+    size: float,
+    rates: Sequence[str],
 ) -> tuple[Matrix, Matrix, Matrix]:
-    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every coupled input."""
-    component = exchange.component
-    states = StateAccess(component)
-    z_0 = np.concatenate([states.read(), exchange.inputs.values])
-    perturbed = [RealBatch(component, [name]) for name in (*component.description.states, *exchange.inputs.names)]
-    after, outputs, slopes = (
-        RealBatch(component, names) for names in (component.description.states, exchange.outputs.names, rates)
-    )
+    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input."""
+    StateAccess(component)  # refuses what cannot be perturbed
+    names = (*component.description.states, *inputs)
+    z_0 = RealBatch(component, names).read().copy()
+    perturbed = [RealBatch(component, [name]) for name in names]
+    after, outputs, slopes = (RealBatch(component, group) for group in (component.description.states, exits, rates))
     columns = tuple(np.zeros((len(z_0), len(batch.names))) for batch in (after, outputs, slopes))
     saved = component.save_state()
     try:

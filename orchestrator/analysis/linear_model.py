@@ -63,16 +63,16 @@ class LinearModel:
     @cached_property
     def A(self) -> Matrix:
         """The whole matrix, dense, shape (n, n)."""
-        A: Matrix = self.F.toarray() + self.G @ self._settle(self.H.toarray())
+        A: Matrix = self.F.toarray() + self.G @ self.settle(self.H.toarray())
         return A
 
     def apply(self, z: Vector) -> Vector:
         """A·z, without A."""
-        result: Vector = self.F @ z + self.G @ self._settle(self.H @ z)
+        result: Vector = self.F @ z + self.G @ self.settle(self.H @ z)
         return result
 
     @cached_property
-    def _settle(self) -> Callable[[Any], Any]:
+    def settle(self) -> Callable[[Any], Any]:
         """W = (I − K)⁻¹·b."""
         m = self.K.shape[0]
         return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b

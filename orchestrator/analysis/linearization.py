@@ -5,7 +5,7 @@ travel one step late, that output as well: an output with direct feed-through fr
 older than itself is memory that the exchange adds. Everything else follows from the states.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +15,7 @@ from orchestrator.analysis.component_linearization import linearize_component
 from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
-from orchestrator.errors import AnalysisError
+from orchestrator.errors import AnalysisError, InputError
 
 Indices = NDArray[np.int64]
 
@@ -29,17 +29,45 @@ class Blocks:
         A running system at its operating point. It is left as it was.
     step_size
         Communication step to linearise over [s]; by default the master's own.
+    inputs, outputs
+        Names ``component.variable`` that the system is driven by and observed at, for `state_space`: tunable
+        parameters or open inputs, and any outputs.
     derivatives
         Whether `continuous` will be asked for as well.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable, or an input is none that can be perturbed.
     """
 
-    def __init__(self, master: Master, step_size: float | None = None, *, derivatives: bool = False) -> None:
+    def __init__(
+        self,
+        master: Master,
+        step_size: float | None = None,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        *,
+        derivatives: bool = False,
+    ) -> None:
         self.step_size = step_size or master.clock.step_size
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        driven, observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
+        _check_driven(master, driven)
         self.components = {
-            name: linearize_component(exchange, master.time, self.step_size, derivatives=derivatives)
+            name: linearize_component(
+                exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
+            )
             for name, exchange in master.exchanges.items()
         }
-        self.sources = {name: exchange.sources for name, exchange in master.exchanges.items()}
+        # External inputs stand behind the coupled outputs, as if a further component gave them.
+        first_external = len(master.output_names)
+        self.sources = {
+            name: np.concatenate(
+                [exchange.sources, [first_external + self.inputs.index(f"{name}.{v}") for v in driven[name]]]
+            ).astype(np.int64)
+            for name, exchange in master.exchanges.items()
+        }
         self.schedule = master.schedule
         self.output_names = master.output_names
         first = 0
@@ -93,8 +121,9 @@ def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
     held = _held_outputs(blocks, schedule)
     memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
     n, p = len(names), len(blocks.output_names)
-    equations = _Equations(n + len(memory), 2 * p)
-    newest = np.arange(p)  # where in w the newest value of every output stands
+    external = 2 * p + np.arange(len(blocks.inputs))
+    equations = _Equations(n + len(memory), 2 * p + len(external))
+    newest = np.concatenate([np.arange(p), external])  # where in w the newest value of every output stands
     _check_feedthrough(blocks, [name for name in blocks.components if name not in held])
     for name, c in blocks.components.items():
         if name not in held:
@@ -129,13 +158,39 @@ def continuous(blocks: Blocks) -> LinearModel:
         )
     windows, names = blocks.state_windows(), blocks.state_names()
     _check_feedthrough(blocks, list(blocks.components))
-    equations = _Equations(len(names), len(blocks.output_names))
+    equations = _Equations(len(names), len(blocks.output_names) + len(blocks.inputs))
     for name, c in blocks.components.items():
         if c.A_c is not None and c.B_c is not None:
             equations.next_state(windows[name], windows[name], c.A_c, blocks.sources[name], c.B_c)
         own = np.arange(len(blocks.output_names))[blocks.window[name]]
         equations.output(own, windows[name], c.C, blocks.sources[name], c.D)
     return equations.model(names, None, blocks.disagreement)
+
+
+def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
+    """Variables of every component among names ``component.variable``."""
+    found: dict[str, list[str]] = {name: [] for name in master.components}
+    for full in names:
+        component, _, variable = full.partition(".")
+        if component not in found or variable not in master.components[component].description.variables:
+            raise InputError(f"linear model: there is no variable {full!r}; `gfor info` lists the variables of an FMU")
+        found[component].append(variable)
+    return found
+
+
+def _check_driven(master: Master, driven: Mapping[str, Sequence[str]]) -> None:
+    """Only what can be changed during a run can drive a linear model, and nothing that is fed already."""
+    fed = {str(c.target): str(c.source) for c in master.system.connections}
+    for name, variables in driven.items():
+        for variable in variables:
+            info = master.components[name].description.variables[variable]
+            if f"{name}.{variable}" in fed:
+                raise InputError(f"linear model: {name}.{variable} is fed by {fed[f'{name}.{variable}']}")
+            if info.type != "Real" or not (info.causality == "input" or info.variability == "tunable"):
+                raise InputError(
+                    f"linear model: {name}.{variable} is a {info.variability} {info.causality} of type {info.type}; "
+                    "an input must be a Real tunable parameter or an open Real input"
+                )
 
 
 class _Equations:
@@ -186,7 +241,7 @@ def _check_feedthrough(blocks: Blocks, names: list[str]) -> None:
 def _feedthrough_sources(blocks: Blocks, name: str) -> set[int]:
     """Indices in y that a component's outputs depend on directly."""
     used = np.abs(blocks.components[name].D).max(axis=0, initial=0.0) > 0
-    return set(blocks.sources[name][used].tolist())
+    return {i for i in blocks.sources[name][used].tolist() if i < len(blocks.output_names)}
 
 
 def _held_outputs(blocks: Blocks, schedule: Schedule) -> list[str]:

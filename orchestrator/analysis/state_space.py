@@ -1,0 +1,98 @@
+"""The linear model with inputs and outputs: what a disturbance does, and what other tools can import."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.coupling.schedule import Schedule
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """x⁺ = A·x + B·u and y = C·x + D·u in deviations from an operating point.
+
+    Attributes
+    ----------
+    A, B, C, D
+        Shapes (n, n), (n, m), (p, n), (p, m). Units are those of the variables; for a continuous model
+        A and B give derivatives per second.
+    states, inputs, outputs
+        Names ``component.variable``; among the states may be ``component.output (held)``.
+    step_size
+        Communication step [s]; None for a continuous model, ẋ for x⁺.
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    step_size: float | None
+
+    def step_response(self, change: Matrix, times: Matrix) -> Matrix:
+        """Outputs after a step of the inputs at t = 0.
+
+        Parameters
+        ----------
+        change
+            Size of the step of every input, shape (m,).
+        times
+            [s], shape (k,), rising from 0 in equal distances; of a step map, multiples of its step.
+
+        Returns
+        -------
+        Deviations of the outputs, shape (k, p).
+        """
+        u = np.tile(np.asarray(change, dtype=float), (len(times), 1))
+        if self.step_size is None:
+            _, y, _ = scipy.signal.lsim((self.A, self.B, self.C, self.D), u, times, interp=False)
+            return np.asarray(y, dtype=float).reshape(len(times), -1)
+        every = round((times[1] - times[0]) / self.step_size) if len(times) > 1 else 1
+        A, B = _over(self.A, self.B, every)
+        x, rows = np.zeros(len(A)), []
+        for row in u:
+            rows.append(self.C @ x + self.D @ row)
+            x = A @ x + B @ row
+        return np.array(rows)
+
+
+def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
+    """Inputs and outputs that were named to the blocks, around the step map of a schedule or, for None, continuous.
+
+    Raises
+    ------
+    AnalysisError
+        As `compose` and `continuous`.
+    """
+    model = compose(blocks, schedule) if schedule else continuous(blocks)
+    n, m = model.G.shape
+    external = m - len(blocks.inputs) + np.arange(len(blocks.inputs))
+    drive = np.zeros((m, len(blocks.inputs)))
+    drive[external, np.arange(len(blocks.inputs))] = 1.0
+    by_state, by_input = model.settle(model.H.toarray()), model.settle(drive)
+    newest = np.concatenate([np.arange(len(blocks.output_names)), external])
+    C, D = np.zeros((len(blocks.outputs), n)), np.zeros((len(blocks.outputs), len(blocks.inputs)))
+    windows = blocks.state_windows()
+    for name, c in blocks.components.items():
+        rows = [blocks.outputs.index(f"{name}.{variable}") for variable in c.observed]
+        w = newest[blocks.sources[name]]
+        C[rows] = c.D_o @ by_state[w]
+        C[rows, windows[name]] += c.C_o
+        D[rows] = c.D_o @ by_input[w]
+    return StateSpace(model.A, model.G @ by_input, C, D, model.names, blocks.inputs, blocks.outputs, model.step_size)
+
+
+def _over(A: Matrix, B: Matrix, steps: int) -> tuple[Matrix, Matrix]:
+    """Several steps with the input held as one: by squaring, so that many cost little more than one."""
+    A_all, B_all = np.eye(len(A)), np.zeros_like(B)
+    while steps:
+        if steps & 1:
+            A_all, B_all = A @ A_all, A @ B_all + B
+        A, B = A @ A, A @ B + B
+        steps >>= 1
+    return A_all, B_all
