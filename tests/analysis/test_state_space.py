@@ -33,7 +33,7 @@ def test_the_response_to_a_small_load_step_is_that_of_the_system(kind):
     seen = (recorder.values - recorder.values[0])[1:]
     linear = model.step_response([1e-5, 0.0], recorder.times)[1:]
     scale = np.abs(seen).max(axis=0)
-    # Voltage and power jump with the load; there one communication step of delay is what is seen, and it shrinks with H.
+    # Voltage and power jump with the load; what is seen there is one communication step of delay, which shrinks with H.
     assert np.all(np.abs(linear - seen).max(axis=0) < np.array([1e-3, 1e-3, 1.2e-2, 1.2e-2]) * scale)
 
 
