@@ -165,8 +165,8 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
     else:
         fading = (1 - branch.connected) / BREAKER_TIME
         rate = rate * (branch.connected * omega_b / branch.X) - branch.current * fading
-    m.derivative(branch.current.re, rate.re)
-    m.derivative(branch.current.im, rate.im)
+    m.derivative(ca.SX(branch.current.re), rate.re)
+    m.derivative(ca.SX(branch.current.im), rate.im)
 
 
 def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:

@@ -137,8 +137,8 @@ class Network:
                 yield f"{kind} {name!r} is at bus {bus!r}, which does not exist"
 
     def _repeated_names(self) -> Iterable[str]:
-        elements = (*self.lines, *self.loads, *self.shunts, *self.ports)
-        names = [*self.buses, *(element.name for element in elements)]
+        names = [*self.buses, *(x.name for x in self.lines), *(x.name for x in self.loads)]
+        names += [*(x.name for x in self.shunts), *(x.name for x in self.ports)]
         yield from (f"the name {name!r} is used twice" for name in sorted({n for n in names if names.count(n) > 1}))
 
     def _bad_elements(self) -> Iterable[str]:

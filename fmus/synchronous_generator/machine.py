@@ -161,7 +161,7 @@ def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
     closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
     opened = Phasor(g.q.open_rate(psi_1q, psi_2q), g.d.open_rate(psi_f, psi_1d))
     psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
-    return psi.re, psi.im, psi_f, psi_1d, psi_1q, psi_2q
+    return ca.SX(psi.re), ca.SX(psi.im), psi_f, psi_1d, psi_1q, psi_2q
 
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:

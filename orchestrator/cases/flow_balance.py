@@ -1,4 +1,4 @@
-"""What a power flow is made of, and our own nodal equations: they check what the solver found, and say why it found none."""
+"""What a power flow is made of, and our own nodal equations: they check a solution and say why there is none."""
 
 import math
 from collections.abc import Mapping, Sequence
