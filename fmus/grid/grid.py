@@ -51,7 +51,7 @@ def grid(network: Network) -> Model:
 def _add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
     floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
     if floating:
-        text = "Capacitance to earth of every bus that has no other way to earth"
+        text = "Capacitance to earth of every bus that has none of its own"
         stray = m.parameter("stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100)
         for bus in floating:
             bus.B += stray

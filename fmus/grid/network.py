@@ -65,7 +65,8 @@ class Network:
     Attributes
     ----------
     stray_B
-        Capacitance to earth [pu, 100 MVA] of every bus that has no other way to earth; 0 where such a bus is an error.
+        Capacitance to earth [pu, 100 MVA] of every bus that has none of its own (charging, capacitor). With 0 such a
+        bus needs a load with P > 0. A unit behind a weak load needs it, too: there v = Σi/G jumps with its current.
 
     Raises
     ------
@@ -93,11 +94,11 @@ class Network:
 
     def needs_stray(self, bus: str) -> bool:
         """Whether the bus gets `stray_B`."""
-        return self.stray_B > 0 and not self._has_way_to_earth(bus)
+        return self.stray_B > 0 and not self._has_fixed_capacitance(bus)
 
     def hangs_on(self, load: Load) -> bool:
         """Whether this load alone determines its bus's voltage, so that it cannot be switched off."""
-        if self._has_fixed_capacitance(load.bus):
+        if self._has_fixed_capacitance(load.bus) or self.needs_stray(load.bus):
             return False
         if capacitive := self._capacitive_loads(load.bus):
             return capacitive == [load]
@@ -121,9 +122,6 @@ class Network:
         return any(x.bus == bus and x.p_mw > 0 and x is not without for x in self.loads) or any(
             x.bus == bus and x.g_mw > 0 for x in self.shunts
         )
-
-    def _has_way_to_earth(self, bus: str) -> bool:
-        return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self._has_conductance(bus)
 
     def _unknown_buses(self) -> Iterable[str]:
         known = set(self.buses)
