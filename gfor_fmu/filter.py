@@ -9,7 +9,7 @@ import casadi as ca
 
 from fmus.toolchain.frames import Phasor, QdState, power, qd_state
 from fmus.toolchain.model import ModelBuilder
-from fmus.toolchain.port import DevicePort
+from fmus.toolchain.port import BREAKER_TIME, DevicePort
 
 APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"
 STAMP = "STAMP toolbox of the paper's group"
@@ -76,7 +76,8 @@ def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, 
     i_s, u_c, i_g = f.i_s.value, f.u_c.value, f.i_g.value
     f.i_s.set_derivative(m, (v_c - f.u - Phasor(f.R_c, w * f.X_c) * i_s) * (port.omega_b / f.X_c))
     f.u_c.set_derivative(m, (i_s - i_g - Phasor(0, w * f.B_c) * u_c) * (port.omega_b / f.B_c))
-    f.i_g.set_derivative(m, (f.u - v_bus - Phasor(f.R_t, w * f.X_t) * i_g) * (port.omega_b / f.X_t))
+    into_grid = (f.u - v_bus - Phasor(f.R_t, w * f.X_t) * i_g) * (port.omega_b / f.X_t)
+    f.i_g.set_derivative(m, port.through_breaker(into_grid, i_g * (-1 / BREAKER_TIME)))
 
 
 def _steady_state(

@@ -164,7 +164,8 @@ def test_there_is_no_cycle():
     [
         ("pythonfmu", {"fmus.toolchain.python_fmu", "fmus.toolchain.slave"}),
         ("fmpy", {"orchestrator.fmi.component", "orchestrator.fmi.description", "orchestrator.coupling.master"}),
-        ("pandapower", {"orchestrator.cases.power_flow"}),
+        ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
+        ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("pint", {"orchestrator.cases.units"}),
         ("argparse", {"orchestrator.cli"}),
     ],

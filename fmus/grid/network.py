@@ -1,14 +1,20 @@
-"""A network as data: buses, lines, loads, and the ports where devices meet it."""
+"""A network as data: buses, lines, loads, shunts, and the ports where devices meet it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 SYSTEM_BASE_MVA = 100.0
+SMALLEST_REACTANCE = 1e-5
+"""Of a line [pu, 100 MVA]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A π section; R, X, B [pu, 100 MVA], B the charging of the whole line."""
+    """A π section; R, X, B [pu, 100 MVA], B the charging of the whole line.
+
+    ``tap``·e^{j·``shift``} is an ideal ratio at the from side, ``shift`` in rad: MATPOWER's convention, in which
+    series impedance and charging lie behind the ratio.
+    """
 
     name: str
     from_bus: str
@@ -16,6 +22,12 @@ class Line:
     X: float
     R: float = 0.0
     B: float = 0.0
+    tap: float = 1.0
+    shift: float = 0.0
+
+    @property
+    def has_ratio(self) -> bool:
+        return self.tap != 1.0 or self.shift != 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +38,16 @@ class Load:
     bus: str
     p_mw: float
     q_mvar: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shunt:
+    """An admittance to earth: what it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an inductor."""
+
+    name: str
+    bus: str
+    g_mw: float = 0.0
+    b_mvar: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +62,17 @@ class Port:
 class Network:
     """Buses with what is connected to them.
 
+    Attributes
+    ----------
+    stray_B
+        Capacitance to earth [pu, 100 MVA] of every bus that has none of its own (charging, capacitor). With 0 such a
+        bus needs a load with P > 0. A unit behind a weak load needs it, too: there v = Σi/G jumps with its current.
+
     Raises
     ------
     ValueError
         Naming every element that refers to an unknown bus, has no reactance or repeats a name,
-        and every bus that has neither a resistive load nor charging.
+        and every bus that has neither a resistive load nor capacitance.
     """
 
     name: str
@@ -52,16 +80,47 @@ class Network:
     lines: tuple[Line, ...]
     loads: tuple[Load, ...]
     ports: tuple[Port, ...]
+    shunts: tuple[Shunt, ...] = ()
+    stray_B: float = 0.0
 
     def __post_init__(self) -> None:
-        problems = [*self._unknown_buses(), *self._bad_elements(), *self._floating_buses()]
+        problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
         if problems:
             raise ValueError(f"network {self.name!r}: " + "; ".join(problems))
 
     def has_capacitance(self, bus: str) -> bool:
-        """Whether the bus voltage is a state: some line charging or a capacitive load is there."""
+        """Whether the bus voltage is a state: line charging, a capacitive load or shunt, or the stray one is there."""
+        return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self.needs_stray(bus)
+
+    def needs_stray(self, bus: str) -> bool:
+        """Whether the bus gets `stray_B`."""
+        return self.stray_B > 0 and not self._has_fixed_capacitance(bus)
+
+    def hangs_on(self, load: Load) -> bool:
+        """Whether this load alone determines its bus's voltage, so that it cannot be switched off."""
+        if self._has_fixed_capacitance(load.bus) or self.needs_stray(load.bus):
+            return False
+        if capacitive := self._capacitive_loads(load.bus):
+            return capacitive == [load]
+        return load.p_mw > 0 and not self._has_conductance(load.bus, without=load)
+
+    def loads_decide(self, bus: str) -> bool:
+        """Whether nothing but switchable loads determines the bus's voltage."""
+        return not (self._has_fixed_capacitance(bus) or self.needs_stray(bus)) and (
+            bool(self._capacitive_loads(bus)) or not any(s.bus == bus and s.g_mw > 0 for s in self.shunts)
+        )
+
+    def _has_fixed_capacitance(self, bus: str) -> bool:
         return any(line.B > 0 and bus in (line.from_bus, line.to_bus) for line in self.lines) or any(
-            load.bus == bus and load.q_mvar < 0 for load in self.loads
+            shunt.bus == bus and shunt.b_mvar > 0 for shunt in self.shunts
+        )
+
+    def _capacitive_loads(self, bus: str) -> list[Load]:
+        return [load for load in self.loads if load.bus == bus and load.q_mvar < 0]
+
+    def _has_conductance(self, bus: str, without: Load | None = None) -> bool:
+        return any(x.bus == bus and x.p_mw > 0 and x is not without for x in self.loads) or any(
+            x.bus == bus and x.g_mw > 0 for x in self.shunts
         )
 
     def _unknown_buses(self) -> Iterable[str]:
@@ -69,30 +128,41 @@ class Network:
         for line in self.lines:
             for bus in {line.from_bus, line.to_bus} - known:
                 yield f"line {line.name!r} ends at bus {bus!r}, which does not exist"
-        attached = [("load", x.name, x.bus) for x in self.loads] + [("port", x.name, x.bus) for x in self.ports]
+        attached = [("load", x.name, x.bus) for x in self.loads] + [("shunt", x.name, x.bus) for x in self.shunts]
+        attached += [("port", x.name, x.bus) for x in self.ports]
         for kind, name, bus in attached:
             if bus not in known:
                 yield f"{kind} {name!r} is at bus {bus!r}, which does not exist"
 
-    def _bad_elements(self) -> Iterable[str]:
-        names = [
-            *self.buses,
-            *(x.name for x in self.lines),
-            *(x.name for x in self.loads),
-            *(x.name for x in self.ports),
-        ]
+    def _repeated_names(self) -> Iterable[str]:
+        names = [*self.buses, *(x.name for x in self.lines), *(x.name for x in self.loads)]
+        names += [*(x.name for x in self.shunts), *(x.name for x in self.ports)]
         yield from (f"the name {name!r} is used twice" for name in sorted({n for n in names if names.count(n) > 1}))
+
+    def _bad_elements(self) -> Iterable[str]:
         for line in self.lines:
-            if line.X <= 0:
-                yield f"line {line.name!r} has the reactance {line.X:g} pu; it must exceed 0"
+            ends = f"between buses {line.from_bus!r} and {line.to_bus!r}"
             if line.from_bus == line.to_bus:
                 yield f"line {line.name!r} begins and ends at bus {line.from_bus!r}"
+            if not line.X >= SMALLEST_REACTANCE:
+                yield (
+                    f"line {line.name!r} has the reactance {line.X:g} pu {ends}; it must be at least "
+                    f"{SMALLEST_REACTANCE:g}: series capacitors are not modelled, so merge it with the line in series "
+                    "with it, and merge buses that nothing separates"
+                )
+            for quantity, value in (("resistance", line.R), ("charging", line.B)):
+                if not value >= 0:
+                    yield f"line {line.name!r} has the {quantity} {value:g} pu {ends}; it must not be negative"
+            if not line.tap > 0:
+                yield f"line {line.name!r} has the ratio {line.tap:g} {ends}; it must exceed 0, and is 1 without one"
+        if not self.stray_B >= 0:
+            yield f"stray_B = {self.stray_B:g} pu; it must not be negative"
 
     def _floating_buses(self) -> Iterable[str]:
         for bus in self.buses:
-            resistive = any(load.bus == bus and load.p_mw > 0 for load in self.loads)
-            if not resistive and not self.has_capacitance(bus):
+            if not self.has_capacitance(bus) and not self._has_conductance(bus):
                 yield (
-                    f"bus {bus!r} has neither a load with P > 0 nor line charging, so its voltage is not "
-                    "determined; add a load, or B to one of its lines"
+                    f"bus {bus!r} has neither a load with P > 0 nor line charging, so its voltage is not determined; "
+                    "add a load, or B to one of its lines, or give the network a small capacitance for such buses: "
+                    "stray_B = 0.01"
                 )

@@ -17,7 +17,7 @@ from fmus.synchronous_generator.conversion import AxisData, RotorBranches, conve
 from fmus.synchronous_generator.data import STAMP, MachineData
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import ModelBuilder
-from fmus.toolchain.port import DevicePort
+from fmus.toolchain.port import BREAKER_TIME, DevicePort
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,10 @@ class Axis:
     def current_rate(self, psi_rate: ca.SX, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
         """di/dt from the rates of the three fluxes."""
         return (self.weight_1 * psi_1_rate + self.weight_2 * psi_2_rate - psi_rate) / self.X_between
+
+    def open_rate(self, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
+        """Rate of the stator flux for which di/dt = −i/τ, as behind an open breaker."""
+        return self.weight_1 * psi_1_rate + self.weight_2 * psi_2_rate + self.X_between * self.i / BREAKER_TIME
 
 
 @dataclass(frozen=True)
@@ -139,21 +143,25 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
     psi_q, psi_d, psi_f, psi_1d, psi_1q, psi_2q = _flux_rates(g, port, E_fd)
     rate = Phasor(g.q.current_rate(psi_q, psi_1q, psi_2q), -g.d.current_rate(psi_d, psi_f, psi_1d))
     drop = Phasor(g.R_t, g.w * g.X_t) * g.current + rate * (g.X_t / port.omega_b)
-    return (port.v.rotated(-g.delta) + drop).magnitude()
+    opened = Phasor(psi_q, -psi_d) / port.omega_b - g.current * g.R + Phasor(g.w * g.d.psi, g.w * g.q.psi)
+    return (port.through_breaker(port.v.rotated(-g.delta), opened) + drop).magnitude()
 
 
 def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
+    """Rates of ψ_q, ψ_d, ψ_f, ψ_1d, ψ_1q, ψ_2q.
+
+    Behind an open breaker the stator's flux follows the rotor's in such a way that the current fades as every open
+    breaker's does; the voltage at the breaker is then what the stator's equation leaves for it.
+    """
+    psi_f = port.omega_b * g.d.branches.R_1 * (E_fd / g.d.X_m - g.d.i_1)
+    psi_1d = -port.omega_b * g.d.branches.R_2 * g.d.i_2
+    psi_1q = -port.omega_b * g.q.branches.R_1 * g.q.i_1
+    psi_2q = -port.omega_b * g.q.branches.R_2 * g.q.i_2
     v = port.v.rotated(-g.delta)
-    v_q, v_d = v.re, -v.im
-    field, damper_d = g.d.branches, g.d.branches
-    return (
-        port.omega_b * (v_q + g.R * g.q.i - g.w * g.d.psi),
-        port.omega_b * (v_d + g.R * g.d.i + g.w * g.q.psi),
-        port.omega_b * field.R_1 * (E_fd / g.d.X_m - g.d.i_1),
-        -port.omega_b * damper_d.R_2 * g.d.i_2,
-        -port.omega_b * g.q.branches.R_1 * g.q.i_1,
-        -port.omega_b * g.q.branches.R_2 * g.q.i_2,
-    )
+    closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
+    opened = Phasor(g.q.open_rate(psi_1q, psi_2q), g.d.open_rate(psi_f, psi_1d))
+    psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
+    return ca.SX(psi.re), ca.SX(psi.im), psi_f, psi_1d, psi_1q, psi_2q
 
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:

@@ -2,6 +2,9 @@
 
 A device takes the bus voltage and gives the current of its transformer, both in the network frame.
 The current is a state, so a device has no direct feed-through at its port.
+
+A breaker at the port is open where ``connected`` is false. Its phases interrupt one after the other, each at a zero
+of its current; here the current fades with `BREAKER_TIME`, di/dt = −i/τ, whatever the voltages are.
 """
 
 from dataclasses import dataclass
@@ -12,6 +15,8 @@ from fmus.toolchain.frames import Phasor, current_of_power, polar, power
 from fmus.toolchain.model import ModelBuilder
 
 SYSTEM_BASE = "100 MVA"
+BREAKER_TIME = 1e-3
+"""Time constant τ [s] with which the current of an open breaker fades."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class DevicePort:
         Base angular frequency [rad/s].
     current_scale
         Device current [pu, S_n] times this is the current on the system base.
+    connected
+        1 where the breaker is closed, 0 where it is open.
     """
 
     v: Phasor
@@ -35,6 +42,11 @@ class DevicePort:
     i_0: Phasor
     omega_b: ca.SX
     current_scale: ca.SX
+    connected: ca.SX
+
+    def through_breaker(self, closed: Phasor, opened: Phasor) -> Phasor:
+        """What holds behind a closed breaker, or behind an open one."""
+        return closed * self.connected + opened * (1 - self.connected)
 
 
 def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
@@ -50,12 +62,13 @@ def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     q_0 = m.parameter(
         "Q_0", 0.0, "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0
     )
+    connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     bus = polar(v_0, theta_0)
     v = Phasor(
         m.input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0),
         m.input("v_im", "pu", "Bus voltage, imaginary part, network frame", base="bus"),
     )
-    return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, rating / system)
+    return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, rating / system, connected)
 
 
 def declare_port_outputs(m: ModelBuilder, port: DevicePort, current: Phasor) -> None:

@@ -1,87 +1,72 @@
-"""Networks and lists of units from tables: what a case file refers to instead of writing it out."""
+"""The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from fmus.grid.network import Line, Load
-from orchestrator.cases.schema import ComponentTable, NetworkTable, UnitsTable
-from orchestrator.errors import InputError
-
-UNIT_KINDS = ("sg", "gfor")
-"""Beginnings of the names of a unit's generator and converter."""
-
-
-@dataclass(frozen=True, slots=True)
-class UnitRow:
-    """One generating unit: its bus, rating [MVA], active power [MW] and voltage [pu]."""
-
-    label: str
-    bus: str
-    rating_mva: float
-    p_mw: float
-    v_pu: float
+from fmus.grid.network import Line, Load, Shunt
+from orchestrator.cases.csv_rows import number, optional_number, rows_of
+from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
+from orchestrator.cases.network_sources import read_matpower, read_pandapower
+from orchestrator.cases.schema import NetworkTable
 
 
-def network_elements(table: NetworkTable, directory: Path) -> tuple[tuple[str, ...], list[Line], list[Load]]:
-    """Buses, lines and loads of a network table, its files included.
+@dataclass(frozen=True)
+class NetworkData:
+    """Elements of a network, and what its source says beyond them.
+
+    Attributes
+    ----------
+    generation
+        By bus: what the units there feed and hold.
+    slack
+        Reference bus of the source.
+    frequency
+        Rated frequency [Hz]; None leaves every model's own.
+    """
+
+    buses: tuple[str, ...]
+    lines: tuple[Line, ...]
+    loads: tuple[Load, ...]
+    shunts: tuple[Shunt, ...]
+    generation: dict[str, Generation] = field(default_factory=dict)
+    slack: str | None = None
+    frequency: float | None = None
+    stray_B: float = 0.0
+
+
+def network_data(table: NetworkTable, directory: Path) -> NetworkData:
+    """Buses, lines, loads and shunts of a network table, its files and its source included.
 
     Raises
     ------
     InputError
-        If a file is missing, lacks a column or holds something that is not a number.
+        If a file is missing, lacks a column, holds something that is not a number, or a source holds something
+        that the grid model does not have.
     """
-    lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B) for n, t in table.lines.items()]
+    source = _source(table, directory)
+    lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift) for n, t in table.lines.items()]
     loads = [Load(n, t.bus, t.p, t.q) for n, t in table.loads.items()]
+    shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
     if table.lines_file is not None:
-        for row in _rows(directory / table.lines_file, ("from", "to", "R", "X", "B")):
-            name = f"line_{row['from']}_{row['to']}"
-            ends = bus_name(row["from"]), bus_name(row["to"])
-            lines.append(Line(name, *ends, X=_number(row, "X"), R=_number(row, "R"), B=_number(row, "B")))
+        lines += _lines_of_file(directory / table.lines_file)
     if table.loads_file is not None:
-        for row in _rows(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
+        for row in rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
             bus = bus_name(row["bus"])
-            loads.append(Load(f"load_{row['bus']}", bus, _number(row, "p_mw"), _number(row, "q_mvar")))
-    buses = dict.fromkeys(table.buses)
+            loads.append(Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar")))
+    buses = dict.fromkeys((*source.buses, *table.buses))
     if not buses:  # nothing to check the lines' ends against: they are the list
         buses = dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
-    return tuple(buses), lines, loads
-
-
-def unit_rows(table: UnitsTable, directory: Path) -> list[UnitRow]:
-    """The units of a units table's file.
-
-    Raises
-    ------
-    InputError
-        As `network_elements`.
-    """
-    path = directory / table.file
-    rows = []
-    for row in _rows(path, ("bus", "rating_mva", "p_mw", "v_pu")):
-        unit = UnitRow(
-            row["bus"], bus_name(row["bus"]), _number(row, "rating_mva"), _number(row, "p_mw"), _number(row, "v_pu")
-        )
-        if abs(unit.p_mw) > unit.rating_mva:
-            raise InputError(
-                f"{path}: the unit at bus {unit.label} feeds {unit.p_mw:g} MW, more than its rating of "
-                f"{unit.rating_mva:g} MVA; raise the rating or lower p_mw"
-            )
-        rows.append(unit)
-    return rows
-
-
-def unit_components(table: UnitsTable, alpha: float, rows: Sequence[UnitRow]) -> dict[str, ComponentTable]:
-    """Generators ``sg<bus>`` and converters ``gfor<bus>`` that share each unit's rating and power 1 − α to α."""
-    shares = (1 - alpha, alpha)
-    models = ((table.generator, table.generator_parameters), (table.converter, table.converter_parameters))
-    components = {}
-    for kind, share, (model, common) in zip(UNIT_KINDS, shares, models, strict=True):
-        for row in rows if share > 0 else ():
-            own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
-            components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=common | own)
-    return components
+    return NetworkData(
+        tuple(buses),
+        (*source.lines, *lines),
+        (*source.loads, *loads),
+        (*source.shunts, *shunts),
+        source.generation,
+        source.slack,
+        table.frequency if table.frequency is not None else source.frequency,
+        table.stray_B,
+    )
 
 
 def bus_name(label: str) -> str:
@@ -89,19 +74,20 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; it should hold the columns {', '.join(columns)}")
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        missing = [c for c in columns if c not in (reader.fieldnames or ())]
-        if missing:
-            raise InputError(f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}")
-        return [row | {"_place": f"{path}, line {number}"} for number, row in enumerate(reader, start=2)]
+def _source(table: NetworkTable, directory: Path) -> ImportedNetwork:
+    imported = ImportedNetwork()
+    if table.matpower is not None:
+        imported = import_network(read_matpower(directory / table.matpower))
+    if table.pandapower is not None:
+        imported = import_network(read_pandapower(table.pandapower, directory))
+    return imported
 
 
-def _number(row: dict[str, str], column: str) -> float:
-    try:
-        return float(row[column])
-    except (TypeError, ValueError):
-        raise InputError(f"{row['_place']}: {column} = {row[column]!r} is not a number") from None
+def _lines_of_file(path: Path) -> Sequence[Line]:
+    lines = []
+    for row in rows_of(path, ("from", "to", "R", "X", "B")):
+        name = f"line_{row['from']}_{row['to']}"
+        ends = bus_name(row["from"]), bus_name(row["to"])
+        tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
+        lines.append(Line(name, *ends, number(row, "X"), number(row, "R"), number(row, "B"), tap, shift))
+    return lines

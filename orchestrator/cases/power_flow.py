@@ -4,46 +4,32 @@ import cmath
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers, widest_angle
 from orchestrator.errors import InputError
 
+__all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
+
 BASE_MVA = 100.0
-_TOLERANCE = 1e-8
+_TOLERANCE = 1e-9
 """Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
-
-
-@dataclass(frozen=True, slots=True)
-class FlowLine:
-    """A π section [pu, 100 MVA]."""
-
-    name: str
-    from_bus: str
-    to_bus: str
-    R: float
-    X: float
-    B: float
-
-
-@dataclass(frozen=True, slots=True)
-class FlowLoad:
-    """A load [MW, Mvar]."""
-
-    bus: str
-    p_mw: float
-    q_mvar: float
+_KV = 230.0
+"""Voltage at which per-unit figures are handed to pandapower; it drops out."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlowUnit:
-    """A unit that feeds P_0 [pu, S_n] and, with the others at its bus, holds v_0 [pu]."""
+    """A unit that feeds P_0 [pu, S_n] and, with the others at its bus, holds v_0 [pu]; nothing where not connected."""
 
     name: str
     bus: str
     S_n: float
     P_0: float
     v_0: float
+    connected: bool = True
 
 
 @dataclass(frozen=True)
@@ -71,6 +57,7 @@ def solve_power_flow(
     loads: Sequence[FlowLoad],
     units: Sequence[FlowUnit],
     slack_bus: str,
+    shunts: Sequence[FlowShunt] = (),
 ) -> PowerFlow:
     """Solve the power flow.
 
@@ -80,66 +67,83 @@ def solve_power_flow(
     Raises
     ------
     InputError
-        If the units at a bus disagree about its voltage, or no solution is found.
+        If the units at a bus disagree about its voltage, no unit is connected at the slack bus, buses have no way
+        to it, or no solution is found.
     """
     at_bus: dict[str, list[FlowUnit]] = {}
     for unit in units:
-        at_bus.setdefault(unit.bus, []).append(unit)
+        if unit.connected:
+            at_bus.setdefault(unit.bus, []).append(unit)
     for bus, members in at_bus.items():
         if len({u.v_0 for u in members}) > 1:
             wanted = ", ".join(f"{u.name} wants {u.v_0:g}" for u in members)
             raise InputError(
                 f"power flow: bus {bus!r} cannot have two voltages ({wanted}); give its units the same v_0"
             )
-    _check_connected(buses, lines, slack_bus)
-    voltages = _pandapower_voltages(buses, lines, loads, at_bus, slack_bus)
-    flow = _shares(voltages, lines, loads, at_bus, slack_bus)
+    if slack_bus not in at_bus:
+        raise InputError(
+            f"power flow: no unit is connected at the slack bus {slack_bus!r}, so nothing feeds what is left; "
+            "choose another slack in [power_flow]"
+        )
+    check_connected(buses, lines, slack_bus)
+    voltages = _pandapower_voltages(buses, lines, loads, shunts, at_bus, slack_bus)
+    flow = _shares(voltages, nodal_powers(voltages, lines, loads, shunts), at_bus, slack_bus)
+    powers = flow.powers | {unit.name: 0j for unit in units if not unit.connected}
     if not flow.residual <= _TOLERANCE:
         raise InputError(
             f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
             "check for very small reactances"
         )
-    return flow
-
-
-def _check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: str) -> None:
-    """Every bus needs a way to the slack bus."""
-    neighbours: dict[str, set[str]] = {bus: set() for bus in buses}
-    for line in lines:
-        neighbours[line.from_bus].add(line.to_bus)
-        neighbours[line.to_bus].add(line.from_bus)
-    reached, waiting = {slack_bus}, [slack_bus]
-    while waiting:
-        found = neighbours[waiting.pop()] - reached
-        waiting += found
-        reached |= found
-    islands = [bus for bus in buses if bus not in reached]
-    if islands:
-        raise InputError(
-            f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
-            "connect them with a line, or remove them"
-        )
+    return PowerFlow(flow.voltages, powers, flow.residual)
 
 
 def _pandapower_voltages(
     buses: Sequence[str],
     lines: Sequence[FlowLine],
     loads: Sequence[FlowLoad],
+    shunts: Sequence[FlowShunt],
     at_bus: Mapping[str, Sequence[FlowUnit]],
     slack_bus: str,
 ) -> dict[str, complex]:
     import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
 
     logging.getLogger("pandapower").setLevel(logging.ERROR)
-    kv = 230.0
-    impedance = kv**2 / BASE_MVA
     net = pp.create_empty_network(f_hz=50.0, sn_mva=BASE_MVA)
-    index = {bus: pp.create_bus(net, vn_kv=kv, name=bus) for bus in buses}
+    index = {bus: pp.create_bus(net, vn_kv=_KV, name=bus) for bus in buses}
     for line in lines:
+        _add_line(pp, net, line, index)
+    for load in loads:
+        pp.create_load(net, index[load.bus], p_mw=load.p_mw, q_mvar=load.q_mvar)
+    for shunt in shunts:
+        pp.create_shunt(net, index[shunt.bus], p_mw=shunt.g * BASE_MVA, q_mvar=-shunt.b * BASE_MVA)
+    for bus, members in at_bus.items():
+        if bus == slack_bus:
+            pp.create_ext_grid(net, index[bus], vm_pu=members[0].v_0)
+        else:
+            pp.create_gen(net, index[bus], p_mw=sum(u.P_0 * u.S_n for u in members), vm_pu=members[0].v_0)
+    try:
+        pp.runpp(
+            net, tolerance_mva=1e-10, max_iteration=50, numba=False, init="dc", calculate_voltage_angles=True,
+            trafo_model="pi",
+        )  # fmt: skip
+    except pp.LoadflowNotConverged as error:
+        injected = {bus: sum(u.P_0 * u.S_n for u in members) / BASE_MVA for bus, members in at_bus.items()}
+        raise InputError(
+            "power flow: no solution found; the lines cannot carry the power asked of them. "
+            f"{widest_angle(buses, lines, loads, injected, slack_bus)}Lower P_0 or the loads, or the line reactances"
+        ) from error
+    result = net.res_bus
+    return {bus: cmath.rect(float(result.vm_pu[i]), float(np.deg2rad(result.va_degree[i]))) for bus, i in index.items()}
+
+
+def _add_line(pp: Any, net: Any, line: FlowLine, index: Mapping[str, int]) -> None:
+    """A line, or a transformer where it has a ratio; shunts alone where it is open."""
+    impedance = _KV**2 / BASE_MVA
+    ends = index[line.from_bus], index[line.to_bus]
+    if line.closed and not line.has_ratio:
         pp.create_line_from_parameters(
             net,
-            index[line.from_bus],
-            index[line.to_bus],
+            *ends,
             length_km=1.0,
             r_ohm_per_km=line.R * impedance,
             x_ohm_per_km=line.X * impedance,
@@ -147,40 +151,33 @@ def _pandapower_voltages(
             max_i_ka=1e3,
             name=line.name,
         )
-    for load in loads:
-        pp.create_load(net, index[load.bus], p_mw=load.p_mw, q_mvar=load.q_mvar)
-    for bus, members in at_bus.items():
-        if bus == slack_bus:
-            pp.create_ext_grid(net, index[bus], vm_pu=members[0].v_0)
-        else:
-            pp.create_gen(net, index[bus], p_mw=sum(u.P_0 * u.S_n for u in members), vm_pu=members[0].v_0)
-    try:
-        pp.runpp(net, tolerance_mva=1e-10, max_iteration=50, numba=False, init="dc")
-    except pp.LoadflowNotConverged as error:
-        raise InputError(
-            "power flow: no solution found; the lines cannot carry the power asked of them. "
-            "Lower P_0 or the loads, or the line reactances"
-        ) from error
-    result = net.res_bus
-    return {bus: cmath.rect(float(result.vm_pu[i]), float(np.deg2rad(result.va_degree[i]))) for bus, i in index.items()}
+        return
+    for end, b in zip(ends, line.charging, strict=True):
+        if b:
+            pp.create_shunt(net, end, p_mw=0.0, q_mvar=-b * BASE_MVA)
+    if line.closed:
+        pp.create_transformer_from_parameters(
+            net,
+            *ends,
+            sn_mva=BASE_MVA,
+            vn_hv_kv=line.tap * _KV,
+            vn_lv_kv=_KV,
+            vkr_percent=100 * line.R,
+            vk_percent=100 * abs(complex(line.R, line.X)),
+            pfe_kw=0.0,
+            i0_percent=0.0,
+            shift_degree=float(np.rad2deg(line.shift)),
+            name=line.name,
+        )
 
 
 def _shares(
     voltages: dict[str, complex],
-    lines: Sequence[FlowLine],
-    loads: Sequence[FlowLoad],
+    needed: Mapping[str, complex],
     at_bus: Mapping[str, Sequence[FlowUnit]],
     slack_bus: str,
 ) -> PowerFlow:
     """Power that every unit must feed for the voltages to hold, and what is left over."""
-    needed = dict.fromkeys(voltages, 0j)
-    for line in lines:
-        v_from, v_to = voltages[line.from_bus], voltages[line.to_bus]
-        current = (v_from - v_to) / complex(line.R, line.X)
-        needed[line.from_bus] += v_from * (current + 0.5j * line.B * v_from).conjugate()
-        needed[line.to_bus] += v_to * (-current + 0.5j * line.B * v_to).conjugate()
-    for load in loads:
-        needed[load.bus] += complex(load.p_mw, load.q_mvar) / BASE_MVA
     powers: dict[str, complex] = {}
     residual = 0.0
     for bus, power in needed.items():

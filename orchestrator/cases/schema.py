@@ -21,6 +21,8 @@ Seconds = Annotated[float, BeforeValidator(_in("s")), Field(allow_inf_nan=False)
 PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
 Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
+Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
+Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
 
 class Table(BaseModel):
@@ -54,7 +56,7 @@ class PowerFlowTable(Table):
     """Which component is the grid, and which unit or bus balances it."""
 
     grid: str
-    slack: str
+    slack: str | None = None
 
 
 class LineTable(Table):
@@ -63,6 +65,8 @@ class LineTable(Table):
     X: PerUnit
     R: PerUnit = 0.0
     B: PerUnit = 0.0
+    tap: float = 1.0
+    shift: Radian = 0.0
 
 
 class LoadTable(Table):
@@ -71,20 +75,37 @@ class LoadTable(Table):
     q: Megavar = 0.0
 
 
+class ShuntTable(Table):
+    """An admittance to earth: what it draws and generates at 1 pu."""
+
+    bus: str
+    g: Megawatt = 0.0
+    b: Megavar = 0.0
+
+
 class NetworkTable(Table):
-    """A network of the user's own, for the model ``grid``."""
+    """A network for the model ``grid``: another program's, or written out, or both together."""
+
+    matpower: str | None = None
+    pandapower: str | None = None
+    frequency: Hertz | None = Field(default=None, gt=0)
+    stray_B: PerUnit = 0.0
 
     buses: list[str] = []
     lines_file: str | None = None
     loads_file: str | None = None
     lines: dict[str, LineTable] = {}
     loads: dict[str, LoadTable] = {}
+    shunts: dict[str, ShuntTable] = {}
 
 
 class UnitsTable(Table):
-    """Many units from a table, each a generator and a converter that share its rating and power."""
+    """Many units, each a generator and a converter that share its rating and power.
 
-    file: str
+    They come from a file; without one, every generator bus of the network's source is a unit.
+    """
+
+    file: str | None = None
     alpha: float = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str
@@ -97,41 +118,86 @@ class ConnectionTable(Table):
     target: str = Field(alias="to")
 
 
-class LoadChangeTable(Table):
-    type: Literal["load_change"]
+class EventBase(Table):
     time: Seconds = Field(ge=0)
-    component: str
+
+
+class GridEventBase(EventBase):
+    """Something in the network; ``component`` is the grid of ``[power_flow]`` where it is left out."""
+
+    component: str | None = None
+
+
+class LoadChangeTable(GridEventBase):
+    type: Literal["load_change"]
     load: str
     scale: float = Field(gt=0)
 
 
-class BranchChangeTable(Table):
+class LoadTripTable(GridEventBase):
+    type: Literal["load_trip"]
+    load: str
+
+
+class LoadReconnectionTable(GridEventBase):
+    type: Literal["load_reconnection"]
+    load: str
+    scale: float = Field(default=1.0, gt=0)
+
+
+class LineTripTable(GridEventBase):
+    type: Literal["line_trip"]
+    line: str
+    reclose_after: Seconds | None = Field(default=None, gt=0)
+
+
+class LineReclosingTable(GridEventBase):
+    type: Literal["line_reclosing"]
+    line: str
+
+
+class UnitTripTable(GridEventBase):
+    type: Literal["unit_trip"]
+    unit: str
+
+
+class UnitReconnectionTable(GridEventBase):
+    type: Literal["unit_reconnection"]
+    unit: str
+
+
+class BranchChangeTable(GridEventBase):
     type: Literal["branch_change"]
-    time: Seconds = Field(ge=0)
-    component: str
     line: str
     X: PerUnit
     R: PerUnit | None = None
 
 
-class ReferenceChangeTable(Table):
+class ReferenceChangeTable(EventBase):
     type: Literal["reference_change"]
-    time: Seconds = Field(ge=0)
     component: str
     reference: str
     delta: PerUnit
 
 
-class ParameterChangeTable(Table):
+class ParameterChangeTable(EventBase):
     type: Literal["parameter_change"]
-    time: Seconds = Field(ge=0)
     component: str
     parameter: str
     value: Value
 
 
 EventTable = Annotated[
-    LoadChangeTable | BranchChangeTable | ReferenceChangeTable | ParameterChangeTable,
+    LoadChangeTable
+    | LoadTripTable
+    | LoadReconnectionTable
+    | LineTripTable
+    | LineReclosingTable
+    | UnitTripTable
+    | UnitReconnectionTable
+    | BranchChangeTable
+    | ReferenceChangeTable
+    | ParameterChangeTable,
     Field(discriminator="type"),
 ]
 

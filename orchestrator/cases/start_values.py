@@ -3,8 +3,9 @@
 import cmath
 from collections.abc import Mapping
 
-from fmus.grid.network import Network
-from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, PowerFlow, solve_power_flow
+from fmus.grid.network import SYSTEM_BASE_MVA, Network
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
 
@@ -47,8 +48,9 @@ def start_from_power_flow(
         network.buses,
         _lines(network, system.components[grid]),
         _loads(network, system.components[grid]),
-        [_unit(name, bus, system.components[name]) for name, bus in units.items()],
+        [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()],
         slack,
+        _shunts(network, system.components[grid]),
     )
     for bus, voltage in flow.voltages.items():
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
@@ -66,6 +68,9 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             R=_value(grid, f"R_{line.name}"),
             X=_value(grid, f"X_{line.name}"),
             B=_value(grid, f"B_{line.name}") if line.B else 0.0,
+            tap=_value(grid, f"tap_{line.name}") if line.has_ratio else 1.0,
+            shift=_value(grid, f"shift_{line.name}") if line.has_ratio else 0.0,
+            closed=_is_connected(grid, f"{line.name}."),
         )
         for line in network.lines
     ]
@@ -82,8 +87,28 @@ def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
     ]
 
 
-def _unit(name: str, bus: str, plan: ComponentPlan) -> FlowUnit:
-    return FlowUnit(name, bus, _value(plan, "S_n"), _value(plan, "P_0"), _value(plan, "v_0"))
+def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
+    shunts = [
+        FlowShunt(
+            shunt.bus,
+            g=_value(grid, f"{shunt.name}.G") / SYSTEM_BASE_MVA if shunt.g_mw else 0.0,
+            b=_value(grid, f"{shunt.name}.B") / SYSTEM_BASE_MVA if shunt.b_mvar else 0.0,
+        )
+        for shunt in network.shunts
+    ]
+    stray = [bus for bus in network.buses if network.needs_stray(bus)]
+    return shunts + [FlowShunt(bus, g=0.0, b=_value(grid, "stray_B")) for bus in stray]
+
+
+def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
+    connected = _is_connected(plan) and _is_connected(grid, f"{name}.")
+    return FlowUnit(name, bus, _value(plan, "S_n"), _value(plan, "P_0"), _value(plan, "v_0"), connected)
+
+
+def _is_connected(plan: ComponentPlan, element: str = "") -> bool:
+    """Whether a breaker is closed; an FMU without one has it closed."""
+    info = plan.description.variables.get(f"{element}connected")
+    return info is None or bool(plan.parameters.get(info.name, info.start != "false"))
 
 
 def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:

@@ -23,9 +23,13 @@ class Event:
         """Variables of the component with their new values."""
         raise TypeError(f"{type(self).__name__} is not a kind of event of its own")
 
+    def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
+        """Settings of every component that is concerned, in the order in which they are made."""
+        return {self.component: self.settings()}
+
     def __str__(self) -> str:
-        values = ", ".join(f"{self.component}.{name} = {value:g}" for name, value in self.settings().items())
-        return f"t = {self.time:g} s: {values}"
+        values = [f"{who}.{name} = {value:g}" for who, new in self.changes().items() for name, value in new.items()]
+        return f"t = {self.time:g} s: {', '.join(values)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,44 @@ class LoadChange(Event):
 
     def settings(self) -> Mapping[str, float | bool]:
         return {f"{self.load}.scale": self.scale}
+
+
+@dataclass(frozen=True, slots=True)
+class LoadSwitching(Event):
+    """A load is switched off (``scale`` 0), or on again."""
+
+    load: str
+    scale: float = 0.0
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {f"{self.load}.scale": self.scale}
+
+
+@dataclass(frozen=True, slots=True)
+class LineSwitching(Event):
+    """A line is opened at both ends, or closed again."""
+
+    line: str
+    connected: bool
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {f"{self.line}.connected": self.connected}
+
+
+@dataclass(frozen=True, slots=True)
+class UnitSwitching(Event):
+    """A unit is taken from the grid, or put back: the grid's port, and the unit's own breaker where it has one."""
+
+    unit: str
+    connected: bool
+    has_breaker: bool = True
+
+    def settings(self) -> Mapping[str, float | bool]:
+        return {f"{self.unit}.connected": self.connected}
+
+    def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
+        own: dict[str, Mapping[str, float | bool]] = {self.unit: {"connected": self.connected}}
+        return (own if self.has_breaker else {}) | {self.component: self.settings()}
 
 
 @dataclass(frozen=True, slots=True)

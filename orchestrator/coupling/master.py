@@ -170,7 +170,7 @@ class Master:
         """Step until a time [s].
 
         An event happens at its communication point before the step that starts there, and the
-        outputs of its component are read again, so that its partners see the change at once.
+        outputs of its components are read again, so that its partners see the change at once.
 
         Raises
         ------
@@ -216,8 +216,10 @@ class Master:
 
     def _apply(self, events: Sequence[Event]) -> None:
         for event in events:
-            self.components[event.component].set(event.settings())
-            self.exchanges[event.component].outputs.read()
+            for name, settings in event.changes().items():
+                self.components[name].set(settings)
+            for name in event.changes():
+                self.exchanges[name].outputs.read()
 
     def _statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
         names = [name for group in self.schedule.groups for name in group]

@@ -1,0 +1,191 @@
+"""Elements of a network as parameters and states: what each adds to its buses, and its own equation."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.grid.network import SMALLEST_REACTANCE, SYSTEM_BASE_MVA, Line, Load, Port, Shunt
+from fmus.toolchain.frames import ZERO, Phasor, polar, power
+from fmus.toolchain.model import ModelBuilder, Scalar
+from fmus.toolchain.port import BREAKER_TIME, SYSTEM_BASE
+
+OPEN_CHARGING = 1e-3
+"""Part of an open line's charging that stays, so that a bus which only this line supports keeps a defined voltage."""
+
+
+@dataclass
+class Bus:
+    """What meets at a bus: injected current, conductance, susceptance; its voltage once known."""
+
+    v_0: Phasor
+    injected: Phasor
+    G: ca.SX
+    B: ca.SX
+    v: Phasor = ZERO
+
+
+@dataclass(frozen=True)
+class Branch:
+    """An inductive current state with R and X, from a voltage to a voltage or to earth.
+
+    Attributes
+    ----------
+    current
+        The state; behind the ratio, where there is one.
+    drawn
+        What it takes from its from bus.
+    ratio
+        Complex ratio at the from side.
+    connected
+        1 or 0; None where it cannot be opened.
+    """
+
+    current: Phasor
+    drawn: Phasor
+    R: Scalar
+    X: ca.SX
+    from_bus: str
+    to_bus: str | None = None
+    ratio: Phasor | None = None
+    connected: ca.SX | None = None
+
+
+def declare_bus(m: ModelBuilder, name: str) -> Bus:
+    """Declare the power flow's voltage of a bus."""
+    with m.scope(name):
+        magnitude = m.parameter("v_0", 1.0, "pu", "Power flow: voltage magnitude", base="bus", minimum=0.1, maximum=2.0)
+        angle = m.parameter("theta_0", 0.0, "rad", "Power flow: voltage angle")
+    return Bus(polar(magnitude, angle), ZERO, ca.SX(0), ca.SX(0))
+
+
+def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
+    """Declare a device's current; returned is what reaches the bus."""
+    with m.scope(port.name):
+        current = Phasor(
+            m.input("i_re", "pu", "Current injected by the device, real part", base=SYSTEM_BASE),
+            m.input("i_im", "pu", "Current injected by the device, imaginary part", base=SYSTEM_BASE),
+        )
+        connected = m.switch("connected", True, "The device's breaker at the bus is closed", tunable=True)
+    fed = current * connected
+    buses[port.bus].injected += fed
+    return fed
+
+
+def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
+    """Declare a π section, with a ratio at its from side where it has one."""
+
+    def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> ca.SX:
+        base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
+        return m.parameter(
+            f"{name}_{line.name}", value, unit, f"{text} of line {line.name}", base=base, minimum=minimum,
+            maximum=maximum, tunable=name != "B",
+        )  # fmt: skip
+
+    start, end = buses[line.from_bus], buses[line.to_bus]
+    X = parameter("X", line.X, "pu", "Reactance", SMALLEST_REACTANCE, 100)
+    R = parameter("R", line.R, "pu", "Resistance", 0, None)
+    with m.scope(line.name):
+        connected = m.switch("connected", True, f"Line {line.name} is closed at both ends", tunable=True)
+    v_from, ratio, turns = start.v_0, None, ca.SX(1)
+    if line.has_ratio:
+        turns = parameter("tap", line.tap, "1", "Magnitude of the ratio at the from side", 0.1, 10)
+        ratio = polar(turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None))
+        v_from = v_from / ratio
+    if line.B:
+        B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (OPEN_CHARGING + (1 - OPEN_CHARGING) * connected)
+        start.B += B / 2 / turns**2
+        end.B += B / 2
+    initial = (v_from - end.v_0) / Phasor(R, X) * connected
+    with m.scope(line.name):
+        current = _current_state(m, initial, f"Current of line {line.name}")
+    drawn = current if ratio is None else current / ratio.conjugate()
+    start.injected -= drawn
+    end.injected += current
+    return Branch(current, drawn, R, X, line.from_bus, line.to_bus, ratio, connected)
+
+
+def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool) -> list[Branch]:
+    """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus.
+
+    The inductor's state is its current at scale 1, of which ``scale`` times is drawn: a load that is switched off
+    and on again comes back without a direct component.
+    """
+    bus = buses[load.bus]
+    v_squared = bus.v_0.re**2 + bus.v_0.im**2
+    text = "Load step: factor on G and 1/X; 0 is switched off"
+    if alone:
+        text = "Load step: factor on G and 1/X; not 0, because nothing else determines the voltage of this bus"
+    with m.scope(load.name):
+        scale = m.parameter("scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True)
+        P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage", minimum=0)
+        bus.G += scale * P / SYSTEM_BASE_MVA / v_squared
+        if load.q_mvar == 0:
+            return []
+        inductive = load.q_mvar > 0
+        Q = m.parameter(
+            "Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage",
+            minimum=1e-6 if inductive else None, maximum=None if inductive else -1e-6,
+        )  # fmt: skip
+        if not inductive:
+            bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
+            return []
+        X = v_squared / (Q / SYSTEM_BASE_MVA)
+        return [_inductor(m, bus, load.bus, X, scale)]
+
+
+def declare_shunt(m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus]) -> list[Branch]:
+    """Declare an admittance to earth: conductance, and a capacitor or an inductor."""
+    bus = buses[shunt.bus]
+    with m.scope(shunt.name):
+        if shunt.g_mw:
+            bus.G += m.parameter("G", shunt.g_mw, "MW", "Active power drawn at 1 pu") / SYSTEM_BASE_MVA
+        if not shunt.b_mvar:
+            return []
+        capacitive = shunt.b_mvar > 0
+        B = m.parameter(
+            "B", shunt.b_mvar, "Mvar", "Reactive power generated at 1 pu",
+            minimum=1e-6 if capacitive else None, maximum=None if capacitive else -1e-6,
+        )  # fmt: skip
+        if capacitive:
+            bus.B += B / SYSTEM_BASE_MVA
+            return []
+        return [_inductor(m, bus, shunt.bus, -SYSTEM_BASE_MVA / B, 1.0)]
+
+
+def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: ca.SX) -> None:
+    """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ."""
+    over = buses[branch.from_bus].v
+    if branch.ratio is not None:
+        over = over / branch.ratio
+    if branch.to_bus is not None:
+        over -= buses[branch.to_bus].v
+    rate = over - Phasor(branch.R, branch.X) * branch.current
+    if branch.connected is None:
+        rate *= omega_b / branch.X
+    else:
+        fading = (1 - branch.connected) / BREAKER_TIME
+        rate = rate * (branch.connected * omega_b / branch.X) - branch.current * fading
+    m.derivative(ca.SX(branch.current.re), rate.re)
+    m.derivative(ca.SX(branch.current.im), rate.im)
+
+
+def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
+    """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage."""
+    s = power(v, current)
+    with m.scope(name):
+        m.output("p", s.re, "pu", active, base=SYSTEM_BASE)
+        m.output("q", s.im, "pu", reactive, base=SYSTEM_BASE)
+
+
+def _inductor(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> Branch:
+    current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
+    drawn = current * scale
+    bus.injected -= drawn
+    return Branch(current, drawn, 0.0, X, name)
+
+
+def _current_state(m: ModelBuilder, initial: Phasor, text: str) -> Phasor:
+    return Phasor(
+        m.state("i_re", initial.re, "pu", f"{text}, real part", SYSTEM_BASE),
+        m.state("i_im", initial.im, "pu", f"{text}, imaginary part", SYSTEM_BASE),
+    )

@@ -1,0 +1,73 @@
+"""Values of the file, the scenario and the command line, given to the components they are for."""
+
+import fnmatch
+from typing import Any
+
+from orchestrator.cases.draft import COMMAND_LINE, Draft
+from orchestrator.cases.names import close_names
+from orchestrator.cases.schema import Value
+from orchestrator.cases.unit_tables import sets_alpha
+from orchestrator.cases.values import convert, flatten
+from orchestrator.fmi.description import VariableInfo
+
+
+def assign_values(draft: Draft) -> None:
+    """Give every value to its variable; a later source goes before an earlier one."""
+    _assign_frequency(draft)
+    for name, table in draft.tables.items():
+        for group in ("parameters", "inputs"):
+            for path, value in flatten(getattr(table, group)):
+                _assign(draft, name, ".".join(path), value, draft.place("components", name, group, *path))
+    for key, value in draft.scenario.set.items():
+        _assign_key(draft, key, value, draft.place("scenarios", draft.name, "set", key))
+    for key, value in draft.overrides.items():
+        _assign_key(draft, key, value, f"{COMMAND_LINE} {key}")
+
+
+def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:
+    """The value in the variable's unit and type; None where it does not fit, which is noted."""
+    try:
+        return convert(info, value)
+    except ValueError as error:
+        draft.note(where, str(error))
+        return None
+
+
+def _assign_frequency(draft: Draft) -> None:
+    """The network's frequency goes to everything that has a rated one."""
+    if draft.data is None or draft.data.frequency is None:
+        return
+    for plan in draft.system.components.values():
+        if "f_n" in plan.description.parameters:
+            plan.parameters["f_n"] = draft.data.frequency
+
+
+def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
+    """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""
+    if draft.case.units is not None and sets_alpha(key):
+        return  # done before the units were made
+    pattern, _, variable = key.partition(".")
+    for name in fnmatch.filter(draft.tables, pattern):
+        _assign(draft, name, variable, value, where)
+    if not fnmatch.filter(draft.known, pattern):
+        some = ", ".join([*draft.case.components][:12])
+        draft.note(where, f"there is no component {pattern!r}; the case has: {some}")
+
+
+def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) -> None:
+    plan = draft.system.components.get(name)
+    if plan is None:
+        return  # the component itself is a problem already
+    info = plan.description.variables.get(variable)
+    if info is None:
+        settable = [*plan.description.parameters, *plan.description.inputs]
+        hint = close_names(variable, settable, f"`gfor info {plan.description.path}` lists them")
+        draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
+        return
+    if info.causality not in ("parameter", "input"):
+        draft.note(where, f"{variable} is of causality {info.causality}; only parameters and inputs can be set")
+        return
+    converted = convert_value(draft, info, value, where)
+    if converted is not None:
+        target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
+        target[variable] = converted

@@ -1,0 +1,144 @@
+"""What a power flow is made of, and our own nodal equations: they check a solution and say why there is none."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+
+from fmus.grid.elements import OPEN_CHARGING
+from orchestrator.errors import InputError
+
+BASE_MVA = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlowLine:
+    """A π section [pu, 100 MVA] behind an ideal ratio tap·e^{j·shift} [rad] at its from side."""
+
+    name: str
+    from_bus: str
+    to_bus: str
+    R: float
+    X: float
+    B: float
+    tap: float = 1.0
+    shift: float = 0.0
+    closed: bool = True
+
+    @property
+    def has_ratio(self) -> bool:
+        return self.tap != 1.0 or self.shift != 0.0
+
+    @property
+    def charging(self) -> tuple[float, float]:
+        """Susceptance to earth at both ends; of an open line the part that the grid model leaves."""
+        b = self.B / 2 * (1.0 if self.closed else OPEN_CHARGING)
+        return b / self.tap**2, b
+
+
+@dataclass(frozen=True, slots=True)
+class FlowLoad:
+    """A load [MW, Mvar]."""
+
+    bus: str
+    p_mw: float
+    q_mvar: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlowShunt:
+    """An admittance to earth g + jb [pu, 100 MVA]."""
+
+    bus: str
+    g: float
+    b: float
+
+
+def nodal_powers(
+    voltages: Mapping[str, complex],
+    lines: Sequence[FlowLine],
+    loads: Sequence[FlowLoad],
+    shunts: Sequence[FlowShunt],
+) -> dict[str, complex]:
+    """P + jQ [pu, 100 MVA] that must be fed into every bus for the voltages to hold."""
+    needed = dict.fromkeys(voltages, 0j)
+    for line in lines:
+        v_from, v_to = voltages[line.from_bus], voltages[line.to_bus]
+        b_from, b_to = line.charging
+        needed[line.from_bus] -= 1j * b_from * abs(v_from) ** 2
+        needed[line.to_bus] -= 1j * b_to * abs(v_to) ** 2
+        if line.closed:
+            behind = v_from / (line.tap * np.exp(1j * line.shift))
+            current = (behind - v_to) / complex(line.R, line.X)
+            needed[line.from_bus] += complex(behind * current.conjugate())
+            needed[line.to_bus] -= complex(v_to * current.conjugate())
+    for load in loads:
+        needed[load.bus] += complex(load.p_mw, load.q_mvar) / BASE_MVA
+    for shunt in shunts:
+        needed[shunt.bus] += complex(shunt.g, -shunt.b) * abs(voltages[shunt.bus]) ** 2
+    return needed
+
+
+def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: str) -> None:
+    """Every bus needs a way to the slack bus.
+
+    Raises
+    ------
+    InputError
+        Naming the buses that have none.
+    """
+    neighbours: dict[str, set[str]] = {bus: set() for bus in buses}
+    for line in lines:
+        if line.closed:
+            neighbours[line.from_bus].add(line.to_bus)
+            neighbours[line.to_bus].add(line.from_bus)
+    reached, waiting = {slack_bus}, [slack_bus]
+    while waiting:
+        found = neighbours[waiting.pop()] - reached
+        waiting += found
+        reached |= found
+    islands = [bus for bus in buses if bus not in reached]
+    if islands:
+        opened = [line.name for line in lines if not line.closed and {line.from_bus, line.to_bus} & set(islands)]
+        remedy = f"close {', '.join(opened[:5])}, " if opened else ""
+        raise InputError(
+            f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
+            f"{remedy}connect them with a line, or remove them"
+        )
+
+
+def widest_angle(
+    buses: Sequence[str],
+    lines: Sequence[FlowLine],
+    loads: Sequence[FlowLoad],
+    injected: Mapping[str, float],
+    slack_bus: str,
+) -> str:
+    """A sentence that names the branch with the largest angle in the DC solution; ``injected`` in pu of 100 MVA."""
+    closed = [line for line in lines if line.closed]
+    position = {bus: k for k, bus in enumerate(buses)}
+    power = np.array([injected.get(bus, 0.0) for bus in buses])
+    for load in loads:
+        power[position[load.bus]] -= load.p_mw / BASE_MVA
+    start = np.array([position[line.from_bus] for line in closed])
+    end = np.array([position[line.to_bus] for line in closed])
+    b = np.array([1 / (line.X * line.tap) for line in closed])
+    shifts = np.array([line.shift for line in closed])
+    np.add.at(power, start, b * shifts)
+    np.add.at(power, end, -b * shifts)
+    rows, columns = np.concatenate([start, end, start, end]), np.concatenate([start, end, end, start])
+    B = coo_matrix((np.concatenate([b, b, -b, -b]), (rows, columns)), shape=(len(buses),) * 2).tocsc()
+    kept = np.array([k for bus, k in position.items() if bus != slack_bus])
+    angle = np.zeros(len(buses))
+    angle[kept] = spsolve(B[kept][:, kept], power[kept])
+    across = angle[start] - angle[end] - shifts
+    worst = int(np.argmax(np.abs(across)))
+    line, degrees = closed[worst], math.degrees(across[worst])
+    ends = (f"{bus!r} ({math.degrees(angle[position[bus]]):.1f} deg)" for bus in (line.from_bus, line.to_bus))
+    return (
+        f"In the DC solution the largest angle, {abs(degrees):.1f} deg, is across {line.name!r} between "
+        f"{' and '.join(ends)}, X = {line.X:g} pu, which would carry {across[worst] * b[worst] * BASE_MVA:.0f} MW. "
+    )

@@ -1,0 +1,143 @@
+"""MATPOWER's tables as elements of our network: the one place where the two conventions meet."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from fmus.grid.network import SYSTEM_BASE_MVA, Line, Load, Shunt
+from orchestrator.cases.network_sources import Matrix, SourceTables
+from orchestrator.errors import InputError
+
+_REFERENCE, _OUT = 3, 4
+_POWER_FACTOR = 0.9
+_NEGLIGIBLE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Generation:
+    """What the generators at a bus feed [MW] and hold [pu] together, and a rating that suits them [MVA]."""
+
+    label: str
+    p_mw: float
+    v_pu: float
+    rating_mva: float
+
+
+@dataclass(frozen=True)
+class ImportedNetwork:
+    """Elements of a network, and by bus what its generators do."""
+
+    buses: tuple[str, ...] = ()
+    lines: tuple[Line, ...] = ()
+    loads: tuple[Load, ...] = ()
+    shunts: tuple[Shunt, ...] = ()
+    generation: dict[str, Generation] = field(default_factory=dict)
+    slack: str | None = None
+    frequency: float | None = None
+
+
+def import_network(source: SourceTables) -> ImportedNetwork:
+    """Map a source's tables to elements; whatever is out of service is left out.
+
+    Raises
+    ------
+    InputError
+        Naming everything in the source that the grid model does not have.
+    """
+    rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
+    labels = {number: source.labels[number] for number in rows}
+    lines, to_earth = _lines(source, labels)
+    loads, problems = _loads(source, rows)
+    for number, row in rows.items():
+        to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
+    shunts = [
+        Shunt(f"shunt_{labels[n]}", bus_of(labels[n]), _clean(y.real), _clean(y.imag))
+        for n, y in ((n, y * source.base_mva) for n, y in to_earth.items())
+        if abs(y) > _NEGLIGIBLE
+    ]
+    problems += [f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
+                 for s in shunts if s.g_mw < 0]  # fmt: skip
+    if problems:
+        raise InputError(f"{source.name}: {'; '.join(problems)}; the grid model has no such element, change the source")
+    reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
+    return ImportedNetwork(
+        tuple(bus_of(label) for label in labels.values()),
+        tuple(lines),
+        tuple(loads),
+        tuple(shunts),
+        {bus_of(g.label): g for g in _generation(source, labels)},
+        bus_of(labels[reference[0]]) if reference else None,
+        source.frequency,
+    )
+
+
+def bus_of(label: str) -> str:
+    """Name of a bus with a label."""
+    return f"bus_{label}"
+
+
+def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], dict[int, complex]]:
+    """Branches, and per bus what they leave to earth that a π section of ours does not have [pu of the source].
+
+    A π section has one capacitance for both ends; a conductance, a difference between the ends and an inductive
+    part (magnetisation) go to the buses.
+    """
+    lines: list[Line] = []
+    to_earth: dict[int, complex] = {}
+    seen: Counter[str] = Counter()
+    scale = SYSTEM_BASE_MVA / source.base_mva
+    for row, (y_from, y_to) in zip(source.branch, source.branch_to_earth, strict=True):
+        start, end = int(row[0]), int(row[1])
+        if row[10] == 0 or start not in labels or end not in labels:
+            continue
+        name = f"line_{labels[start]}_{labels[end]}"
+        seen[name] += 1
+        tap = float(row[8]) or 1.0
+        b = max(0.0, 2 * min(y_from.imag, y_to.imag))
+        for bus, rest in ((start, (y_from - 0.5j * b) / tap**2), (end, y_to - 0.5j * b)):
+            to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
+        lines.append(
+            Line(
+                name if seen[name] == 1 else f"{name}_{seen[name]}",
+                bus_of(labels[start]),
+                bus_of(labels[end]),
+                X=float(row[3]) * scale,
+                R=float(row[2]) * scale,
+                B=float(b) / scale,
+                tap=tap,
+                shift=math.radians(float(row[9])),
+            )
+        )
+    return lines, to_earth
+
+
+def _loads(source: SourceTables, rows: dict[int, Matrix]) -> tuple[list[Load], list[str]]:
+    loads, problems = [], []
+    for number, row in rows.items():
+        label, p, q = source.labels[number], float(row[2]), float(row[3])
+        if p < -_NEGLIGIBLE:
+            problems.append(
+                f"the load at bus {label} is {p:g} MW, so that it feeds; make it a generator (a unit) in the source"
+            )
+        elif p > _NEGLIGIBLE or abs(q) > _NEGLIGIBLE:
+            loads.append(Load(f"load_{label}", bus_of(label), max(0.0, p), _clean(q)))
+    return loads, problems
+
+
+def _generation(source: SourceTables, labels: dict[int, str]) -> Iterator[Generation]:
+    """The generators in service, those at one bus summed."""
+    by_bus: dict[int, list[tuple[float, float, float]]] = {}
+    for row in source.gen:
+        if row[7] > 0 and int(row[0]) in labels:
+            p, most = float(row[1]), float(row[8])
+            reactive = max(abs(float(row[3])), abs(float(row[4])))
+            needed = max(abs(p), most) or (reactive if reactive < 1e4 else 0.0)
+            by_bus.setdefault(int(row[0]), []).append((p, float(row[5]), needed / _POWER_FACTOR))
+    for number, members in by_bus.items():
+        rating = round(sum(m[2] for m in members), 1) or SYSTEM_BASE_MVA
+        yield Generation(labels[number], sum(m[0] for m in members), members[0][1], rating)
+
+
+def _clean(value: float) -> float:
+    return 0.0 if abs(value) < _NEGLIGIBLE else float(value)

@@ -1,0 +1,194 @@
+"""Networks of other programs: MATPOWER's case files, and pandapower's networks, both as MATPOWER's tables.
+
+pandapower makes these tables itself for its power flow: switches, three-winding transformers and
+everything out of service are dealt with there.
+"""
+
+import logging
+import re
+import warnings
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.cases.names import close_names
+from orchestrator.errors import InputError
+
+Matrix = NDArray[np.float64]
+_COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
+
+
+@dataclass(frozen=True)
+class SourceTables:
+    """MATPOWER's tables of a network, its columns in MATPOWER's order.
+
+    Attributes
+    ----------
+    branch_to_earth
+        Conductance and susceptance to earth at both ends of every branch [pu]: g + jb behind the ratio at the from
+        side, and at the to side.
+    labels
+        Number of a bus → what people call it.
+    frequency
+        Rated frequency [Hz], where the source knows it.
+    """
+
+    name: str
+    base_mva: float
+    bus: Matrix
+    branch: Matrix
+    gen: Matrix
+    branch_to_earth: NDArray[np.complex128]
+    labels: dict[int, str]
+    frequency: float | None = None
+
+
+def read_matpower(path: Path) -> SourceTables:
+    """Read a MATPOWER case, ``.m`` or ``.mat``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it does not hold MATPOWER's tables.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)")
+    if path.suffix not in (".m", ".mat"):
+        raise InputError(f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}")
+    try:
+        tables = _m_file(path) if path.suffix == ".m" else _mat_file(path)
+    except Exception as error:  # both libraries let all kinds of errors through
+        raise InputError(f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}") from error
+    missing = [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]
+    if missing:
+        raise InputError(f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing")
+    for name, columns in _COLUMNS.items():
+        if (
+            tables[name].ndim != 2
+            or tables[name].shape[1] < columns
+            or not np.isfinite(tables[name][:, :columns]).all()
+        ):
+            raise InputError(f"{path}: mpc.{name} must be a table of numbers with {columns} columns or more")
+    branch = tables["branch"]
+    numbers = tables["bus"][:, 0].astype(int)
+    return SourceTables(
+        path.name, float(tables["baseMVA"]), tables["bus"], branch, tables["gen"],
+        np.repeat(0.5j * branch[:, [4]], 2, axis=1), {int(n): str(n) for n in numbers},
+    )  # fmt: skip
+
+
+def read_pandapower(name: str, directory: Path) -> SourceTables:
+    """Take a network of ``pandapower.networks`` by name, or one saved with ``pandapower.to_json``.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or its own power flow has no solution.
+    """
+    path = directory / name
+    changed = path.stat().st_mtime_ns if name.endswith(".json") and path.is_file() else 0
+    return _solved_pandapower(name, path, changed)
+
+
+@cache
+def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
+    """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
+    import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
+
+    logging.getLogger("pandapower").setLevel(logging.CRITICAL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        net = _pandapower_file(pp, path) if name.endswith(".json") else _pandapower_named(name)
+        try:
+            pp.runpp(net, calculate_voltage_angles=True, numba=False, init="auto", voltage_depend_loads=False)
+        except Exception as error:  # pandapower's checks raise whatever fits
+            raise InputError(f"pandapower network {name!r}: its power flow has no solution: {error}") from error
+    return _pandapower_tables(name, net)
+
+
+def _m_file(path: Path) -> dict[str, Any]:
+    from matpowercaseframes import CaseFrames  # noqa: PLC0415
+
+    frames = CaseFrames(str(path))
+    found = {name: getattr(frames, name, None) for name in ("baseMVA", *_COLUMNS)}
+    return {n: t if n == "baseMVA" or t is None else t.to_numpy(dtype=float) for n, t in found.items()}
+
+
+def _mat_file(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat  # noqa: PLC0415
+
+    mpc = loadmat(str(path), squeeze_me=False, struct_as_record=True).get("mpc")
+    if mpc is None:
+        return {}
+    found = {name: mpc[0, 0][name] for name in ("baseMVA", *_COLUMNS) if name in (mpc.dtype.names or ())}
+    return {n: t.item() if n == "baseMVA" else np.asarray(t, dtype=float) for n, t in found.items()}
+
+
+def _pandapower_named(name: str) -> Any:
+    from pandapower import networks  # noqa: PLC0415
+
+    known = [n for n in dir(networks) if not n.startswith("_") and callable(getattr(networks, n))]
+    if name not in known:
+        hint = close_names(name, known, "give one of pandapower.networks, or the path of a .json file")
+        raise InputError(f"there is no pandapower network {name!r}; {hint}")
+    try:
+        net = getattr(networks, name)()
+    except TypeError as error:
+        raise InputError(f"pandapower.networks.{name} needs arguments; save it with pandapower.to_json") from error
+    if not hasattr(net, "bus"):
+        raise InputError(f"pandapower.networks.{name} is no network; save one with pandapower.to_json")
+    return net
+
+
+def _pandapower_file(pp: Any, path: Path) -> Any:
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})")
+    try:
+        net = pp.from_json(str(path))
+        if not hasattr(net, "bus"):
+            raise ValueError("it holds no network")
+    except Exception as error:  # whatever the decoder raises
+        raise InputError(f"{path}: it is no network saved with pandapower.to_json: {error}") from error
+    return net
+
+
+def _pandapower_tables(name: str, net: Any) -> SourceTables:
+    from pandapower.pypower import idx_brch  # noqa: PLC0415
+
+    ppc = net._ppc
+    branch, columns = ppc["branch"].real, idx_brch
+    unequal = (branch[:, columns.BR_R_ASYM] != 0) | (branch[:, columns.BR_X_ASYM] != 0)
+    numbers = dict(zip(net.bus.index, net._pd2ppc_lookups["bus"][net.bus.index], strict=True))
+    labels = _labels(net, numbers, len(ppc["bus"]))
+    if unequal.any():
+        ends = [" and ".join(labels[int(n)] for n in row) for row in branch[unequal][:, :2]]
+        raise InputError(
+            f"pandapower network {name!r}: an impedance differs by direction between buses {', '.join(ends[:5])}; "
+            "the grid model has the same impedance both ways"
+        )
+    start = branch[:, columns.BR_G] + 1j * branch[:, columns.BR_B]
+    end = start + branch[:, columns.BR_G_ASYM] + 1j * branch[:, columns.BR_B_ASYM]
+    gen = ppc["gen"].real.copy()
+    gen[:, 8] = np.where(gen[:, 8] < 1e6, gen[:, 8], 0.0)  # pandapower's "no limit"
+    for table in (net.ext_grid, net.gen):
+        for bus, most in zip(table.bus, table.get("max_p_mw", [0.0] * len(table)), strict=True):
+            if np.isfinite(most):
+                gen[(gen[:, 0] == numbers[bus]) & (gen[:, 8] == 0), 8] = most
+    to_earth: NDArray[np.complex128] = np.stack([start, end], axis=1).astype(np.complex128) / 2
+    base, frequency = float(ppc["baseMVA"]), float(net.f_hz)
+    return SourceTables(name, base, ppc["bus"].real, branch, gen, to_earth, labels, frequency)
+
+
+def _labels(net: Any, numbers: dict[Any, int], count: int) -> dict[int, str]:
+    """The buses' names where each has one of its own, else their indices; buses that pandapower adds have neither."""
+    named = {index: re.sub(r"\W+", "_", str(name)).strip("_") for index, name in net.bus.name.items()}
+    if len(set(named.values())) < len(named) or not all(named.values()) or net.bus.name.isna().any():
+        named = {index: str(index) for index in net.bus.index}
+    labels: dict[int, str] = {}
+    for index, number in numbers.items():  # several for one where a closed switch joins them: the first counts
+        labels.setdefault(int(number), named[index])
+    return {number: labels.get(number, f"inner_{number}") for number in range(count)}

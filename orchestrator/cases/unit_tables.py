@@ -1,0 +1,170 @@
+"""Generating units of a case: rows of a file or generators of the network's source, shared by two components each."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.csv_rows import Row, optional_number, place_of, rows_of
+from orchestrator.cases.draft import COMMAND_LINE, Draft
+from orchestrator.cases.names import close_names
+from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.network_import import Generation
+from orchestrator.cases.schema import ComponentTable, UnitsTable, Value
+from orchestrator.errors import InputError
+
+UNIT_KINDS = ("sg", "gfor")
+"""Beginnings of the names of a unit's generator and converter."""
+_ALPHA = "units.alpha"
+
+
+@dataclass(frozen=True, slots=True)
+class UnitRow:
+    """One generating unit.
+
+    Attributes
+    ----------
+    label, bus
+        What it is called, and where it is.
+    rating_mva, p_mw, v_pu
+        Rating [MVA], active power [MW] and voltage [pu].
+    alpha
+        The converter's share where the row has its own.
+    parameters
+        Of its generator and its converter, by kind.
+    """
+
+    label: str
+    bus: str
+    rating_mva: float
+    p_mw: float
+    v_pu: float
+    alpha: float | None = None
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def sets_alpha(key: str) -> bool:
+    """Whether a key sets a converter's share: ``units.alpha`` all, ``units.alpha.<label>`` one."""
+    return key == _ALPHA or key.startswith(f"{_ALPHA}.")
+
+
+def unit_components(draft: Draft) -> dict[str, ComponentTable]:
+    """Generators ``sg<label>`` and converters ``gfor<label>``, 1 − α to α of each unit; a share of 0 has none.
+
+    All names that a share may give go to the draft's known ones.
+    """
+    table = draft.case.units
+    if table is None:
+        return {}
+    generation = draft.data.generation if draft.data else {}
+    try:
+        rows = unit_rows(table, draft.directory, generation)
+    except InputError as error:
+        draft.note(draft.place("units", "file") if table.file else draft.place("units"), str(error))
+        return {}
+    draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
+    alphas = _alphas(draft, table, rows)
+    models = ((table.generator, table.generator_parameters), (table.converter, table.converter_parameters))
+    components = {}
+    for kind, (model, common) in zip(UNIT_KINDS, models, strict=True):
+        for row in rows:
+            share = alphas[row.label] if kind == "gfor" else 1 - alphas[row.label]
+            if share > 0:
+                own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
+                values = {**common, **row.parameters.get(kind, {}), **own}
+                components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=values)
+    return components
+
+
+def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Generation]) -> list[UnitRow]:
+    """The units of a units table; what its file leaves out comes from the network's source.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or wrong, or neither it nor the source gives a figure that is needed.
+    """
+    if table.file is None:
+        if not generation:
+            raise InputError(
+                "the key 'file' is missing; without it the units are the generators of the [network] source, "
+                "which is not given or has none"
+            )
+        rows = [UnitRow(g.label, bus, g.rating_mva, g.p_mw, g.v_pu) for bus, g in generation.items()]
+        return [_checked(row, "the network's source") for row in rows]
+    rows = []
+    for entry in rows_of(directory / table.file, ("bus",)):
+        bus = bus_name(entry["bus"])
+        given = generation.get(bus)
+        figures = {column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")}
+        missing = [column for column, value in figures.items() if value is None]
+        if missing:
+            raise InputError(
+                f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
+                "take the network from a source with a generator at this bus"
+            )
+        alpha = optional_number(entry, "alpha")
+        if alpha is not None and not 0 <= alpha <= 1:
+            raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
+        own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
+        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own)  # type: ignore[arg-type]
+        rows.append(_checked(unit, place_of(entry)))
+    repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
+    if repeated:
+        raise InputError(f"{directory / table.file}: bus {', '.join(repeated)} has more than one row; merge its units")
+    return rows
+
+
+def _figure(entry: Row, column: str, given: Generation | None) -> float | None:
+    """The file's figure, else the source's."""
+    value = optional_number(entry, column)
+    return getattr(given, column, None) if value is None else value
+
+
+def _checked(row: UnitRow, place: str) -> UnitRow:
+    if not row.rating_mva > 0:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"
+        )
+    if abs(row.p_mw) > row.rating_mva:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} feeds {row.p_mw:g} MW, more than its rating of "
+            f"{row.rating_mva:g} MVA; raise the rating or lower p_mw"
+        )
+    return row
+
+
+def _parameters(entry: Row, kind: str) -> dict[str, Any]:
+    """Columns such as ``sg.machine.H`` that this row fills: a number, a truth value or text with a unit."""
+    values: dict[str, Any] = {}
+    for column, text in entry.items():
+        if column.startswith(f"{kind}.") and (text or "").strip():
+            name, plain = column.removeprefix(f"{kind}."), text.strip()
+            values[name] = {"true": True, "false": False}.get(plain.lower(), plain)
+    return values
+
+
+def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:
+    """Every unit's share: the command line's, else the scenario's, else the row's, else the table's.
+
+    Within the first two, a key for this unit goes before the one for all.
+    """
+    alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
+    for values, where in ((draft.scenario.set, draft.set_place), (draft.overrides, COMMAND_LINE)):
+        for key in sorted((k for k in values if sets_alpha(k)), key=lambda k: k != _ALPHA):
+            label = key.removeprefix(_ALPHA).removeprefix(".")
+            if label and label not in alphas:
+                hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+                draft.note(f"{where} {key}", f"there is no unit {label!r}; {hint}")
+                continue
+            share = _share(draft, values[key], f"{where} {key}")
+            if share is not None:
+                alphas |= {label: share} if label else dict.fromkeys(alphas, share)
+    return alphas
+
+
+def _share(draft: Draft, value: Value, where: str) -> float | None:
+    if isinstance(value, bool | str) or not 0 <= value <= 1:
+        draft.note(where, f"alpha = {value!r}; it must be a number from 0 to 1")
+        return None
+    return float(value)
