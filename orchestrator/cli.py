@@ -23,7 +23,9 @@ from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.report import tables
+from orchestrator.report.linear_model_files import save_linear_model
 from orchestrator.report.study_files import save_modes, save_run, save_study, summary_of
+from orchestrator.study.linear import default_inputs, default_outputs, linear_model
 from orchestrator.study.modes import ModesResult, compute_modes, modes_json
 from orchestrator.study.run import RunResult, run_scenario
 
@@ -33,6 +35,7 @@ examples:
   gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
+  gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -74,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     _case_arguments(run)
     run.add_argument("--stop", type=_seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    run.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     run.add_argument("--json", action="store_true", help="print the summary as JSON")
     run.set_defaults(command=_run)
 
@@ -97,6 +101,24 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
+
+    linearize = commands.add_parser("linearize", help="write a scenario's linear model A, B, C, D for other tools")
+    _case_arguments(linearize)
+    linearize.add_argument(
+        "--input",
+        action="append",
+        metavar="COMPONENT.VARIABLE",
+        help="tunable parameter or open input (repeatable; default: what the scenario's events change)",
+    )
+    linearize.add_argument(
+        "--output",
+        action="append",
+        metavar="COMPONENT.VARIABLE",
+        help="observed output (repeatable; default: what the case plots)",
+    )
+    linearize.add_argument("--continuous", action="store_true", help="ẋ = A·x + B·u instead of the step map")
+    linearize.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
+    linearize.set_defaults(command=_linearize)
 
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
@@ -212,6 +234,20 @@ def _modes(options: argparse.Namespace) -> int:
     return 0
 
 
+def _linearize(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    folder = _folder(options.out or Path("results") / f"{case.name}_linear")
+    for prepared in scenarios:
+        inputs = options.input or default_inputs(prepared)
+        outputs = options.output or default_outputs(case, prepared)
+        model, point = linear_model(prepared, inputs, outputs, as_continuous=options.continuous)
+        paths = save_linear_model(model, point, case, prepared, folder / prepared.name)
+        size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+        kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
+        print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
+    return 0
+
+
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
     folder = _folder(options.out or Path("results") / case.name)
@@ -224,7 +260,7 @@ def _run(options: argparse.Namespace) -> int:
             def report(done: int, total: int, task: Any = task) -> None:
                 bar.update(task, completed=done, total=total)
 
-            result = run_scenario(case, prepared, observers=[Progress(report)])
+            result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
             results.append(result)
             save_run(result, folder)
             _print_warnings([result.modes])
@@ -272,6 +308,8 @@ def _print_run(console: Console, case: Case, results: Sequence[RunResult]) -> No
         console.print("", tables.ring_downs(results))
     if any(r.shifts for r in results):
         console.print("", tables.mode_shifts(results))
+    if any(r.linear is not None for r in results):
+        console.print("", tables.linear_differences(case, results))
     console.print("", tables.run_statistics(results), "")
 
 

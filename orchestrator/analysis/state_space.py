@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
+import scipy.linalg
 
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.linearization import Blocks, compose, continuous
@@ -42,23 +42,36 @@ class StateSpace:
         change
             Size of the step of every input, shape (m,).
         times
-            [s], shape (k,), rising from 0 in equal distances; of a step map, multiples of its step.
+            [s], shape (k,), not before 0 and in equal distances; of a step map, multiples of its step.
 
         Returns
         -------
         Deviations of the outputs, shape (k, p).
         """
-        u = np.tile(np.asarray(change, dtype=float), (len(times), 1))
-        if self.step_size is None:
-            _, y, _ = scipy.signal.lsim((self.A, self.B, self.C, self.D), u, times, interp=False)
-            return np.asarray(y, dtype=float).reshape(len(times), -1)
-        every = round((times[1] - times[0]) / self.step_size) if len(times) > 1 else 1
-        A, B = _over(self.A, self.B, every)
-        x, rows = np.zeros(len(A)), []
-        for row in u:
-            rows.append(self.C @ x + self.D @ row)
-            x = A @ x + B @ row
+        u = np.asarray(change, dtype=float)
+        distance = times[1] - times[0] if len(times) > 1 else 0.0
+        A, B = self._over(distance)
+        x, rows = self._over(times[0])[1] @ u, []
+        for _ in times:
+            rows.append(self.C @ x + self.D @ u)
+            x = A @ x + B @ u
         return np.array(rows)
+
+    def _over(self, duration: float) -> tuple[Matrix, Matrix]:
+        """The map over a time [s] with the input held."""
+        if self.step_size is None:
+            n, m = self.B.shape
+            whole = scipy.linalg.expm(duration * np.block([[self.A, self.B], [np.zeros((m, n + m))]]))
+            return whole[:n, :n], whole[:n, n:]
+        steps = round(duration / self.step_size)
+        A, B = self.A, self.B
+        A_all, B_all = np.eye(len(A)), np.zeros_like(B)
+        while steps:  # by squaring, so that many steps cost little more than one
+            if steps & 1:
+                A_all, B_all = A @ A_all, A @ B_all + B
+            A, B = A @ A, A @ B + B
+            steps >>= 1
+        return A_all, B_all
 
 
 def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
@@ -85,14 +98,3 @@ def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
         C[rows, windows[name]] += c.C_o
         D[rows] = c.D_o @ by_input[w]
     return StateSpace(model.A, model.G @ by_input, C, D, model.names, blocks.inputs, blocks.outputs, model.step_size)
-
-
-def _over(A: Matrix, B: Matrix, steps: int) -> tuple[Matrix, Matrix]:
-    """Several steps with the input held as one: by squaring, so that many cost little more than one."""
-    A_all, B_all = np.eye(len(A)), np.zeros_like(B)
-    while steps:
-        if steps & 1:
-            A_all, B_all = A @ A_all, A @ B_all + B
-        A, B = A @ A, A @ B + B
-        steps >>= 1
-    return A_all, B_all

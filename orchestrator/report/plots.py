@@ -46,9 +46,13 @@ def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -
                         color=colour(index),
                         label=result.modes.prepared.title,
                     )
+                follows = signal(result.linear, panel.signal) if result.linear is not None else None
+                if follows is not None:
+                    axis.plot(follows["time"], panel.scale * follows, color="black", linewidth=0.8, linestyle="--")
             axis.set_ylabel(panel.label)
             axis.margins(x=0)
-        axes[0].set_title(table.title, loc="left")
+        dashed = "; dashed: linear model" if any(r.linear is not None for r in results) else ""
+        axes[0].set_title(f"{table.title}{dashed}", loc="left")
         axes[-1].set_xlabel("Time [s]")
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))

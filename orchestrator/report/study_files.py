@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.cases.case import Case
 from orchestrator.report.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.report.plots import plot_signals
+from orchestrator.report.signals import relative_difference
 from orchestrator.report.storage import save_dataset, save_json, save_table
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ def save_run(result: "RunResult", folder: Path) -> None:
     """Write one scenario's trajectory and modes, as soon as they are there."""
     scenario = folder / result.modes.prepared.name
     save_dataset(result.dataset, scenario / "trajectory")
+    if result.linear is not None:
+        result.linear.assign_attrs(result.dataset.attrs).to_netcdf(scenario / "linear.nc", engine="scipy")
     save_table(_mode_rows([result.modes]), scenario / "modes.csv")
 
 
@@ -150,9 +153,17 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
         "ring_down": _mode_summary(seen),
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,
+        "linear_difference": _linear_differences(result),
         "warnings": list(modes.warnings),
         "failure": str(result.failure) if result.failure else None,
     }
+
+
+def _linear_differences(result: "RunResult") -> dict[str, float] | None:
+    """Of every recorded signal, as a share of its largest deviation."""
+    if result.linear is None:
+        return None
+    return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}
 
 
 def _mode_summary(mode: Any) -> dict[str, float] | None:

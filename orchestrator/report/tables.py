@@ -1,11 +1,14 @@
 """Tables for a terminal, with rich."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
+from orchestrator.cases.case import Case
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.report.signals import relative_difference, signal
 
 if TYPE_CHECKING:
     from orchestrator.study.modes import ModesResult
@@ -127,6 +130,22 @@ def ring_downs(results: Sequence["RunResult"]) -> Table:
                 f"{seen.damping_percent:.2f}",
                 f"{mode.damping_percent:.2f}",
             )
+    return table
+
+
+def linear_differences(case: Case, results: Sequence["RunResult"]) -> Table:
+    """Largest difference between the linear model's response and the simulated one, signal by signal."""
+    signals = dict.fromkeys(panel.signal for plot in case.table.plots for panel in plot.panels)
+    table = _table("Linear model against the simulation: largest difference, of the largest deviation",
+                   "Scenario", *signals)  # fmt: skip
+    for r in results:
+        if r.linear is not None:
+            cells = []
+            for expression in signals:
+                seen, follows = signal(r.dataset, expression), signal(r.linear, expression)
+                share = math.nan if seen is None or follows is None else relative_difference(seen, follows)
+                cells.append("–" if math.isnan(share) else f"{share:.2%}")
+            table.add_row(r.modes.prepared.title, *cells)
     return table
 
 

@@ -19,6 +19,7 @@ from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
+from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running
 
 STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
@@ -49,6 +50,8 @@ class RunResult:
         What was recorded, up to the failure if there was one.
     ring_down
         The electromechanical mode as identified from the response.
+    linear
+        The linear model's response to the same events, where it was asked for.
     failure
         The error that ended the run before its time.
     """
@@ -58,6 +61,7 @@ class RunResult:
     statistics: StepStatistics | None = None
     ring_down: IdentifiedMode | None = None
     shifts: list[ModeShift] = field(default_factory=list)
+    linear: xr.Dataset | None = None
     failure: CosimError | None = None
 
 
@@ -66,8 +70,10 @@ def run_scenario(
     prepared: PreparedScenario,
     frequency_range: tuple[float, float] = (0.1, 2.0),
     observers: Sequence[Observer] = (),
+    *,
+    linear: bool = False,
 ) -> RunResult:
-    """Compute the modes of a scenario and its response to the case's events.
+    """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
     A component that fails in the middle ends the run; what was recorded until then is in the result.
     """
@@ -76,13 +82,14 @@ def run_scenario(
     with running(prepared) as master:
         modes = modes_of(case, prepared, master, frequency_range)
         shifts = _shifts(master, modes.electromechanical)
+        follows = linear_response(master, prepared) if linear else None
         try:
             statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
         except CosimError as error:
             failure = error
     dataset = trajectory_dataset(recorder, case, prepared)
     ring_down = None if failure else _ring_down(case, modes, dataset)
-    return RunResult(modes, dataset, statistics, ring_down, shifts, failure)
+    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure)
 
 
 def run_study(

@@ -1,0 +1,111 @@
+"""The linear model of a scenario: exported for other tools, and laid over the simulated response."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.state_space import StateSpace, state_space
+from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.master import Master
+from orchestrator.errors import InputError
+from orchestrator.report.signals import variables_of
+from orchestrator.study.modes import running
+
+
+def default_inputs(prepared: PreparedScenario) -> list[str]:
+    """What the scenario's events change, as far as a linear model can be driven by it."""
+    changed = [
+        f"{component}.{variable}"
+        for event in prepared.events
+        for component, settings in event.changes().items()
+        for variable, value in settings.items()
+        if not isinstance(value, bool)
+    ]
+    return list(dict.fromkeys(changed))
+
+
+def default_outputs(case: Case, prepared: PreparedScenario) -> list[str]:
+    """What the case plots or reads a ring-down from, as far as the scenario has it."""
+    expressions = [panel.signal for plot in case.table.plots for panel in plot.panels]
+    if case.table.analysis.ring_down:
+        expressions.append(case.table.analysis.ring_down.signal)
+    names = dict.fromkeys(name for expression in expressions for name in variables_of(expression))
+    return [name for name in names if _is_output(prepared, name)]
+
+
+def _is_output(prepared: PreparedScenario, name: str) -> bool:
+    component, _, variable = name.partition(".")
+    plan = prepared.system.components.get(component)
+    return plan is not None and variable in plan.description.outputs
+
+
+def linear_model(
+    prepared: PreparedScenario, inputs: Sequence[str], outputs: Sequence[str], *, as_continuous: bool = False
+) -> tuple[StateSpace, OperatingPoint]:
+    """The scenario's linear model around its steady state, as step map or continuous.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable, or an input is none that can be perturbed.
+    AnalysisError
+        If no steady state is found, or for a continuous model a component gives no derivatives.
+    """
+    with running(prepared) as master:
+        point = find_operating_point(master)
+        blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=as_continuous)
+        return state_space(blocks, None if as_continuous else master.schedule), point
+
+
+def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
+    """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals.
+
+    Parameters
+    ----------
+    master
+        At the operating point; it is left as it was.
+
+    Raises
+    ------
+    InputError
+        If an event switches something, or there is none: a linear model has no answer to that.
+    """
+    switching = [
+        str(event)
+        for event in prepared.events
+        for settings in event.changes().values()
+        if any(isinstance(value, bool) for value in settings.values())
+    ]
+    if switching:
+        raise InputError(f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out")
+    inputs = default_inputs(prepared)
+    if not inputs:
+        raise InputError(f"scenario {prepared.name!r} has no event that a linear model could answer to")
+    model = state_space(Blocks(master, inputs=inputs, outputs=prepared.record), master.schedule)
+    distance = prepared.record_every * prepared.step_size
+    count = 1 + int(np.floor(prepared.stop_time / distance + 1e-9))
+    times: Matrix = prepared.record_every * np.arange(count, dtype=np.float64) * prepared.step_size
+    before = {name: _value(master, name) for name in inputs}
+    total = np.array([_value(master, name) for name in prepared.record]) * np.ones((count, 1))
+    for event in sorted(prepared.events, key=lambda e: e.time):
+        change = np.zeros(len(inputs))
+        for component, settings in event.changes().items():
+            for variable, value in settings.items():
+                name = f"{component}.{variable}"
+                change[inputs.index(name)] = float(value) - before[name]
+                before[name] = float(value)
+        after = times > event.time + prepared.step_size / 2  # what is recorded at the event's time is from before it
+        if after.any():
+            total[after] += model.step_response(change, times[after] - event.time)
+    data = {name: ("time", total[:, k]) for k, name in enumerate(prepared.record)}
+    return xr.Dataset(data, coords={"time": ("time", times, {"units": "s", "long_name": "Time"})})
+
+
+def _value(master: Master, name: str) -> float:
+    component, _, variable = name.partition(".")
+    return master.components[component].get([variable])[variable]
