@@ -177,7 +177,9 @@ def test_a_mistake_in_the_source(case, old, new, words):
 
 
 def test_units_without_a_file_need_a_source(case):
-    text = CASE.replace('file = "units.csv"\n', "").replace("matpower", "lines_file")
+    text = CASE.replace('file = "units.csv"\n', "").replace(
+        'matpower = "small.m"', 'lines.l = { from = "a", to = "b", X = 1 }'
+    )
     assert any(
         "the key 'file' is missing; without it the units" in problem for problem in problems(case(text), ["plain"])
     )
