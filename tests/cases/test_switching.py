@@ -2,6 +2,9 @@
 
 import pytest
 
+from fmus.toolchain.frames import current_of_power, polar
+from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.python_fmu import cached
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.events import LineSwitching, LoadSwitching, UnitSwitching
@@ -105,9 +108,29 @@ def test_a_unit_trips_on_both_sides_and_returns(prepared):
     assert off["vsc.omega"] == pytest.approx(1.03, abs=2e-3)  # droop at no load
 
 
-def test_a_foreign_unit_without_a_breaker_of_its_own_is_opened_on_the_grids_side():
-    event = UnitSwitching(0.1, "grid", "vendor", False, has_breaker=False)
-    assert event.changes() == {"grid": {"vendor.connected": False}}
+def vendor_fmu():
+    """A current source with the power flow's start values and no breaker."""
+    m = ModelBuilder("vendor", "Constant current, as another tool might export it")
+    S_n = m.parameter("S_n", 100.0, "MVA", "Rating")
+    values = {"P_0": ("pu", 0.5), "Q_0": ("pu", 0.0), "v_0": ("pu", 1.01), "theta_0": ("rad", 0.0)}
+    p, q, v, theta = (m.parameter(n, x, unit, n, base="S_n" * (unit == "pu")) for n, (unit, x) in values.items())
+    for part in ("re", "im"):
+        m.input(f"v_{part}", "pu", "Bus voltage", base="bus")
+    i = current_of_power(p, q, polar(v, theta)) * (S_n / 100)
+    m.output("i_re", i.re, "pu", "Current", base="100 MVA")
+    m.output("i_im", i.im, "pu", "Current", base="100 MVA")
+    return cached(m.build())
+
+
+def test_a_foreign_unit_without_a_breaker_of_its_own_is_opened_on_the_grids_side(prepared):
+    base = RING.replace('model = "gfor"', f"fmu = '{vendor_fmu()}'")
+    ready = prepared(EVENT + 'type = "unit_trip"\nunit = "vsc"\n', None, base)
+    (event,) = ready.events
+    assert event.changes() == {"grid": {"vsc.connected": False}}
+    before, after = watch(ready, ["grid.vsc.p", "vsc.i_re"], [0.1, 0.102])
+    assert before["grid.vsc.p"] == pytest.approx(3, abs=1e-6)
+    assert after["grid.vsc.p"] == 0
+    assert after["vsc.i_re"] == before["vsc.i_re"]  # it does not know
 
 
 @pytest.mark.parametrize("opened", ["grid.l23.connected", "grid.l31.connected", "grid.vsc.connected", "vsc.connected"])

@@ -124,6 +124,12 @@ def test_a_share_that_cannot_be(case, overrides, words):
     assert problems(case(), ["plain"], overrides) == [words]
 
 
+def test_a_line_named_from_its_other_end_is_recognised(case):
+    words = "has no variable 'line_20_12.connected'; did you mean line_12_20.connected?"
+    (problem,) = problems(case(), ["plain"], {"grid.line_20_12.connected": False})
+    assert words in problem
+
+
 @pytest.mark.parametrize(
     ("units", "words"),
     [
