@@ -159,10 +159,12 @@ class Network:
             yield f"stray_B = {self.stray_B:g} pu; it must not be negative"
 
     def _floating_buses(self) -> Iterable[str]:
-        for bus in self.buses:
-            if not self.has_capacitance(bus) and not self._has_conductance(bus):
-                yield (
-                    f"bus {bus!r} has neither a load with P > 0 nor line charging, so its voltage is not determined; "
-                    "add a load, or B to one of its lines, or give the network a small capacitance for such buses: "
-                    "stray_B = 0.01"
-                )
+        floating = [b for b in self.buses if not self.has_capacitance(b) and not self._has_conductance(b)]
+        if floating:
+            named = ", ".join(map(repr, floating[:10])) + (", …" if len(floating) > 10 else "")
+            many = len(floating) > 1
+            yield (
+                f"bus{'es' if many else ''} {named} {'have' if many else 'has'} neither a load with P > 0 nor line "
+                f"charging, so {'their' if many else 'its'} voltage is not determined; add a load, or B to a line "
+                "there, or give the network a small capacitance for such buses: stray_B = 0.05"
+            )

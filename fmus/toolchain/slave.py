@@ -170,6 +170,9 @@ class Slave(Fmi2Slave):
         if self._phase < STEPPING and self._parameters_changed:
             self._kernel.initialise(self._address)
             self._parameters_changed = False
+        elif self._phase == STEPPING and self._parameters_changed:
+            self._check_requirements()  # before partners see what follows from values that cannot be used
+            self._parameters_changed = False
         self._kernel.outputs(self._address)
         self._outputs_stale = False
 

@@ -48,10 +48,18 @@ class Draft:
     known: set[str] = field(default_factory=set)
     tables: dict[str, ComponentTable] = field(default_factory=dict)
     system: System = field(default_factory=System)
+    network_failed: bool = False
 
     def note(self, place: str, text: str) -> None:
-        """Add a problem."""
-        self.problems.append(Problem(place, text))
+        """Add a problem, once."""
+        problem = Problem(place, text)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def note_network(self, place: str, text: str) -> None:
+        """Add a problem that leaves no network, so that what follows from its lack is not noted as well."""
+        self.network_failed = True
+        self.note(place, text)
 
     @property
     def grid(self) -> str | None:

@@ -1,10 +1,17 @@
 """Names that somebody may have meant."""
 
 import difflib
+import re
 from collections.abc import Iterable
 
 
 def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
-    """A hint at names that look like the wanted one."""
-    close = difflib.get_close_matches(wanted, list(known), n=3, cutoff=0.5)
+    """A hint at names of the same parts (``line_5_4`` for ``line_4_5``), else at ones that look alike."""
+    names = list(known)
+    close = [name for name in names if _parts(name) == _parts(wanted)]
+    close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else otherwise
+
+
+def _parts(name: str) -> list[str]:
+    return sorted(re.split(r"[_.]", name))

@@ -2,7 +2,6 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from fmus.grid.network import SYSTEM_BASE_MVA, Line, Load, Shunt
@@ -12,6 +11,7 @@ from orchestrator.errors import InputError
 _REFERENCE, _OUT = 3, 4
 _POWER_FACTOR = 0.9
 _NEGLIGIBLE = 1e-9
+_NO_LIMIT = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +19,15 @@ class Generation:
     """What the generators at a bus feed [MW] and hold [pu] together, and a rating that suits them [MVA]."""
 
     label: str
+    p_mw: float
+    v_pu: float
+    rating_mva: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Member:
+    """One generator: what it feeds [MW], holds [pu] and is rated [MVA]."""
+
     p_mw: float
     v_pu: float
     rating_mva: float
@@ -48,7 +57,8 @@ def import_network(source: SourceTables) -> ImportedNetwork:
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
     lines, to_earth = _lines(source, labels)
-    loads, problems = _loads(source, rows)
+    at_bus = _generators(source, labels)
+    loads, problems = _loads(source, rows, at_bus)
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
     shunts = [
@@ -59,14 +69,15 @@ def import_network(source: SourceTables) -> ImportedNetwork:
     problems += [f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
                  for s in shunts if s.g_mw < 0]  # fmt: skip
     if problems:
-        raise InputError(f"{source.name}: {'; '.join(problems)}; the grid model has no such element, change the source")
+        more = f" and {len(problems) - 5} more like these" if len(problems) > 5 else ""
+        raise InputError(f"{source.name}: {'; '.join(problems[:5])}{more}; the grid model has no such element")
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
     return ImportedNetwork(
         tuple(bus_of(label) for label in labels.values()),
         tuple(lines),
         tuple(loads),
         tuple(shunts),
-        {bus_of(g.label): g for g in _generation(source, labels)},
+        {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
         bus_of(labels[reference[0]]) if reference else None,
         source.frequency,
     )
@@ -112,31 +123,37 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
     return lines, to_earth
 
 
-def _loads(source: SourceTables, rows: dict[int, Matrix]) -> tuple[list[Load], list[str]]:
+def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[_Member]]:
+    """By bus, the generators in service."""
+    at_bus: dict[int, list[_Member]] = {}
+    for row in source.gen:
+        if row[7] > 0 and int(row[0]) in labels:
+            p, most = float(row[1]), float(row[8])
+            reactive = max(abs(float(row[3])), abs(float(row[4])))
+            needed = max(abs(p), most) or (reactive if reactive < _NO_LIMIT else 0.0)
+            at_bus.setdefault(int(row[0]), []).append(_Member(p, float(row[5]), needed / _POWER_FACTOR))
+    return at_bus
+
+
+def _loads(
+    source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]
+) -> tuple[list[Load], list[str]]:
+    """Loads, and what is wrong with them. What feeds at a generator's bus joins the generators there."""
     loads, problems = [], []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])
-        if p < -_NEGLIGIBLE:
-            problems.append(
-                f"the load at bus {label} is {p:g} MW, so that it feeds; make it a generator (a unit) in the source"
-            )
+        if p < -_NEGLIGIBLE and number in at_bus:
+            at_bus[number].append(_Member(-p, at_bus[number][0].v_pu, -p / _POWER_FACTOR))
+        elif p < -_NEGLIGIBLE:
+            problems.append(f"the load at bus {label} is {p:g} MW, so that it feeds; make it a generator in the source")
         elif p > _NEGLIGIBLE or abs(q) > _NEGLIGIBLE:
             loads.append(Load(f"load_{label}", bus_of(label), max(0.0, p), _clean(q)))
     return loads, problems
 
 
-def _generation(source: SourceTables, labels: dict[int, str]) -> Iterator[Generation]:
-    """The generators in service, those at one bus summed."""
-    by_bus: dict[int, list[tuple[float, float, float]]] = {}
-    for row in source.gen:
-        if row[7] > 0 and int(row[0]) in labels:
-            p, most = float(row[1]), float(row[8])
-            reactive = max(abs(float(row[3])), abs(float(row[4])))
-            needed = max(abs(p), most) or (reactive if reactive < 1e4 else 0.0)
-            by_bus.setdefault(int(row[0]), []).append((p, float(row[5]), needed / _POWER_FACTOR))
-    for number, members in by_bus.items():
-        rating = round(sum(m[2] for m in members), 1) or SYSTEM_BASE_MVA
-        yield Generation(labels[number], sum(m[0] for m in members), members[0][1], rating)
+def _generation(label: str, members: list[_Member]) -> Generation:
+    rating = round(sum(m.rating_mva for m in members), 1) or SYSTEM_BASE_MVA
+    return Generation(label, sum(m.p_mw for m in members), members[0].v_pu, rating)
 
 
 def _clean(value: float) -> float:

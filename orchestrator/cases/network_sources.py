@@ -184,8 +184,10 @@ def _pandapower_tables(name: str, net: Any) -> SourceTables:
 
 
 def _labels(net: Any, numbers: dict[Any, int], count: int) -> dict[int, str]:
-    """The buses' names where each has one of its own, else their indices; buses that pandapower adds have neither."""
+    """The buses' names where each has one of its own (``Bus 7``: 7), else their indices; inner buses have neither."""
     named = {index: re.sub(r"\W+", "_", str(name)).strip("_") for index, name in net.bus.name.items()}
+    short = {index: re.sub(r"^bus_*(?=\w)", "", name, flags=re.IGNORECASE) for index, name in named.items()}
+    named = short if len(set(short.values())) == len(set(named.values())) else named
     if len(set(named.values())) < len(named) or not all(named.values()) or net.bus.name.isna().any():
         named = {index: str(index) for index in net.bus.index}
     labels: dict[int, str] = {}

@@ -122,13 +122,14 @@ class Preparer:
         if table is None:
             return
         if table.matpower is not None and table.pandapower is not None:
-            self.draft.note(self.draft.place("network"), "give either 'matpower' or 'pandapower', not both")
+            self.draft.note_network(self.draft.place("network"), "give either 'matpower' or 'pandapower', not both")
             return
         source = next((key for key in ("matpower", "pandapower") if getattr(table, key) is not None), None)
         try:
             self.draft.data = network_data(table, self.draft.directory)
         except InputError as error:
-            self.draft.note(self.draft.place("network", source) if source else self.draft.place("network"), str(error))
+            where = self.draft.place("network", source) if source else self.draft.place("network")
+            self.draft.note_network(where, str(error))
 
     def _find_network(self) -> None:
         """The network behind the grid component: the model's own, or the file's table."""
@@ -147,7 +148,7 @@ class Preparer:
         draft, data = self.draft, self.draft.data
         if data is None:
             if draft.case.network is None:
-                draft.note(
+                draft.note_network(
                     draft.place("power_flow", "grid"),
                     "the model 'grid' needs a [network] table with buses, lines and loads",
                 )
@@ -155,7 +156,7 @@ class Preparer:
         held = {table.bus for table in self._everything.values()}
         idle = [bus for bus in data.generation if bus not in held]
         if idle:
-            draft.note(
+            draft.note_network(
                 draft.place("network"),
                 f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; "
                 "add a row to the units' file, or a component with this bus",
@@ -166,11 +167,13 @@ class Preparer:
         try:
             return Network(name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
         except ValueError as error:
-            draft.note(draft.place("network"), str(error))
+            draft.note_network(draft.place("network"), str(error))
             return None
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
         where = self.draft.place("components", name)
+        if table.model == "grid" and self.draft.network_failed:
+            return
         if (table.model is None) == (table.fmu is None):
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
             return
@@ -238,6 +241,8 @@ class Preparer:
     def _schedule(self) -> Schedule:
         """The case's schedule, checked against its components."""
         schedule = self._chosen_schedule()
+        if self.draft.network_failed:
+            return schedule
         try:
             schedule.check(set(self.draft.system.components))
         except InputError as error:

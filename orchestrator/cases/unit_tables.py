@@ -54,12 +54,14 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     All names that a share may give go to the draft's known ones.
     """
     table = draft.case.units
-    if table is None:
+    if table is None or (draft.network_failed and table.file is None):
         return {}
     generation = draft.data.generation if draft.data else {}
     try:
         rows = unit_rows(table, draft.directory, generation)
     except InputError as error:
+        if draft.network_failed:
+            return {}  # what the source would have given is missing
         draft.note(draft.place("units", "file") if table.file else draft.place("units"), str(error))
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}

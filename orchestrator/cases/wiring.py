@@ -24,6 +24,8 @@ def check_inputs(draft: Draft) -> None:
                 f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other",
             )
     for endpoint in draft.system.unconnected_inputs():
+        if draft.network_failed and draft.tables[endpoint.component].bus is not None:
+            continue
         draft.note(
             draft.place("components", endpoint.component),
             f"scenario {draft.name!r}: nothing feeds the input {endpoint}; "
@@ -33,6 +35,8 @@ def check_inputs(draft: Draft) -> None:
 
 def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
     where = draft.place("components", name, "bus")
+    if draft.network_failed:
+        return
     if draft.grid is None or draft.network is None:
         draft.note(
             where,

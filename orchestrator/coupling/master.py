@@ -219,7 +219,7 @@ class Master:
             for name, settings in event.changes().items():
                 self.components[name].set(settings)
             for name in event.changes():
-                self.exchanges[name].outputs.read()
+                self.components[name].read(self.exchanges[name].outputs)
 
     def _statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
         names = [name for group in self.schedule.groups for name in group]

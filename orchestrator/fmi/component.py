@@ -255,6 +255,10 @@ class Component:
                 raise InputError(f"component {self.name!r}: {name} = {value:g}; it must be a whole number")
             self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
 
+    def read(self, batch: RealBatch) -> None:
+        """Read a batch, and take the FMU at its log's word: after new parameters it may have to refuse."""
+        self._call("fmi2GetReal", batch.read)
+
     def get(self, names: Iterable[str]) -> dict[str, float]:
         """Read Real variables by name."""
         batch = RealBatch(self, tuple(names))

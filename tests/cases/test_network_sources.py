@@ -73,7 +73,7 @@ def compare(flow, wanted):
         assert cmath.phase(v * cmath.exp(1j * turn) / wanted[bus]) == pytest.approx(0, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["case39", "case14", "case118"])
+@pytest.mark.parametrize("name", ["case39", "case14", "case118", "case24_ieee_rts"])
 def test_a_pandapower_network_has_pandapowers_voltages(name, tmp_path):
     data = network_data(NetworkTable(pandapower=name), tmp_path)
     net = getattr(networks, name)()
@@ -172,7 +172,7 @@ def as_pandapower():
         ({"matpower": "script.m"}, "script.m: it (is not|cannot be read as) a MATPOWER case"),
         ({"matpower": "broken.mat"}, "broken.mat: it cannot be read as a MATPOWER case"),
         ({"matpower": "short.m"}, r"short.m: mpc.branch must be a table of numbers with 11 columns or more"),
-        ({"matpower": "feeding.m"}, "feeding.m: the load at bus 20 is -50 MW, so that it feeds; make it a generator"),
+        ({"matpower": "feeding.m"}, "feeding.m: the load at bus 12 is -50 MW, so that it feeds; make it a generator"),
         ({"pandapower": "case93"}, "there is no pandapower network 'case93'; did you mean case9 or"),
         ({"pandapower": "quite_different"}, "'quite_different'; give one of pandapower.networks, or the path"),
         ({"pandapower": "none.json"}, r"none.json: there is no such file; save a network with pandapower.to_json"),
@@ -184,7 +184,7 @@ def test_a_source_that_cannot_be_used(table, words, tmp_path):
     (tmp_path / "script.m").write_text("x = 3;\ndisp(x)\n")
     (tmp_path / "broken.mat").write_bytes(b"no matrices here")
     (tmp_path / "text.json").write_text("[1, 2")
-    (tmp_path / "feeding.m").write_text(SMALL.replace("20  2   50 ", "20  2   -50 "))
+    (tmp_path / "feeding.m").write_text(SMALL.replace("12  1   90 ", "12  1   -50 "))
     head, _, tail = SMALL.partition("mpc.branch")
     short = "\n".join(
         " ".join(line.split()[:7]) + ";" if line.startswith("    ") else line for line in tail.splitlines()

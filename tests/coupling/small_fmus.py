@@ -50,6 +50,16 @@ def gain() -> Model:
     return m.build()
 
 
+def guarded_gain() -> Model:
+    """y = u/K at once, usable where K > 0."""
+    m = ModelBuilder("small_guarded_gain", "Gain with a rule")
+    K = m.parameter("K", 1.0, "1", "Divisor", tunable=True)
+    m.require(K, "K must exceed 0; raise it")
+    u = m.input("u", "1", "Input")
+    m.output("y", u / K, "1", "Output")
+    return m.build()
+
+
 def blow_up() -> Model:
     """ẋ = x² + u: at rest for u = 0; for u = r² it is x = r·tan(r·t), infinite at t = π/2r."""
     m = ModelBuilder("small_blow_up", "A state that becomes infinite in finite time")
@@ -73,6 +83,7 @@ MODELS = {
     "integrator": integrator,
     "lag": lag,
     "gain": gain,
+    "guarded_gain": guarded_gain,
     "blow_up": blow_up,
     "power_source": power_source,
 }

@@ -1,6 +1,7 @@
 """The master against recursions computed by hand, and what it leaves behind when something fails."""
 
 import tempfile
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from orchestrator.coupling import loop as loops
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import ParameterChange
+from orchestrator.coupling.events import Event, ParameterChange
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
@@ -250,6 +251,29 @@ def test_events_at_one_time_happen_in_their_order_and_none_is_lost():
     seen = trajectory(system, jacobi(("x", "z")), ["x.y", "z.y"], 4, events)
     assert np.abs(seen[:, 0] - H * np.array([0, 1, 2, 5, 8])).max() < TOLERANCE
     assert np.abs(seen[:, 1] - H * np.array([0, 1, 2, 1, 0])).max() < TOLERANCE
+
+
+@dataclass(frozen=True, slots=True)
+class BothGains(Event):
+    """Sets variables of two components at once."""
+
+    def changes(self):
+        return {"k": {"K": 5.0}, self.component: {"gain": 2.0}}
+
+
+def test_an_event_may_change_several_components_before_their_partners_see_any_of_it():
+    system = system_of([("k.y", "x.u")], k=("gain", {"K": 1.0}, {"u": 1.0}), x=("integrator",))
+    event = BothGains(2 * H, "x")
+    seen = trajectory(system, jacobi(("k", "x")), ["x.y"], 4, [event])[:, 0]
+    assert np.abs(seen - H * np.array([0, 1, 2, 12, 22])).max() < TOLERANCE
+    assert str(event) == "t = 0.002 s: k.K = 5, x.gain = 2"
+
+
+def test_an_event_that_breaks_a_rule_of_the_fmu_is_refused_before_its_partners_see_it():
+    system = system_of([("k.y", "x.u")], k=("guarded_gain", {}, {"u": 1.0}), x=("integrator",))
+    rule = r"component 'k' at t = 0\.002 s: .* K must exceed 0; raise it"
+    with Master(system, gauss_seidel((("x",), ("k",))), H) as master, pytest.raises(ComponentError, match=rule):
+        master.run(0.01, [ParameterChange(2 * H, "k", "K", 0.0)])
 
 
 def test_an_event_between_communication_points_stops_the_run_before_it_starts():

@@ -226,7 +226,7 @@ def test_states_and_parameters_only_where_something_is():
         ({"lines": (Line("ab", "a", "b", X=-0.1),)}, "series capacitors are not modelled"),
         ({"lines": (Line("ab", "a", "b", X=0.1, R=-1),)}, "'ab' has the resistance -1 pu between"),
         ({"lines": (Line("ab", "a", "b", X=0.1, tap=0),)}, "has the ratio 0 between buses 'a' and 'b'"),
-        ({"loads": ()}, "bus 'b' has neither a load with P > 0 nor line charging.*stray_B = 0.01"),
+        ({"loads": ()}, "bus 'b' has neither a load with P > 0 nor line charging.*stray_B = 0.05"),
         ({"shunts": (Shunt("s", "z", 1, 1),)}, "shunt 's' is at bus 'z', which does not exist"),
         ({"stray_B": -1}, "stray_B = -1 pu; it must not be negative"),
     ],
