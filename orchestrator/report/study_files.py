@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.report.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.report.plots import plot_signals
 from orchestrator.report.signals import relative_difference
@@ -154,9 +155,29 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,
         "linear_difference": _linear_differences(result),
+        "swing": {name: modes.swing_of(mode) for name, mode in modes.named.items()},
+        "step_size": modes.prepared.step_size,
+        "stop_time": modes.prepared.stop_time,
+        "schedule": modes.prepared.schedule.name,
+        "events": [str(event) for event in modes.prepared.events],
+        "power_flow": _power_flow(modes.prepared),
         "warnings": list(modes.warnings),
         "failure": str(result.failure) if result.failure else None,
     }
+
+
+def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
+    """Voltages [pu, degrees] by bus, and what every unit feeds [MVA, MW, Mvar]."""
+    flow = prepared.power_flow
+    if flow is None:
+        return None
+    units = {}
+    for name, power in flow.powers.items():
+        plan = prepared.system.components[name]
+        rating = float(plan.parameters.get("S_n", plan.description.variables["S_n"].start or 0.0))
+        units[name] = {"rating_mva": rating, "p_mw": power.real * rating, "q_mvar": power.imag * rating}
+    buses = {bus: [abs(v), math.degrees(cmath.phase(v))] for bus, v in flow.voltages.items()}
+    return {"residual": flow.residual, "buses": buses, "units": units}
 
 
 def _linear_differences(result: "RunResult") -> dict[str, float] | None:

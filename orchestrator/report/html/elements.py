@@ -1,0 +1,58 @@
+"""Small pieces of HTML: tables, figures with numbers, texts that are safe to put in a page."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""As in the picture files: a scenario keeps its colour everywhere."""
+
+
+def colour(index: int) -> str:
+    """A scenario's colour."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
+    """A table; the first ``left`` columns hold text. Cells are HTML already."""
+
+    def cells(tag: str, values: Sequence[str]) -> str:
+        return "".join(f'<{tag}{" class=text" if k < left else ""}>{v}</{tag}>' for k, v in enumerate(values))
+
+    head = cells("th", [escape(c) for c in columns])
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+class Figures:
+    """Counts figures, so that texts can refer to them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def add(self, content: str, caption: str) -> tuple[str, str]:
+        """The figure, and how a text calls it: "Figure 3"."""
+        self.count += 1
+        name = f"Figure {self.count}"
+        return (
+            f'<figure id="figure-{self.count}">{content}<figcaption><b>{name}.</b> {escape(caption)}</figcaption></figure>',
+            f'<a href="#figure-{self.count}">{name}</a>',
+        )
+
+
+def number(value: float, digits: int) -> str:
+    """With a true minus sign."""
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
+def eigenvalue(real: float, imag: float) -> str:
+    """``−0.389 ± j3.655``."""
+    return f"{number(real, 3)} ± j{abs(imag):.3f}"
+
+
+def damping(percent: float, least: float = 5.0) -> str:
+    """A damping in percent, marked where it is negative or below a limit."""
+    text = number(percent, 2)
+    return f'<span class="bad">{text}</span>' if percent < least else text

@@ -1,0 +1,107 @@
+"""What a report is made from: the folders that `gfor run`, `gfor sweep` and `gfor design` leave."""
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from orchestrator.cases.case import Case, load_case
+from orchestrator.errors import InputError
+
+
+@dataclass
+class Results:
+    """Contents of result folders, read as far as they are there.
+
+    Attributes
+    ----------
+    case
+        The case of the run.
+    scenarios
+        One summary a scenario, as in ``summary.json``.
+    modes, participation, step_sizes
+        Rows of the files of that name.
+    trajectories, linear
+        By scenario.
+    sweeps, designs
+        Datasets and calculation sheets that were found beside the run.
+    """
+
+    folder: Path
+    case: Case
+    scenarios: list[dict[str, Any]]
+    modes: list[dict[str, str]]
+    participation: list[dict[str, str]]
+    step_sizes: list[dict[str, str]]
+    trajectories: dict[str, xr.Dataset]
+    linear: dict[str, xr.Dataset]
+    sweeps: list[xr.Dataset] = field(default_factory=list)
+    designs: list[dict[str, Any]] = field(default_factory=list)
+
+
+def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
+    """Read a run's folder, and sweeps and designs from it and from further folders.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no run, or a file in it cannot be read.
+    """
+    summary = folder / "summary.json"
+    if not summary.is_file():
+        raise InputError(
+            f"{folder}: there is no summary.json in it, so it is not the folder of a run; "
+            "make one with `gfor run CASE --out DIR`, and give that folder first"
+        )
+    for other in others:
+        if not other.exists():
+            raise InputError(f"{other}: there is no such file or folder")
+    try:
+        content = json.loads(summary.read_text(encoding="utf-8"))
+        case = load_case(folder / "case.toml")
+        scenarios = content["scenarios"]
+        names = [s["name"] for s in scenarios]
+        results = Results(
+            folder,
+            case,
+            scenarios,
+            _rows(folder / "modes.csv"),
+            _rows(folder / "participation.csv"),
+            _rows(folder / "step_size.csv"),
+            dict(_datasets(folder, names, "trajectory.nc")),
+            dict(_datasets(folder, names, "linear.nc")),
+        )
+        for place in (folder, *others):
+            results.sweeps += [_load(path) for path in _files(place, "sweep.nc")]
+            results.designs += [
+                json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "design_*.json")
+            ]
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
+    return results
+
+
+def _files(place: Path, pattern: str) -> list[Path]:
+    return [place] if place.is_file() and place.match(pattern) else sorted(place.glob(pattern))
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    if not path.is_file():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _datasets(folder: Path, names: Sequence[str], file: str) -> Iterator[tuple[str, xr.Dataset]]:
+    for name in names:
+        if (folder / name / file).is_file():
+            yield name, _load(folder / name / file)
+
+
+def _load(path: Path) -> xr.Dataset:
+    with xr.open_dataset(path) as dataset:
+        return dataset.load()

@@ -1,0 +1,68 @@
+"""The page as a whole."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+
+from orchestrator.report.html import sections, studies
+from orchestrator.report.html.elements import Figures
+from orchestrator.report.html.folder import Results, read_results
+
+_HERE = Path(__file__).parent
+
+
+def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = None) -> Path:
+    """Write ``report.html``: one file that needs no network and no other file.
+
+    Parameters
+    ----------
+    folder
+        Of a run.
+    others
+        Folders or files with sweeps and designs that belong to it.
+    path
+        By default ``report.html`` in the folder.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to report on.
+    """
+    results = read_results(folder, others)
+    target = path or folder / "report.html"
+    target.write_text(page(results), encoding="utf-8")
+    return target
+
+
+def page(results: Results) -> str:
+    """The page's text."""
+    figures = Figures()
+    content: list[tuple[str, str]] = [
+        ("What was studied", sections.studied(results)),
+        ("Operating point", sections.operating_point(results)),
+        ("Modes", sections.modes(results, figures)),
+    ]
+    content += [(studies.sweep_title(sweep), studies.sweep(sweep, results, figures)) for sweep in results.sweeps]
+    content += [(studies.design_title(sheet), studies.design(sheet)) for sheet in results.designs]
+    if results.trajectories:
+        content.append(("Time responses", sections.responses(results, figures)))
+    if results.step_sizes:
+        content.append(("Communication step", sections.step_sizes(results)))
+    content.append(("Provenance", sections.provenance(results)))
+    title = results.case.table.title or results.case.name
+    links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
+    body = "".join(f'<section id="section-{k}"><h2>{escape(n)}</h2>{text}</section>' for k, (n, text) in enumerate(content))
+    made = f"gfor-cosim {version('gfor-cosim')}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    return f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}</style></head>
+<body><main><header><h1>{escape(title)}</h1><div class="soft">Small-signal and time-domain study by co-simulation of FMUs · {made}</div></header>
+<nav>{links}</nav>{sections.findings(results)}{body}</main><div id="tooltip" role="status"></div>
+<script>{_text("page.js")}</script></body></html>
+"""
+
+
+def _text(name: str) -> str:
+    return (_HERE / name).read_text(encoding="utf-8")

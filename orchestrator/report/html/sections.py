@@ -1,0 +1,282 @@
+"""The sections of the page that a run fills: findings, operating point, modes, responses, provenance."""
+
+import json
+from html import escape
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.report.html.charts import Curve, Mark, bar_chart, complex_plane, legend, line_chart
+from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
+from orchestrator.report.html.folder import Results
+from orchestrator.report.signals import relative_difference, signal
+
+_BARS = 8
+_LEAST_DAMPING = 5.0
+"""Damping [%] that grid codes commonly ask for; less is marked."""
+
+
+def titles(results: Results) -> dict[str, str]:
+    """Title of every scenario."""
+    return {s["name"]: s["title"] for s in results.scenarios}
+
+
+def scenario_legend(results: Results) -> str:
+    """Colours of the scenarios."""
+    return legend((s["title"], colour(k)) for k, s in enumerate(results.scenarios))
+
+
+def findings(results: Results) -> str:
+    """What a reader in a hurry should take away, from the figures themselves."""
+    items = []
+    for s in results.scenarios:
+        if s["failure"]:
+            items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
+        for name, mode in s["modes"].items():
+            state = "unstable" if mode["damping_percent"] < 0 else "damped"
+            items.append(
+                f"{escape(s['title'])}: the {escape(name)} mode is {state}: {mode['frequency_hz']:.3f} Hz at "
+                f"{damping(mode['damping_percent'])} % damping"
+            )
+    worst = [
+        f"{escape(title)}: {damping(float(row['damping [%]']))} % at {float(row['frequency [Hz]']):.3f} Hz"
+        for title, row in _least_damped(results)
+    ]
+    items.append(f"Least damped of all modes from 0.1 to 2 Hz: {'; '.join(worst)}")
+    warnings = "".join(
+        f'<div class="warning"><b>{escape(s["title"])}:</b> {escape(text)}</div>'
+        for s in results.scenarios
+        for text in s["warnings"]
+    )
+    return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{warnings}'
+
+
+def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
+    found = []
+    for name, title in titles(results).items():
+        rows = [r for r in results.modes if r["scenario"] == name]
+        if rows:
+            found.append((title, min(rows, key=lambda r: float(r["damping [%]"]))))
+    return found
+
+
+def studied(results: Results) -> str:
+    """What was studied: source of the data, scenarios, events, solver."""
+    case = results.case.table
+    rows = []
+    for s in results.scenarios:
+        scenario = case.scenarios.get(s["name"])
+        differs = ", ".join(f"{k} = {v}" for k, v in scenario.set.items()) if scenario else ""
+        removed = f"without {', '.join(scenario.remove)}" if scenario and scenario.remove else ""
+        rows.append([escape(s["title"]), escape("; ".join(x for x in (removed, differs) if x) or "as the case"),
+                     escape("; ".join(s.get("events", [])) or "none"), str(s["states"])])  # fmt: skip
+    first = results.scenarios[0]
+    solver = (
+        f"Coupled as FMUs with a communication step of {1e6 * first['step_size']:g} µs ({escape(first['schedule'])}), "
+        f"simulated for {first['stop_time']:g} s. Modes come from perturbing the running FMUs around the coupled steady "
+        "state: the linear model is that of the FMUs that were simulated."
+    )
+    source = f"<p>{escape(case.source)}</p>" if case.source else ""
+    return f"{source}<p>{solver}</p>" + table(
+        "Scenarios", ["Scenario", "What differs", "Events", "States"], rows, left=3
+    )
+
+
+def operating_point(results: Results) -> str:
+    """Residuals, and what every unit feeds."""
+    rows, details = [], []
+    for s in results.scenarios:
+        flow = s.get("power_flow")
+        low = high = "–"
+        if flow:
+            low, high = (f"{pick(v[0] for v in flow['buses'].values()):.4f}" for pick in (min, max))
+            units = [
+                [escape(n), f"{u['rating_mva']:g}", number(u["p_mw"], 1), number(u["q_mvar"], 1)]
+                for n, u in flow["units"].items()
+            ]
+            buses = [[escape(b), f"{v:.4f}", number(angle, 2)] for b, (v, angle) in flow["buses"].items()]
+            details.append(
+                f"<details><summary>{escape(s['title'])}: {len(units)} units, {len(buses)} buses</summary>"
+                + table("Units", ["Unit", "Rating [MVA]", "P [MW]", "Q [Mvar]"], units)
+                + table("Buses", ["Bus", "Voltage [pu]", "Angle [°]"], buses)
+                + "</details>"
+            )
+        residual = f"{flow['residual']:.1e}" if flow else "–"
+        rows.append([escape(s["title"]), f"{s['residual']:.1e}", residual, low, high])
+    columns = ["Scenario", "Change in one step [pu]", "Power-flow mismatch [pu]", "Lowest voltage [pu]", "Highest [pu]"]
+    return table("Coupled steady state", columns, rows) + "".join(details)
+
+
+def modes(results: Results, figures: Figures) -> str:
+    """Named modes beside other people's, the map, and who takes part."""
+    reference = results.case.table.reference
+    compared = reference is not None and any(s["references"] for s in results.scenarios)
+    columns = ["Mode", "Scenario", "λ [rad/s]", "f [Hz]", "Damping [%]"]
+    columns += [f"{reference.title}: f [Hz]", "Damping [%]"] if reference and compared else []
+    rows = []
+    for name in dict.fromkeys(n for s in results.scenarios for n in [*s["modes"], *s["references"]]):
+        for s in results.scenarios:
+            mode, theirs = s["modes"].get(name), s["references"].get(name)
+            row = [escape(name), escape(s["title"])]
+            row += (
+                [eigenvalue(mode["real"], mode["imag"]), f"{mode['frequency_hz']:.3f}", damping(mode["damping_percent"])]
+                if mode
+                else ["none in range", "", ""]
+            )
+            if compared:
+                row += [f"{theirs['frequency_hz']:.2f}", number(theirs["damping_percent"], 2)] if theirs else ["", ""]
+            rows.append(row)
+    parts = [table("Electromechanical modes", columns, rows, left=2)]
+    if reference and compared:
+        parts.append(f'<p class="soft">{escape(reference.title)}: {escape(reference.source)}</p>')
+    picture, link = figures.add(
+        scenario_legend(results) + complex_plane("Eigenvalue map", _marks(results), highest_hz=_highest(results)),
+        "Modes from 0.1 Hz up with rays of equal damping; modes with a name are large"
+        + (f", circles are the figures of: {reference.title}." if reference and compared else "."),
+    )
+    parts.append(f"<p>{link} shows all modes; the pointer on one shows what it is.</p>{picture}")
+    return "".join(parts) + _participation(results, figures)
+
+
+def _highest(results: Results) -> float | None:
+    named = [m["frequency_hz"] for s in results.scenarios for m in s["modes"].values()]
+    return 1.25 * max(named) if named else None
+
+
+def _marks(results: Results) -> list[Mark]:
+    marks, title = [], titles(results)
+    order = {name: k for k, name in enumerate(title)}
+    highest = _highest(results) or float("inf")
+    for row in results.modes:
+        real, hz = float(row["real [1/s]"]), float(row["frequency [Hz]"])
+        if real < -3 or hz > highest:
+            continue
+        name = f"{row['name']} mode, " if row["name"] else ""
+        text = (
+            f"{name}{title[row['scenario']]}\n{hz:.3f} Hz, damping {float(row['damping [%]']):.2f} %\n"
+            + "\n".join(row["participation"].split("; ")[:4])
+        )
+        marks.append(Mark(real, hz, colour(order[row["scenario"]]), text, large=bool(row["name"])))
+    for k, s in enumerate(results.scenarios):
+        for name, theirs in s["references"].items():
+            ratio = theirs["damping_percent"] / 100
+            default = -ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * theirs["frequency_hz"]
+            text = f"{name}, {s['title']}: reference\n{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
+            marks.append(Mark(theirs.get("real", default), theirs["frequency_hz"], colour(k), text, "circle"))
+    return marks
+
+
+def _participation(results: Results, figures: Figures) -> str:
+    parts, title = [], titles(results)
+    for name in dict.fromkeys(n for s in results.scenarios for n in s["modes"]):
+        shares: dict[str, dict[str, float]] = {}
+        for row in results.participation:
+            if row["name"] == name and row["of"] == "component":
+                shares.setdefault(row["scenario"], {})[row["element"]] = 100 * float(row["participation"])
+        most = {c: max(s.get(c, 0.0) for s in shares.values()) for s in shares.values() for c in s}
+        components = sorted(most, key=lambda c: -most[c])[:_BARS]
+        if not components:
+            continue
+        bars = [
+            (title[s], colour(k), [shares.get(s, {}).get(c, 0.0) for c in components]) for k, s in enumerate(title)
+        ]
+        picture, link = figures.add(
+            bar_chart(f"Participation in the {name} mode", components, bars),
+            f"Participation of whole components in the {name} mode: the sum over their states.",
+        )
+        sides = "; ".join(
+            f"{escape(s['title'])}: {escape(', '.join(a[:4]) or '–')} against {escape(', '.join(b[:4]) or 'nobody')}"
+            for s in results.scenarios
+            if (swing := s.get("swing", {}).get(name))
+            for a, b in [swing]
+        )
+        parts.append(f"<p>{link}: who takes part in the {escape(name)} mode. Who swings against whom: {sides}.</p>{picture}")
+    return "".join(parts)
+
+
+def responses(results: Results, figures: Figures) -> str:
+    """The case's plots, and what the curves say about the modes."""
+    parts = [scenario_legend(results)]
+    for plot in results.case.table.plots:
+        charts, notes = [], []
+        for panel in plot.panels:
+            curves, says = _curves(results, panel.signal, panel.scale)
+            if curves:
+                charts.append(line_chart(f"{plot.title}: {panel.label}", "Time [s]", panel.label, curves))
+                notes.append(f"{escape(panel.label)}: {says}")
+        if charts:
+            dashed = " Dashed: response of the linear model." if results.linear else ""
+            picture, link = figures.add("".join(charts), f"{plot.title}.{dashed}")
+            listed = "".join(f"<li>{note}</li>" for note in notes)
+            parts.append(f"<h3>{escape(plot.title)}</h3><p>{link}. Largest deviation from the start:</p><ul>{listed}</ul>")
+            parts.append(picture)
+    return "".join(parts) + _ring_downs(results)
+
+
+def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve], str]:
+    curves, says = [], []
+    for k, s in enumerate(results.scenarios):
+        seen = _signal(results.trajectories.get(s["name"]), expression)
+        if seen is None:
+            continue
+        x, y = seen["time"].values, scale * seen.values
+        curves.append(Curve(s["title"], colour(k), x, y))
+        text = f"{escape(s['title'])} {np.abs(y - y[0]).max():.3g}"
+        linear = _signal(results.linear.get(s["name"]), expression)
+        if linear is not None:
+            curves.append(Curve(f"{s['title']}, linear", "#000", linear["time"].values, scale * linear.values, True))
+            share = relative_difference(seen, linear)
+            text += f" (linear model differs by at most {100 * share:.2g} % of it)" if np.isfinite(share) else ""
+        says.append(text)
+    return curves, ", ".join(says)
+
+
+def _signal(dataset: xr.Dataset | None, expression: str) -> xr.DataArray | None:
+    return None if dataset is None else signal(dataset, expression)
+
+
+def _ring_downs(results: Results) -> str:
+    rows = []
+    for s in results.scenarios:
+        mode, seen = next(iter(s["modes"].values()), None), s["ring_down"]
+        if mode and seen:
+            rows.append(
+                [escape(s["title"]), f"{seen['frequency_hz']:.4f}", f"{mode['frequency_hz']:.4f}",
+                 damping(seen["damping_percent"]), damping(mode["damping_percent"])]
+            )  # fmt: skip
+    columns = ["Scenario", "f seen [Hz]", "f of the mode [Hz]", "Damping seen [%]", "Damping of the mode [%]"]
+    return table("Ring-down of the simulated response against the eigenvalue", columns, rows) if rows else ""
+
+
+def step_sizes(results: Results) -> str:
+    """How far the communication step moves the electromechanical mode."""
+    steps = sorted({float(r["step size [s]"]) for r in results.step_sizes})
+    title, rows = titles(results), []
+    for name in title:
+        for schedule in sorted({r["schedule"] for r in results.step_sizes}):
+            found = {float(r["step size [s]"]): float(r["shift [rad/s]"]) for r in results.step_sizes
+                     if (r["scenario"], r["schedule"]) == (name, schedule)}  # fmt: skip
+            if found:
+                rows.append([escape(title[name]), schedule, *(f"{found[h]:.1e}" for h in steps)])
+    columns = ["Scenario", "Schedule", *(f"{1e6 * h:g} µs" for h in steps)]
+    return table("Shift of the electromechanical mode from the continuous system's [rad/s]", columns, rows, left=2)
+
+
+def provenance(results: Results) -> str:
+    """Versions, FMUs, settings and the case file itself."""
+    parts = []
+    attributes = next((d.attrs for d in results.trajectories.values()), {})
+    if attributes:
+        versions = json.loads(attributes["versions"])
+        parts.append(f"<p>{escape(', '.join(f'{name} {v}' for name, v in versions.items()))}</p>")
+    fmus: dict[str, tuple[str, str, str]] = {}
+    for dataset in results.trajectories.values():
+        fmus |= {n: (f["model"], f["guid"], f["tool"]) for n, f in json.loads(dataset.attrs["fmus"]).items()}
+    rows = [[escape(name), *map(escape, content)] for name, content in fmus.items()]
+    if rows:
+        listed = table("FMUs", ["Component", "Model", "Guid", "Made by"], rows, left=4)
+        parts.append(f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>")
+    parts.append(
+        f"<details><summary>Case file {escape(results.case.name)}</summary><pre>{escape(results.case.text)}</pre></details>"
+    )
+    return "".join(parts)
