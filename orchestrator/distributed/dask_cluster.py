@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLost
+from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLostError
 from orchestrator.errors import InputError
 
 _PATIENCE = 30
@@ -24,7 +24,7 @@ class DaskCluster:
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
-    ) -> Iterator[tuple[int, Result | WorkerLost]]:
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
         """See `Executor.run`."""
         if not tasks:
             return
@@ -60,7 +60,7 @@ class DaskCluster:
     def _result(self, distributed: Any, future: Any) -> Any:
         error = future.exception()
         if isinstance(error, distributed.KilledWorker):
-            return WorkerLost(
+            return WorkerLostError(
                 f"its worker process died {ATTEMPTS} times (Dask: {error}); give the workers more memory, "
                 "or try this point alone with `gfor modes`"
             )

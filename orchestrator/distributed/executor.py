@@ -12,7 +12,7 @@ ATTEMPTS = 3
 """How often a task may lose its worker before it is given up."""
 
 
-class WorkerLost(CosimError):
+class WorkerLostError(CosimError):
     """The process that computed a task died every time."""
 
 
@@ -21,10 +21,10 @@ class Executor(Protocol):
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
-    ) -> Iterator[tuple[int, Result | WorkerLost]]:
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
         """Give the index of each task with its result, as soon as it is there, in any order.
 
         An exception that ``function`` raises ends the run. A worker process that dies does not: its task is
-        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLost`.
+        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`.
         """
         ...

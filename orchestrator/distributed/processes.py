@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLost
+from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLostError
 
 _QUEUE_PER_WORKER = 2
 """Tasks under way for each worker; the second one waits there so that no worker does."""
@@ -29,7 +29,7 @@ class Processes:
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
-    ) -> Iterator[tuple[int, Result | WorkerLost]]:
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
         """See `Executor.run`."""
         waiting = deque(range(len(tasks)))
         while waiting:
@@ -39,9 +39,7 @@ class Processes:
             for index in suspects:
                 yield index, self._run_alone(function, tasks[index])
 
-    def _run_together(
-        self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]
-    ) -> Any:
+    def _run_together(self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]) -> Any:
         """Compute what is waiting; ends early, with what was under way, if a worker dies."""
         under_way: dict[Future[Result], int] = {}
         suspects: list[int] = []
@@ -72,7 +70,7 @@ class Processes:
                 suspects.append(index)
         return sorted(suspects)
 
-    def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLost:
+    def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
         for _ in range(ATTEMPTS - 1):
             pool = _pool(1)
             try:
@@ -81,7 +79,7 @@ class Processes:
                 continue
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
-        return WorkerLost(
+        return WorkerLostError(
             f"its worker process died {ATTEMPTS} times; is there too little memory? Try fewer --workers, "
             "or this point alone with `gfor modes`"
         )

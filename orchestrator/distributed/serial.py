@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from orchestrator.distributed.executor import Result, Task, WorkerLost
+from orchestrator.distributed.executor import Result, Task, WorkerLostError
 
 
 class Serial:
@@ -10,7 +10,7 @@ class Serial:
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
-    ) -> Iterator[tuple[int, Result | WorkerLost]]:
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
         """See `Executor.run`."""
         for index, task in enumerate(tasks):
             yield index, function(task)

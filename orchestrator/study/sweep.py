@@ -9,7 +9,7 @@ from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.distributed.executor import Executor, WorkerLost
+from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import CaseError, Problem
 from orchestrator.study.sweep_axes import Axis, Vary, grid_places, resolve
 from orchestrator.study.sweep_point import PointRecord, PointStore, PointTask, compute_point, make_task
@@ -196,23 +196,25 @@ def _fill(
     tasks: list[PointTask] = []
     for sweep, place in wanted:
         task = result.plan.task(sweep.prepared, place)
-        record = store.load(task.key)
-        if record is None:
+        stored = store.load(task.key)
+        if stored is None:
             missing.append((sweep, place))
             tasks.append(task)
         else:
-            sweep.points[place] = record
+            sweep.points[place] = stored
             result.stored += 1
     done = result.stored + result.computed
     total = done + len(tasks)
     report(done, total)
     for index, outcome in executor.run(compute_point, tasks):
         sweep, place = missing[index]
-        if isinstance(outcome, WorkerLost):
-            outcome = PointRecord(tasks[index].key, error=str(outcome), lasting=False)
-        if outcome.lasting:
-            store.save(outcome)
-        sweep.points[place] = outcome
+        if isinstance(outcome, WorkerLostError):
+            record = PointRecord(tasks[index].key, error=str(outcome), lasting=False)
+        else:
+            record = outcome
+        if record.lasting:
+            store.save(record)
+        sweep.points[place] = record
         result.computed += 1
         done += 1
         report(done, total)

@@ -19,7 +19,6 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.analysis.modes import Mode
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -191,17 +190,14 @@ def _record(key: str, result: ModesResult) -> PointRecord:
         key,
         ModeSet(
             np.array([mode.eigenvalue for mode in modes], dtype=complex),
-            *(_rows([_vectors(mode)[side] for mode in modes], names) for side in (0, 1)),
+            _rows([mode.left for mode in modes], names),
+            _rows([mode.shape for mode in modes], names),
             names,
         ),
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
         residual=result.operating_point.residual,
         warnings=result.warnings,
     )
-
-
-def _vectors(mode: Mode) -> tuple[dict[str, complex], dict[str, complex]]:
-    return mode.left, mode.shape
 
 
 def _rows(vectors: list[dict[str, complex]], names: tuple[str, ...]) -> Any:
