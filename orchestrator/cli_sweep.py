@@ -64,7 +64,7 @@ def sweep(
     samples = Samples(result)
     save_sweep(samples, folder)
     plots = save_sweep_plots(samples, folder)
-    remarks = Console(stderr=True, soft_wrap=True, highlight=False)
+    remarks = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
     if as_json:
         print(json.dumps(sweep_json(samples), indent=1, ensure_ascii=False))
     else:

@@ -17,7 +17,7 @@ from scipy.optimize import linear_sum_assignment
 THRESHOLD = 0.5
 """Least similarity at which two modes are taken for the same."""
 
-_MARGIN = 0.2
+_MARGIN = 0.3
 """A mode with another candidate as good as this difference is taken for neither."""
 
 _DISTANCE_WEIGHT = 0.1

@@ -33,7 +33,7 @@ class DaskCluster:
             futures = [client.submit(function, task, pure=False) for task in tasks]
             index_of = {future.key: index for index, future in enumerate(futures)}
             try:
-                for future in distributed.as_completed(futures):
+                for future in distributed.as_completed(futures, loop=client.loop):
                     yield index_of[future.key], self._result(distributed, future)
                     future.release()
             finally:

@@ -11,7 +11,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import CaseError, Problem
-from orchestrator.study.sweep_axes import Axis, Vary, grid_places, resolve
+from orchestrator.study.sweep_axes import ALPHA, Axis, Vary, grid_places, resolve
 from orchestrator.study.sweep_point import PointRecord, PointStore, PointTask, compute_point, make_task
 from orchestrator.study.sweep_trajectories import Place, Trajectory, find_trajectories
 
@@ -135,12 +135,13 @@ def plan_sweep(
     prepared = case.prepare(scenarios, fixed, step_size)
     axes = tuple(resolve(one, prepared) for one in vary)
     plan = SweepPlan(case, axes, tuple(prepared), fixed, step_size, frequency_range)
-    for end in (0, -1):
-        _check_end(plan, {axis.key: axis.values[end] for axis in axes})
+    ends = [{axis.key: axis.values[end] for axis in axes} for end in (0, -1)]
+    for varied in ends if any(axis.key == ALPHA for axis in axes) else ends[:1]:
+        _check_end(plan, varied)
     return plan
 
 
-def _check_end(plan: SweepPlan, varied: dict[str, Value]) -> None:
+def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> None:
     """Prepare one point at an end: it shows what cannot be varied, and builds FMUs that only appear there."""
     try:
         plan.case.prepare([plan.scenarios[-1].name], {**plan.overrides, **varied}, plan.step_size)

@@ -18,8 +18,10 @@ from orchestrator.fmi.description import VariableInfo
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 _MOST = 100_000
-_ALPHA = "units.alpha"
-_ALPHA_INFO = VariableInfo(_ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")
+ALPHA = "units.alpha"
+"""The converters' share of a units table; with it the FMUs themselves may change."""
+
+_ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     InputError
         If there is no such variable, or if a value does not fit its type, unit or range.
     """
-    if vary.key == _ALPHA:
+    if vary.key == ALPHA:
         return _axis(vary, _ALPHA_INFO)
     pattern, _, variable = vary.key.partition(".")
     plans = {n: p for s in scenarios for n, p in s.system.components.items() if fnmatch.fnmatchcase(n, pattern)}
@@ -153,7 +155,9 @@ def _spaced(start: float, stop: float, count: int, logarithmic: bool) -> list[fl
     if start == stop:
         raise ValueError(f"the range begins and ends at {start:g}; give two different limits")
     if logarithmic and not start * stop > 0:
-        raise ValueError(f"log:{start:g}:{stop:g} passes zero; give limits of one sign, or a linear range")
+        raise ValueError(
+            f"a logarithmic range from {start:g} to {stop:g} passes zero; give limits of one sign, or a linear range"
+        )
     numbers = np.geomspace(start, stop, count) if logarithmic else np.linspace(start, stop, count)
     return [float(f"{number:.12g}") for number in numbers]  # 0.02 and not 0.020000000000000004
 
