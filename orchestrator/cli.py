@@ -19,6 +19,7 @@ from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.units import to_unit
+from orchestrator.cli_sweep import choose_executor, sweep
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
@@ -28,6 +29,8 @@ from orchestrator.report.study_files import save_modes, save_run, save_study, su
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
 from orchestrator.study.modes import ModesResult, compute_modes, modes_json
 from orchestrator.study.run import RunResult, run_scenario
+from orchestrator.study.sweep import plan_sweep
+from orchestrator.study.sweep_axes import Vary, parse_vary
 
 EXAMPLES = """\
 examples:
@@ -36,6 +39,7 @@ examples:
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
+  gfor sweep two_area --vary grid.X_L=0.01:0.6:60  all modes followed along the line's reactance
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -44,7 +48,7 @@ examples:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
     options = _parser().parse_args(arguments)
-    errors = Console(stderr=True, soft_wrap=True, highlight=False)
+    errors = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
     try:
         return int(options.command(options))
     except CosimError as error:
@@ -120,6 +124,29 @@ def _parser() -> argparse.ArgumentParser:
     linearize.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
     linearize.set_defaults(command=_linearize)
 
+    vary = commands.add_parser("sweep", help="modes over a grid of parameters, followed from point to point")
+    _case_arguments(vary)
+    vary.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        type=_vary,
+        metavar="COMPONENT.PARAMETER=START:STOP:COUNT",
+        help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
+        "last one)",
+    )
+    vary.add_argument("--range", type=_range, default=(0.1, 2.0), metavar="LO:HI", help="frequencies [Hz] (0.1:2)")
+    vary.add_argument("--workers", type=_count, metavar="N", help="processes to compute in (default: one a core)")
+    vary.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
+    vary.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder for results (default: results/<case>_sweep); points that are there are not computed again",
+    )
+    vary.add_argument("--json", action="store_true", help="print JSON")
+    vary.set_defaults(command=_sweep)
+
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
@@ -186,6 +213,19 @@ def _range(text: str) -> tuple[float, float]:
     if not colon or not 0 <= limits[0] < limits[1]:
         raise argparse.ArgumentTypeError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
     return limits
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1000")
+    return int(text)
+
+
+def _vary(text: str) -> Vary:
+    try:
+        return parse_vary(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _assignment(text: str) -> tuple[str, Value]:
@@ -281,6 +321,21 @@ def _run(options: argparse.Namespace) -> int:
         )
         return 1
     return 0
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    executor = choose_executor(options.workers, options.scheduler)
+    case = load_case(options.case)
+    plan = plan_sweep(case, options.vary, options.scenario, dict(options.set), options.step, options.range)
+    folder = _folder(options.out or Path("results") / f"{case.name}_sweep")
+    console = _console(stderr=options.json)
+    with _progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+
+        def report(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        return sweep(plan, executor, folder, console, report, as_json=options.json)
 
 
 def _folder(path: Path) -> Path:

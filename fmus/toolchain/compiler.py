@@ -1,11 +1,11 @@
 """A C compiler without a system compiler: ziglang from PyPI, its results kept between runs."""
 
 import hashlib
-import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import uuid
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
@@ -70,7 +70,7 @@ def compile_library(source: str, platform: str) -> Path:
         if result.returncode:
             raise RuntimeError(f"the C compiler (ziglang) failed for {platform}:\n{result.stderr.strip()}")
         library.parent.mkdir(parents=True, exist_ok=True)
-        partial = library.with_suffix(f".{os.getpid()}")
+        partial = library.with_suffix(f".{uuid.uuid4().hex}.part")
         shutil.copy(built, partial)
-        partial.replace(library)  # atomic: another process may be compiling the same
+        partial.replace(library)  # atomic: others, perhaps on other machines, may be compiling the same
     return library

@@ -1,7 +1,7 @@
 """Modes of a linear model: eigenvalues, damping ratio, frequency, participation factors, mode shapes."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -24,11 +24,14 @@ class Mode:
         Factor of every state, largest first; the factors of a mode sum to 1.
     shape
         Right eigenvector by state name, scaled so that its largest element is 1.
+    left
+        Left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere.
     """
 
     eigenvalue: complex
     participation: tuple[tuple[str, float], ...]
     shape: dict[str, complex]
+    left: dict[str, complex] = field(default_factory=dict, repr=False)
 
     @property
     def frequency_hz(self) -> float:
@@ -170,8 +173,11 @@ def make_mode(
     factors /= factors.sum()
     order = np.argsort(-factors)
     shape = right / right[np.argmax(np.abs(right))]
+    overlap = np.vdot(left, shape)
+    scaled = left / overlap.conjugate() if overlap else left
     return Mode(
         complex(value),
         tuple((names[k], float(factors[k])) for k in order),
         dict(zip(names, shape.tolist(), strict=True)),
+        dict(zip(names, scaled.tolist(), strict=True)),
     )

@@ -47,7 +47,7 @@ def plot_eigenvalues(results: Sequence["ModesResult"], title: str, path: Path) -
         left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
         axis.set_xlim(left, 0.35)
         axis.set_ylim(0, highest_hz)
-        _damping_rays(axis, left, highest_hz)
+        damping_rays(axis, left, highest_hz)
         axis.axvline(0, color="#888888", linewidth=0.8)
         axis.set_xlabel("Real part [1/s]")
         axis.set_ylabel("Frequency [Hz]")
@@ -64,7 +64,8 @@ def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
     return float(-ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz), reference.frequency_hz
 
 
-def _damping_rays(axis: Any, left: float, highest_hz: float) -> None:
+def damping_rays(axis: Any, left: float, highest_hz: float) -> None:
+    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz]."""
     for percent in (5, 10, 15, 20, 30):
         ratio = percent / 100
         slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi  # −Re λ per Hz

@@ -102,7 +102,9 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[Curve], h
             f'data-label="{escape(curve.label)}" data-x="{abscissa}" data-y="{values}"/>'
         )
     x0, x1 = frame.x_range
-    scale = f' data-kind="lines" data-x0="{x0:.8g}" data-x1="{x1:.8g}" data-left="{_LEFT}" data-right="{_WIDTH - _RIGHT}"'
+    scale = (
+        f' data-kind="lines" data-x0="{x0:.8g}" data-x1="{x1:.8g}" data-left="{_LEFT}" data-right="{_WIDTH - _RIGHT}"'
+    )
     return frame.svg(name, scale + f' data-top="{_TOP}" data-bottom="{height - _BOTTOM}"')
 
 

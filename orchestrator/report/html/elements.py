@@ -16,7 +16,7 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], l
     """A table; the first ``left`` columns hold text. Cells are HTML already."""
 
     def cells(tag: str, values: Sequence[str]) -> str:
-        return "".join(f'<{tag}{" class=text" if k < left else ""}>{v}</{tag}>' for k, v in enumerate(values))
+        return "".join(f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values))
 
     head = cells("th", [escape(c) for c in columns])
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)

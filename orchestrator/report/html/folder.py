@@ -77,9 +77,7 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
         )
         for place in (folder, *others):
             results.sweeps += [_load(path) for path in _files(place, "sweep.nc")]
-            results.designs += [
-                json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "design_*.json")
-            ]
+            results.designs += [json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "design_*.json")]
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
     return results

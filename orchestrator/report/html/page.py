@@ -53,7 +53,9 @@ def page(results: Results) -> str:
     content.append(("Provenance", sections.provenance(results)))
     title = results.case.table.title or results.case.name
     links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
-    body = "".join(f'<section id="section-{k}"><h2>{escape(n)}</h2>{text}</section>' for k, (n, text) in enumerate(content))
+    body = "".join(
+        f'<section id="section-{k}"><h2>{escape(n)}</h2>{text}</section>' for k, (n, text) in enumerate(content)
+    )
     made = f"gfor-cosim {version('gfor-cosim')}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

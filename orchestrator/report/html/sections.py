@@ -119,7 +119,11 @@ def modes(results: Results, figures: Figures) -> str:
             mode, theirs = s["modes"].get(name), s["references"].get(name)
             row = [escape(name), escape(s["title"])]
             row += (
-                [eigenvalue(mode["real"], mode["imag"]), f"{mode['frequency_hz']:.3f}", damping(mode["damping_percent"])]
+                [
+                    eigenvalue(mode["real"], mode["imag"]),
+                    f"{mode['frequency_hz']:.3f}",
+                    damping(mode["damping_percent"]),
+                ]
                 if mode
                 else ["none in range", "", ""]
             )
@@ -152,16 +156,17 @@ def _marks(results: Results) -> list[Mark]:
         if real < -3 or hz > highest:
             continue
         name = f"{row['name']} mode, " if row["name"] else ""
-        text = (
-            f"{name}{title[row['scenario']]}\n{hz:.3f} Hz, damping {float(row['damping [%]']):.2f} %\n"
-            + "\n".join(row["participation"].split("; ")[:4])
+        text = f"{name}{title[row['scenario']]}\n{hz:.3f} Hz, damping {float(row['damping [%]']):.2f} %\n" + "\n".join(
+            row["participation"].split("; ")[:4]
         )
         marks.append(Mark(real, hz, colour(order[row["scenario"]]), text, large=bool(row["name"])))
     for k, s in enumerate(results.scenarios):
         for name, theirs in s["references"].items():
             ratio = theirs["damping_percent"] / 100
             default = -ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * theirs["frequency_hz"]
-            text = f"{name}, {s['title']}: reference\n{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
+            text = (
+                f"{name}, {s['title']}: reference\n{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
+            )
             marks.append(Mark(theirs.get("real", default), theirs["frequency_hz"], colour(k), text, "circle"))
     return marks
 
@@ -177,9 +182,7 @@ def _participation(results: Results, figures: Figures) -> str:
         components = sorted(most, key=lambda c: -most[c])[:_BARS]
         if not components:
             continue
-        bars = [
-            (title[s], colour(k), [shares.get(s, {}).get(c, 0.0) for c in components]) for k, s in enumerate(title)
-        ]
+        bars = [(title[s], colour(k), [shares.get(s, {}).get(c, 0.0) for c in components]) for k, s in enumerate(title)]
         picture, link = figures.add(
             bar_chart(f"Participation in the {name} mode", components, bars),
             f"Participation of whole components in the {name} mode: the sum over their states.",
@@ -190,7 +193,9 @@ def _participation(results: Results, figures: Figures) -> str:
             if (swing := s.get("swing", {}).get(name))
             for a, b in [swing]
         )
-        parts.append(f"<p>{link}: who takes part in the {escape(name)} mode. Who swings against whom: {sides}.</p>{picture}")
+        parts.append(
+            f"<p>{link}: who takes part in the {escape(name)} mode. Who swings against whom: {sides}.</p>{picture}"
+        )
     return "".join(parts)
 
 
@@ -208,7 +213,9 @@ def responses(results: Results, figures: Figures) -> str:
             dashed = " Dashed: response of the linear model." if results.linear else ""
             picture, link = figures.add("".join(charts), f"{plot.title}.{dashed}")
             listed = "".join(f"<li>{note}</li>" for note in notes)
-            parts.append(f"<h3>{escape(plot.title)}</h3><p>{link}. Largest deviation from the start:</p><ul>{listed}</ul>")
+            parts.append(
+                f"<h3>{escape(plot.title)}</h3><p>{link}. Largest deviation from the start:</p><ul>{listed}</ul>"
+            )
             parts.append(picture)
     return "".join(parts) + _ring_downs(results)
 

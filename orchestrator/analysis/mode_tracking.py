@@ -1,0 +1,177 @@
+"""Following modes from one operating point to the next by their eigenvectors.
+
+Sorted lists of eigenvalues lose a mode where two cross. What stays the same is the pair of eigenvectors: with
+lᴴ·r = 1, the product (l_aᴴ·r_b)(l_bᴴ·r_a) is 1 for one and the same mode, 0 for two modes of one matrix, and does
+not depend on how states or eigenvectors are scaled. Over all modes b these products sum to 1, so that one above
+a half means: most of mode a is in mode b.
+"""
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+THRESHOLD = 0.5
+"""Least similarity at which two modes are taken for the same."""
+
+_MARGIN = 0.3
+"""A mode with another candidate as good as this difference is taken for neither."""
+
+_DISTANCE_WEIGHT = 0.1
+"""Of the relative distance between eigenvalues beside the similarity, which lies between 0 and 1."""
+
+_EDGE = 1.1
+"""A mode nearer than this factor to an end of the range of frequencies may leave or enter there."""
+
+Place = TypeVar("Place", bound=Hashable)
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ModeSet:
+    """The modes of one operating point.
+
+    Attributes
+    ----------
+    eigenvalues
+        λ [rad/s], shape (m,).
+    left, right
+        Eigenvectors as rows, shape (m, n), in any scaling.
+    names
+        Of the n states.
+    """
+
+    eigenvalues: Complex
+    left: Complex
+    right: Complex
+    names: tuple[str, ...]
+
+    @property
+    def frequencies(self) -> NDArray[np.float64]:
+        """Im λ/2π [Hz]."""
+        return np.asarray(self.eigenvalues.imag / (2 * np.pi), dtype=float)
+
+    def participation(self) -> NDArray[np.float64]:
+        """Factors of all states, shape (m, n); those of a mode sum to 1."""
+        factors = np.abs(self.left.conj() * self.right)
+        return np.asarray(factors / factors.sum(axis=1, keepdims=True), dtype=float)
+
+
+@dataclass(frozen=True)
+class Link:
+    """Mode ``source`` of one point is mode ``target`` of another."""
+
+    source: int
+    target: int
+    similarity: float
+
+
+def similarity(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
+    """How much every mode of one point is every mode of another, shape (m_a, m_b), from 0 to 1.
+
+    States that only one of the points has count as at rest.
+    """
+    common = [name for name in a.names if name in set(b.names)]
+    of_a, of_b = ([s.names.index(name) for name in common] for s in (a, b))
+    forth = a.left[:, of_a].conj() @ b.right[:, of_b].T
+    back = (b.left[:, of_b].conj() @ a.right[:, of_a].T).T
+    norm_a, norm_b = (np.einsum("ij,ij->i", s.left.conj(), s.right) for s in (a, b))
+    product = np.abs(forth * back) / np.abs(np.outer(norm_a, norm_b))
+    # Above 1 only near a double eigenvalue, where eigenvectors say little: as far from certain as its inverse.
+    return np.asarray(np.where(product > 1, 1 / np.maximum(product, 1.0), product), dtype=float)
+
+
+def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
+    """Pair the modes of two points so that the sum of their similarities is largest.
+
+    Pairs below the threshold, and those with another candidate nearly as good, are left out: the mode is
+    ambiguous there, or has come or gone.
+    """
+    if not (len(a.eigenvalues) and len(b.eigenvalues)):
+        return []
+    alike = similarity(a, b)
+    sizes = np.abs(a.eigenvalues)[:, None] + np.abs(b.eigenvalues)[None, :]
+    distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(sizes > 0, sizes, 1.0)
+    cost = np.where(alike >= threshold, 1 - alike + _DISTANCE_WEIGHT * distance, 1 + 2 * _DISTANCE_WEIGHT)
+    links = []
+    for i, k in zip(*linear_sum_assignment(cost), strict=True):
+        rivals = [*np.delete(alike[i], k), *np.delete(alike[:, k], i)]
+        if alike[i, k] >= max(threshold, max(rivals, default=0.0) + _MARGIN):
+            links.append(Link(int(i), int(k), float(alike[i, k])))
+    return links
+
+
+def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
+    """Whether a mode of this frequency may just have entered the range, or may leave it next [Hz]."""
+    return not frequency_range[0] * _EDGE < frequency < frequency_range[1] / _EDGE
+
+
+def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD) -> bool:
+    """Whether a mode of one point has no partner in the other without being near an end of the range [Hz]."""
+    links = match(a, b, threshold)
+    paired = ({link.source for link in links}, {link.target for link in links})
+    return any(
+        i not in known and not near_an_end(float(frequency), frequency_range)
+        for s, known in zip((a, b), paired, strict=True)
+        for i, frequency in enumerate(s.frequencies)
+    )
+
+
+@dataclass
+class Followed(Generic[Place]):
+    """Which trajectory every mode belongs to.
+
+    Attributes
+    ----------
+    trajectory
+        Numbers of the trajectories of a point's modes.
+    similarity
+        To the point that each mode was recognised from; NaN where a trajectory begins.
+    origin
+        That point; None where a trajectory begins.
+    """
+
+    trajectory: dict[Place, list[int]] = field(default_factory=dict)
+    similarity: dict[Place, list[float]] = field(default_factory=dict)
+    origin: dict[Place, list[Place | None]] = field(default_factory=dict)
+
+
+def follow(
+    points: Mapping[Place, ModeSet],
+    route: Iterable[tuple[Place, Sequence[Place]]],
+    threshold: float = THRESHOLD,
+) -> Followed[Place]:
+    """Give every mode of every point the number of a trajectory.
+
+    Parameters
+    ----------
+    points
+        Modes by place.
+    route
+        Places in the order of walking, each with the earlier places that its modes are recognised from; a
+        mode that the first of these does not have is looked for in the next.
+    threshold
+        Least similarity.
+    """
+    result: Followed[Place] = Followed()
+    count = 0
+    for place, origins in route:
+        modes = points[place]
+        numbers: dict[int, tuple[int, float, Place | None]] = {}
+        for origin in origins:
+            for link in match(points[origin], modes, threshold):
+                number = result.trajectory[origin][link.source]
+                if link.target not in numbers and all(number != taken for taken, _, _ in numbers.values()):
+                    numbers[link.target] = (number, link.similarity, origin)
+        for i in range(len(modes.eigenvalues)):
+            if i not in numbers:
+                numbers[i] = (count, np.nan, None)
+                count += 1
+        entries = [numbers[i] for i in range(len(modes.eigenvalues))]
+        result.trajectory[place] = [number for number, _, _ in entries]
+        result.similarity[place] = [alike for _, alike, _ in entries]
+        result.origin[place] = [origin for _, _, origin in entries]
+    return result

@@ -1,0 +1,30 @@
+"""What all executors have in common."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol, TypeVar
+
+from orchestrator.errors import CosimError
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+ATTEMPTS = 3
+"""How often a task may lose its worker before it is given up."""
+
+
+class WorkerLostError(CosimError):
+    """The process that computed a task died every time."""
+
+
+class Executor(Protocol):
+    """Computes ``function(task)`` for many tasks."""
+
+    def run(
+        self, function: Callable[[Task], Result], tasks: Sequence[Task]
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
+        """Give the index of each task with its result, as soon as it is there, in any order.
+
+        An exception that ``function`` raises ends the run. A worker process that dies does not: its task is
+        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`.
+        """
+        ...

@@ -1,0 +1,104 @@
+"""Tasks on the cores of this machine, in processes: FMUs with Python inside hold its lock, so threads would wait."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLostError
+
+_QUEUE_PER_WORKER = 2
+"""Tasks under way for each worker; the second one waits there so that no worker does."""
+
+
+def number_of_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Processes:
+    """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+
+    def run(
+        self, function: Callable[[Task], Result], tasks: Sequence[Task]
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
+        """See `Executor.run`."""
+        waiting = deque(range(len(tasks)))
+        while waiting:
+            suspects = yield from self._run_together(function, tasks, waiting)
+            # A dead worker takes the whole pool along and does not say which task it had. Those that were under
+            # way are computed one at a time, so that only a task that really kills its worker is blamed for it.
+            for index in suspects:
+                yield index, self._run_alone(function, tasks[index])
+
+    def _run_together(self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]) -> Any:
+        """Compute what is waiting; ends early, with what was under way, if a worker dies."""
+        under_way: dict[Future[Result], int] = {}
+        suspects: list[int] = []
+        pool = _pool(min(self.workers, len(waiting)))
+        try:
+            while waiting or under_way:
+                try:
+                    while waiting and len(under_way) < _QUEUE_PER_WORKER * self.workers:
+                        under_way[pool.submit(function, tasks[waiting[0]])] = waiting[0]
+                        waiting.popleft()
+                except BrokenProcessPool:
+                    break
+                done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+                for future in done:
+                    index = under_way.pop(future)
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        suspects.append(index)
+                    else:
+                        yield index, future.result()
+                if suspects:
+                    break
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+        for future, index in under_way.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                yield index, future.result()
+            else:
+                suspects.append(index)
+        return sorted(suspects)
+
+    def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
+        for _ in range(ATTEMPTS - 1):
+            pool = _pool(1)
+            try:
+                return pool.submit(function, task).result()
+            except BrokenProcessPool:
+                continue
+            finally:
+                pool.shutdown(wait=True, cancel_futures=True)
+        return WorkerLostError(
+            f"its worker process died {ATTEMPTS} times; is there too little memory? Try fewer --workers, "
+            "or this point alone with `gfor modes`"
+        )
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    # Spawned and not forked: a copy of a process that has loaded FMUs and BLAS threads is not safe to use.
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
+
+
+def _start_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

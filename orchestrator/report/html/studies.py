@@ -1,0 +1,170 @@
+"""The sections of the page that sweeps and designs fill."""
+
+from html import escape
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
+from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
+from orchestrator.report.html.folder import Results
+
+
+def _axis(sweep: xr.Dataset) -> str:
+    """The parameter along which the trajectories run: the last one that varies."""
+    return str([d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory")][-1])
+
+
+def sweep_title(sweep: xr.Dataset) -> str:
+    """``Trajectories along grid.X_L``."""
+    return f"Trajectories along {_axis(sweep)}"
+
+
+def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
+    """Trajectories of the modes, and damping, frequency and participation of the named ones along the parameter."""
+    axis = _axis(sweep)
+    others = [d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory", axis)]
+    shown = sweep.isel(dict.fromkeys(others, 0))
+    names = [str(s) for s in shown["scenario"].values]
+    known = [s["name"] for s in results.scenarios]
+    shades = {s: colour(known.index(s) if s in known else k) for k, s in enumerate(names)}
+    title = {s["name"]: s["title"] for s in results.scenarios}
+    unit = shown[axis].attrs.get("units", "1")
+    label = f"{axis} [{unit}]" if unit != "1" else axis
+    key = legend((title.get(s, s), shades[s]) for s in names)
+    lines, marks = _trajectories(shown, axis, shades, title)
+    ends = f"{shown[axis].values[0]:g} to {shown[axis].values[-1]:g}"
+    picture, link = figures.add(
+        key + complex_plane(f"Trajectories along {axis}", marks, lines, _highest(shown)),
+        f"Modes for {label} from {ends} ({shown.sizes[axis]} points); the large cross is the start. "
+        "Each is followed by its eigenvector, so that it keeps its name where modes cross.",
+    )
+    fixed = "".join(
+        f"<p>At {escape(str(d))} = {float(sweep[d].values[0]):g}, the first of its values.</p>" for d in others
+    )
+    parts = [f"{fixed}<p>{link} shows how the modes move with {escape(label)}.</p>{picture}"]
+    for quantity, text, tick in (
+        ("damping", "Damping ratio", "Damping [%]"),
+        ("frequency", "Frequency", "Frequency [Hz]"),
+    ):
+        curves = [
+            Curve(title.get(s, s), shades[s], *points) for s in names if (points := _named(shown, s, axis, quantity))
+        ]
+        if curves:
+            picture, link = figures.add(
+                key + line_chart(f"{text} along {axis}", label, tick, curves, 260),
+                f"{text} of the named mode along {label}.",
+            )
+            parts.append(f"<p>{link}: {_extremes(curves, tick)}</p>{picture}")
+    parts.append(_states(shown, axis, label, names, title, figures))
+    return "".join(parts)
+
+
+def _trajectories(
+    shown: xr.Dataset, axis: str, shades: dict[str, str], title: dict[str, str]
+) -> tuple[list[Curve], list[Mark]]:
+    lines, marks = [], []
+    for s in shades:
+        one = shown.sel(scenario=s)
+        for t in range(one.sizes["trajectory"]):
+            real, hz, percent = (one[q].isel(trajectory=t).values for q in ("real", "frequency", "damping"))
+            there = np.isfinite(real) & (real > -3)
+            if not there.any():
+                continue
+            name = str(one["trajectory_name"].values[t])
+            lines.append(Curve(name, shades[s], real[there], hz[there]))
+            for n, k in enumerate(np.flatnonzero(there)):
+                text = (
+                    f"{name}, {title.get(s, s)}\n{axis} = {shown[axis].values[k]:.4g}\n"
+                    f"{hz[k]:.3f} Hz, damping {percent[k]:.2f} %\n{_shares(one, t, k)}"
+                )
+                marks.append(Mark(float(real[k]), float(hz[k]), shades[s], text, "dot" if n else "cross", large=True))
+    return lines, marks
+
+
+def _shares(one: xr.Dataset, trajectory: int, k: int) -> str:
+    values = one["participation"].isel(trajectory=trajectory).values[k]
+    states = [str(s) for s in one["state"].values]
+    order = np.argsort(-np.nan_to_num(values))[:3]
+    return "\n".join(f"{states[i]} {values[i]:.3f}" for i in order if np.isfinite(values[i]))
+
+
+def _highest(shown: xr.Dataset) -> float:
+    named = shown["frequency"].where(shown["named"] == 1)
+    found = float(named.max()) if bool(np.isfinite(named).any()) else float(shown["frequency"].max())
+    return min(1.25 * found, float(shown["frequency"].max()))
+
+
+def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> tuple[Any, Any] | None:
+    """The values of the mode that carries the case's first name, point by point."""
+    one = shown.sel(scenario=scenario)
+    chosen = one[quantity].where(one["named"] == 1)
+    values = chosen.max("trajectory", skipna=True).values if chosen.size else np.zeros(0)
+    there = np.isfinite(values)
+    return (shown[axis].values[there], values[there]) if there.sum() > 1 else None
+
+
+def _extremes(curves: list[Curve], unit: str) -> str:
+    said = [
+        f"{escape(c.label)} from {number(float(c.y[0]), 2)} to {number(float(c.y[-1]), 2)}, "
+        f"least {number(float(c.y.min()), 2)} at {c.x[np.argmin(c.y)]:.3g}"
+        for c in curves
+    ]
+    return f"{escape(unit)}: {'; '.join(said)}."
+
+
+def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: dict[str, str], figures: Figures) -> str:
+    """Participation of the swing states in the named mode, one small chart a scenario."""
+    states = [str(s) for s in shown["state"].values]
+    if not 0 < len(states) <= 6:
+        return ""
+    charts = []
+    for s in names:
+        one = shown.sel(scenario=s)
+        share = one["participation"].where(one["named"] == 1).max("trajectory", skipna=True)
+        curves = []
+        for k, state in enumerate(states):
+            values = share.sel(state=state).values
+            there = np.isfinite(values)
+            if there.sum() > 1:
+                curves.append(Curve(state, colour(k + 1), shown[axis].values[there], values[there]))
+        if curves:
+            charts.append(f"<h3>{escape(title.get(s, s))}</h3>" + line_chart(
+                f"Participation along {axis}, {s}", label, "Participation", curves, 170))  # fmt: skip
+    if not charts:
+        return ""
+    key = legend((state, colour(k + 1)) for k, state in enumerate(states))
+    picture, link = figures.add(
+        key + "".join(charts), f"Participation of the swing states in the named mode along {label}."
+    )
+    return f"<p>{link}: who carries the mode along the sweep.</p>{picture}"
+
+
+def design_title(sheet: dict[str, Any]) -> str:
+    """``Design of pod_p``."""
+    return f"Design of {sheet['controller']}"
+
+
+def design(sheet: dict[str, Any]) -> str:
+    """The calculation sheet of a POD design, step by step."""
+    sensitivity, target = sheet["sensitivity"], sheet["target_mode"]
+    modes = {"Target, POD off": target, "Predicted": sheet["predicted_mode"], "Achieved": sheet["achieved_mode"]}
+    settings = [
+        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"],
+        ["T_S2 [s]", f"{sheet['T_S2']:.4f}"],
+        ["N_S", str(sheet["N_S"])],
+        ["K", f"{sheet['K']:.1f}"],
+        ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
+    ]
+    rows = []
+    for name, mode in modes.items():
+        percent = -100 * mode["real"] / np.hypot(mode["real"], mode["imag"])
+        rows.append([name, eigenvalue(mode["real"], mode["imag"]), f"{mode['imag'] / 2 / np.pi:.3f}", damping(percent)])
+    kind = "lead" if sensitivity["phase_deg"] >= 0 else "lag"
+    return (
+        f"<p>Non-compensated eigenvalue sensitivity {sensitivity['magnitude']:.4g} ∠ "
+        f"{number(sensitivity['phase_deg'], 1)}°: a {kind} is needed.</p>"
+        + table("Setting", ["Parameter", "Value"], settings)
+        + table("Modes", ["Mode", "λ [rad/s]", "f [Hz]", "Damping [%]"], rows)
+    )

@@ -1,0 +1,97 @@
+"""A sweep on a terminal."""
+
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from orchestrator.report.sweep_dataset import Samples
+from orchestrator.report.sweep_plots import axis_label
+
+if TYPE_CHECKING:
+    from orchestrator.study.sweep_trajectories import Place
+
+_FAILURES_SHOWN = 5
+
+
+def trajectories(samples: Samples) -> Table:
+    """Where each trajectory leads: those with a name, or all where the case gives none."""
+    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for column in ("Scenario", "Mode", "From", "To"):
+        table.add_column(column, overflow="fold")
+    for column in ("f [Hz]", "Damping [%]", "Least damping [%]", "Named at", "Least similarity"):
+        table.add_column(column, justify="right")
+    anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
+    for sweep in samples.result.scenarios:
+        for trajectory in sweep.trajectories:
+            curve = list(samples.of(sweep, trajectory))
+            if not curve or (anything and trajectory.carries is None):
+                continue
+            (start, first), (stop, last) = curve[0], curve[-1]
+            where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
+            alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
+            table.add_row(
+                sweep.prepared.title,
+                trajectory.name,
+                _values(samples, start),
+                _values(samples, stop),
+                f"{first['frequency']:.3f} → {last['frequency']:.3f}",
+                f"{first['damping']:.2f} → {last['damping']:.2f}",
+                f"{least['damping']:.2f} at {_values(samples, where)}",
+                f"{sum(f['named'] for _, f in curve)} of {len(curve)}",
+                f"{min(alike):.2f}" if alike else "–",
+            )
+        table.add_section()
+    return table
+
+
+def remarks(samples: Samples) -> list[str]:
+    """What the user must know of points that failed, trajectories that break, and points in between."""
+    result, texts = samples.result, []
+    failures = list(result.failures())
+    if failures:
+        texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")
+        texts += [
+            f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
+            for sweep, place, error in failures[:_FAILURES_SHOWN]
+        ]
+        more = len(failures) - _FAILURES_SHOWN
+        texts += [f"  … and {more} more, in sweep.csv"] if more > 0 else []
+    breaks = [
+        (sweep, trajectory, place)
+        for sweep in result.scenarios
+        for trajectory in sweep.trajectories
+        for place, point in trajectory.points.items()
+        if point.beginning.name == "BROKEN"
+    ]
+    for sweep, trajectory, place in breaks[:_FAILURES_SHOWN]:
+        texts.append(
+            f"{sweep.prepared.name}: {trajectory.name} begins at {place_text(samples, place)}, not recognised in the "
+            "point before; take more points there"
+        )
+    more = len(breaks) - _FAILURES_SHOWN
+    texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
+    if result.refined:
+        texts.append(
+            f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
+            "(where, is marked 'refined' in sweep.csv)"
+        )
+    return texts
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number != 1 else "")
+
+
+def place_text(samples: Samples, place: "Place") -> str:
+    """``grid.X_L = 0.1 pu``."""
+    setting = samples.setting(place)
+    return ", ".join(f"{a.key} = {_value(setting[a.key])} {a.unit}".rstrip() for a in samples.axes)
+
+
+def _values(samples: Samples, place: "Place") -> str:
+    return ", ".join(_value(value) for value in samples.setting(place).values())
+
+
+def _value(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
