@@ -24,6 +24,7 @@ from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.report import tables
+from orchestrator.report.html.page import write_report
 from orchestrator.report.linear_model_files import save_linear_model
 from orchestrator.report.study_files import save_modes, save_run, save_study, summary_of
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
@@ -146,6 +147,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     vary.add_argument("--json", action="store_true", help="print JSON")
     vary.set_defaults(command=_sweep)
+
+    report = commands.add_parser("report", help="one self-contained HTML page from the folder of a run")
+    report.add_argument("folder", type=Path, metavar="DIR", help="folder of `gfor run`")
+    report.add_argument("others", type=Path, nargs="*", metavar="DIR", help="folders of sweeps and designs beside it")
+    report.add_argument("--out", type=Path, metavar="FILE.html", help="page (default: DIR/report.html)")
+    report.set_defaults(command=_report)
 
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
@@ -285,6 +292,11 @@ def _linearize(options: argparse.Namespace) -> int:
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    print(write_report(options.folder, options.others, options.out))
     return 0
 
 

@@ -13,7 +13,7 @@ Numbers = NDArray[np.float64]
 
 _WIDTH, _HEIGHT = 720, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 14, 12, 42
-_POINTS = 700
+_POINTS = 500
 """A curve is drawn with about so many points: more than the page has pixels to show."""
 
 
@@ -42,13 +42,14 @@ class Mark:
 
 @dataclass
 class Frame:
-    """Axes: ranges, labels, and the way from values to the picture."""
+    """Axes: ranges, labels, and the way from values to the picture; ``x_names`` stand at 0, 1, … for numbers."""
 
     x_range: tuple[float, float]
     y_range: tuple[float, float]
     x_label: str
     y_label: str
     height: int = _HEIGHT
+    x_names: Sequence[str] = ()
     parts: list[str] = field(default_factory=list)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
@@ -60,9 +61,11 @@ class Frame:
         """The finished picture; ``name`` is read out by a screen reader."""
         right, bottom = _WIDTH - _RIGHT, self.height - _BOTTOM
         grid: list[str] = []
-        for value, text in _ticks(self.x_range):
+        named = [(float(k), escape(text)) for k, text in enumerate(self.x_names)]
+        for value, text in named or _ticks(self.x_range):
             x, _ = self.at(value, self.y_range[0])
-            grid.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{bottom}"/>')
+            if not named:
+                grid.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{bottom}"/>')
             grid.append(f'<text x="{x:.1f}" y="{bottom + 16}" text-anchor="middle">{text}</text>')
         for value, text in _ticks(self.y_range):
             _, y = self.at(self.x_range[0], value)
@@ -135,7 +138,7 @@ def complex_plane(
 def bar_chart(name: str, groups: Sequence[str], bars: Sequence[tuple[str, str, Sequence[float]]]) -> str:
     """Groups of bars [%]: each entry of ``bars`` is a label, a colour and one height a group."""
     top = max([1.0, *(h for *_, heights in bars for h in heights)])
-    frame = Frame((-0.5, len(groups) - 0.5), (0.0, 1.08 * top), "", "Participation [%]", 220)
+    frame = Frame((-0.5, len(groups) - 0.5), (0.0, 1.08 * top), "", "Participation [%]", 220, groups)
     width = 0.8 / max(1, len(bars))
     for k, (label, colour, heights) in enumerate(bars):
         for i, height in enumerate(heights):
@@ -146,12 +149,7 @@ def bar_chart(name: str, groups: Sequence[str], bars: Sequence[tuple[str, str, S
                 f'<rect class="tip" x="{x0:.1f}" y="{y0:.1f}" width="{x1 - x0:.1f}" height="{max(0.0, y1 - y0):.1f}" '
                 f'fill="{colour}" data-tip="{escape(text)}"/>'
             )
-    svg = frame.svg(name, ' data-kind="bars"')
-    names = "".join(
-        f'<text x="{frame.at(i, 0)[0]:.1f}" y="{frame.height - _BOTTOM + 16}" text-anchor="middle">{escape(g)}</text>'
-        for i, g in enumerate(groups)
-    )
-    return svg.replace("</svg>", names + "</svg>")
+    return frame.svg(name, ' data-kind="bars"')
 
 
 def thinned(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:

@@ -36,8 +36,9 @@ class Figures:
         """The figure, and how a text calls it: "Figure 3"."""
         self.count += 1
         name = f"Figure {self.count}"
+        below = f"<figcaption><b>{name}.</b> {escape(caption)}</figcaption>"
         return (
-            f'<figure id="figure-{self.count}">{content}<figcaption><b>{name}.</b> {escape(caption)}</figcaption></figure>',
+            f'<figure id="figure-{self.count}">{content}{below}</figure>',
             f'<a href="#figure-{self.count}">{name}</a>',
         )
 

@@ -54,15 +54,16 @@ def page(results: Results) -> str:
     title = results.case.table.title or results.case.name
     links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
     body = "".join(
-        f'<section id="section-{k}"><h2>{escape(n)}</h2>{text}</section>' for k, (n, text) in enumerate(content)
+        f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>' for k, (name, text) in enumerate(content)
     )
     made = f"gfor-cosim {version('gfor-cosim')}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    subtitle = f"Small-signal and time-domain study by co-simulation of FMUs · {made}"
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}</style></head>
-<body><main><header><h1>{escape(title)}</h1><div class="soft">Small-signal and time-domain study by co-simulation of FMUs · {made}</div></header>
-<nav>{links}</nav>{sections.findings(results)}{body}</main><div id="tooltip" role="status"></div>
-<script>{_text("page.js")}</script></body></html>
+<body><main><header><h1>{escape(title)}</h1><div class="soft">{subtitle}</div></header>
+<nav>{links}</nav>{sections.findings(results)}{body}</main>
+<div id="tooltip" role="status"></div><script>{_text("page.js")}</script></body></html>
 """
 
 

@@ -73,8 +73,8 @@ def studied(results: Results) -> str:
     first = results.scenarios[0]
     solver = (
         f"Coupled as FMUs with a communication step of {1e6 * first['step_size']:g} µs ({escape(first['schedule'])}), "
-        f"simulated for {first['stop_time']:g} s. Modes come from perturbing the running FMUs around the coupled steady "
-        "state: the linear model is that of the FMUs that were simulated."
+        f"simulated for {first['stop_time']:g} s. Modes come from perturbing the running FMUs around the coupled "
+        "steady state: the linear model is that of the FMUs that were simulated."
     )
     source = f"<p>{escape(case.source)}</p>" if case.source else ""
     return f"{source}<p>{solver}</p>" + table(
@@ -203,39 +203,44 @@ def responses(results: Results, figures: Figures) -> str:
     """The case's plots, and what the curves say about the modes."""
     parts = [scenario_legend(results)]
     for plot in results.case.table.plots:
-        charts, notes = [], []
+        charts, columns = [], []
         for panel in plot.panels:
-            curves, says = _curves(results, panel.signal, panel.scale)
+            curves, deviations = _curves(results, panel.signal, panel.scale)
             if curves:
                 charts.append(line_chart(f"{plot.title}: {panel.label}", "Time [s]", panel.label, curves))
-                notes.append(f"{escape(panel.label)}: {says}")
+                columns.append((panel.label, deviations))
         if charts:
             dashed = " Dashed: response of the linear model." if results.linear else ""
             picture, link = figures.add("".join(charts), f"{plot.title}.{dashed}")
-            listed = "".join(f"<li>{note}</li>" for note in notes)
-            parts.append(
-                f"<h3>{escape(plot.title)}</h3><p>{link}. Largest deviation from the start:</p><ul>{listed}</ul>"
-            )
-            parts.append(picture)
+            rows = [
+                [escape(title), *(deviations.get(name, "–") for _, deviations in columns)]
+                for name, title in titles(results).items()
+            ]
+            linear = " (largest difference of the linear model, as a share of it)" if results.linear else ""
+            caption = f"Largest deviation from the start{linear}"
+            figures_of_it = table(caption, ["Scenario", *(label for label, _ in columns)], rows)
+            heading = f"<h3>{escape(plot.title)}</h3><p>{link} shows the responses to the events.</p>"
+            parts.append(f"{heading}{picture}{figures_of_it}")
     return "".join(parts) + _ring_downs(results)
 
 
-def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve], str]:
-    curves, says = [], []
+def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve], dict[str, str]]:
+    """One signal in every scenario, and how far it goes."""
+    curves, deviations = [], {}
     for k, s in enumerate(results.scenarios):
         seen = _signal(results.trajectories.get(s["name"]), expression)
         if seen is None:
             continue
         x, y = seen["time"].values, scale * seen.values
         curves.append(Curve(s["title"], colour(k), x, y))
-        text = f"{escape(s['title'])} {np.abs(y - y[0]).max():.3g}"
+        text = f"{np.abs(y - y[0]).max():.3g}"
         linear = _signal(results.linear.get(s["name"]), expression)
         if linear is not None:
             curves.append(Curve(f"{s['title']}, linear", "#000", linear["time"].values, scale * linear.values, True))
             share = relative_difference(seen, linear)
-            text += f" (linear model differs by at most {100 * share:.2g} % of it)" if np.isfinite(share) else ""
-        says.append(text)
-    return curves, ", ".join(says)
+            text += f" ({100 * share:.2g} %)" if np.isfinite(share) else ""
+        deviations[s["name"]] = text
+    return curves, deviations
 
 
 def _signal(dataset: xr.Dataset | None, expression: str) -> xr.DataArray | None:
@@ -283,7 +288,6 @@ def provenance(results: Results) -> str:
     if rows:
         listed = table("FMUs", ["Component", "Model", "Guid", "Made by"], rows, left=4)
         parts.append(f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>")
-    parts.append(
-        f"<details><summary>Case file {escape(results.case.name)}</summary><pre>{escape(results.case.text)}</pre></details>"
-    )
+    text = f"<pre>{escape(results.case.text)}</pre>"
+    parts.append(f"<details><summary>Case file {escape(results.case.name)}</summary>{text}</details>")
     return "".join(parts)

@@ -48,13 +48,15 @@ def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
         ("damping", "Damping ratio", "Damping [%]"),
         ("frequency", "Frequency", "Frequency [Hz]"),
     ):
-        curves = [
-            Curve(title.get(s, s), shades[s], *points) for s in names if (points := _named(shown, s, axis, quantity))
-        ]
+        curves = []
+        for s in names:
+            for rank, (name, points) in enumerate(_named(shown, s, axis, quantity).items()):
+                label_of = title.get(s, s) if rank == 0 else f"{title.get(s, s)}: {name}"
+                curves.append(Curve(label_of, shades[s], *points, dashed=rank > 0))
         if curves:
             picture, link = figures.add(
                 key + line_chart(f"{text} along {axis}", label, tick, curves, 260),
-                f"{text} of the named mode along {label}.",
+                f"{text} along {label} of the modes with a name; dashed: a second mode that has it in part.",
             )
             parts.append(f"<p>{link}: {_extremes(curves, tick)}</p>{picture}")
     parts.append(_states(shown, axis, label, names, title, figures))
@@ -65,7 +67,7 @@ def _trajectories(
     shown: xr.Dataset, axis: str, shades: dict[str, str], title: dict[str, str]
 ) -> tuple[list[Curve], list[Mark]]:
     lines, marks = [], []
-    for s in shades:
+    for s, shade in shades.items():
         one = shown.sel(scenario=s)
         for t in range(one.sizes["trajectory"]):
             real, hz, percent = (one[q].isel(trajectory=t).values for q in ("real", "frequency", "damping"))
@@ -73,13 +75,13 @@ def _trajectories(
             if not there.any():
                 continue
             name = str(one["trajectory_name"].values[t])
-            lines.append(Curve(name, shades[s], real[there], hz[there]))
-            for n, k in enumerate(np.flatnonzero(there)):
+            lines.append(Curve(name, shade, real[there], hz[there]))
+            for n, k in enumerate(np.flatnonzero(there).tolist()):
                 text = (
                     f"{name}, {title.get(s, s)}\n{axis} = {shown[axis].values[k]:.4g}\n"
                     f"{hz[k]:.3f} Hz, damping {percent[k]:.2f} %\n{_shares(one, t, k)}"
                 )
-                marks.append(Mark(float(real[k]), float(hz[k]), shades[s], text, "dot" if n else "cross", large=True))
+                marks.append(Mark(float(real[k]), float(hz[k]), shade, text, "dot" if n else "cross", large=True))
     return lines, marks
 
 
@@ -96,13 +98,15 @@ def _highest(shown: xr.Dataset) -> float:
     return min(1.25 * found, float(shown["frequency"].max()))
 
 
-def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> tuple[Any, Any] | None:
-    """The values of the mode that carries the case's first name, point by point."""
-    one = shown.sel(scenario=scenario)
-    chosen = one[quantity].where(one["named"] == 1)
-    values = chosen.max("trajectory", skipna=True).values if chosen.size else np.zeros(0)
-    there = np.isfinite(values)
-    return (shown[axis].values[there], values[there]) if there.sum() > 1 else None
+def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> dict[str, tuple[Any, Any]]:
+    """Along every trajectory that carries a name of the case somewhere: parameter and value."""
+    one, found = shown.sel(scenario=scenario), {}
+    for t in np.flatnonzero((one["named"] == 1).any(axis).values).tolist():
+        values = one[quantity].isel(trajectory=t).values
+        there = np.isfinite(values)
+        if there.sum() > 1:
+            found[str(one["trajectory_name"].values[t])] = (shown[axis].values[there], values[there])
+    return found
 
 
 def _extremes(curves: list[Curve], unit: str) -> str:
@@ -121,22 +125,17 @@ def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: d
         return ""
     charts = []
     for s in names:
-        one = shown.sel(scenario=s)
-        share = one["participation"].where(one["named"] == 1).max("trajectory", skipna=True)
-        curves = []
-        for k, state in enumerate(states):
-            values = share.sel(state=state).values
-            there = np.isfinite(values)
-            if there.sum() > 1:
-                curves.append(Curve(state, colour(k + 1), shown[axis].values[there], values[there]))
-        if curves:
-            charts.append(f"<h3>{escape(title.get(s, s))}</h3>" + line_chart(
-                f"Participation along {axis}, {s}", label, "Participation", curves, 170))  # fmt: skip
+        shares = {state: _named(shown.assign(share=shown["participation"].sel(state=state)), s, axis, "share")
+                  for state in states}  # fmt: skip
+        for name in next(iter(shares.values())):
+            curves = [Curve(x, colour(k + 1), *shares[x][name]) for k, x in enumerate(states) if name in shares[x]]
+            charts.append(f"<h3>{escape(title.get(s, s))}: {escape(name)}</h3>" + line_chart(
+                f"Participation along {axis}, {s}, {name}", label, "Participation", curves, 170))  # fmt: skip
     if not charts:
         return ""
     key = legend((state, colour(k + 1)) for k, state in enumerate(states))
     picture, link = figures.add(
-        key + "".join(charts), f"Participation of the swing states in the named mode along {label}."
+        key + "".join(charts), f"Participation of the swing states in the modes with a name along {label}."
     )
     return f"<p>{link}: who carries the mode along the sweep.</p>{picture}"
 
