@@ -15,7 +15,9 @@ from rich.progress import Progress as ProgressBar
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.python_fmu import export
+from orchestrator import cli_design
 from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.units import to_unit
@@ -33,6 +35,7 @@ examples:
   gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
+  gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -98,6 +101,11 @@ def _parser() -> argparse.ArgumentParser:
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
 
+    design = commands.add_parser("design", help="design a POD controller by eigenvalue sensitivity")
+    _case_arguments(design)
+    cli_design.add_arguments(design)
+    design.set_defaults(command=_design)
+
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
@@ -127,6 +135,14 @@ def _case_arguments(parser: argparse.ArgumentParser) -> None:
         type=_assignment,
         metavar="COMPONENT.PARAMETER=VALUE",
         help="override a value (repeatable)",
+    )
+    parser.add_argument(
+        "--parameters",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
     )
     parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
 
@@ -185,7 +201,11 @@ def _value(text: str) -> Value:
 def _prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
     case = load_case(options.case)
     stop = getattr(options, "stop", None)
-    return case, case.prepare(options.scenario, dict(options.set), options.step, stop)
+    return case, case.prepare(options.scenario, dict(options.set), options.step, stop, _parameters(options))
+
+
+def _parameters(options: argparse.Namespace) -> list[ParameterFile]:
+    return [read_parameter_file(path) for path in options.parameters]
 
 
 # -- commands ------------------------------------------------------------------------------------
@@ -210,6 +230,11 @@ def _modes(options: argparse.Namespace) -> int:
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
     _print_warnings(results)
     return 0
+
+
+def _design(options: argparse.Namespace) -> int:
+    values = {"overrides": dict(options.set), "parameters": _parameters(options), "step_size": options.step}
+    return cli_design.run_design(options, load_case(options.case), _console(stderr=options.json), values)
 
 
 def _run(options: argparse.Namespace) -> int:

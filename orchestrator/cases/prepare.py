@@ -2,7 +2,7 @@
 
 import difflib
 import fnmatch
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -13,6 +13,7 @@ from fmus.toolchain.catalogue import build_model, model_names, network_of
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.event_tables import event_of
 from orchestrator.cases.network_data import UNIT_KINDS, network_elements, unit_components, unit_rows
+from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import (
     CaseTable,
@@ -31,6 +32,8 @@ from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 
 Place = Callable[..., str]
+Layer = tuple[Mapping[str, Value], Callable[[str], str]]
+"""Values by ``component.variable``, and where each is written; a later layer goes before an earlier one."""
 _COMMAND_LINE = "--set"
 _ALPHA = "units.alpha"
 
@@ -69,6 +72,10 @@ def catalogue_fmu(model: str, network: Network | None = None) -> FmuDescription:
     return read_description(cached(build_model(model, **arguments)))
 
 
+def _layer(file: ParameterFile) -> Layer:
+    return file.values, file.place
+
+
 class Preparer:
     """Makes one scenario ready; ``problems`` collects what is wrong."""
 
@@ -80,10 +87,13 @@ class Preparer:
         overrides: dict[str, Value],
         directory: Path,
         place: Place,
+        parameters: Sequence[ParameterFile] = (),
     ) -> None:
         self.case, self.name, self.scenario = case, name, scenario
-        self.overrides, self.directory, self.place = overrides, directory, place
+        self.directory, self.place = directory, place
         self.problems: list[Problem] = []
+        self.layers = [*self._scenario_layers(), *map(_layer, parameters)]
+        self.layers.append((overrides, lambda key: f"{_COMMAND_LINE} {key}"))
         self.system = System()
         self.network: Network | None = None
         everything = dict(case.components) | self._units()
@@ -94,8 +104,8 @@ class Preparer:
         """Add a problem."""
         self.problems.append(Problem(place, text))
 
-    def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
-        """Go through all of it; None if there were problems that leave nothing to run."""
+    def assemble(self) -> System:
+        """The scenario's components with their values; nothing is connected yet."""
         for name in self.scenario.remove:
             if name not in self.known:
                 self.note(self.place("scenarios", self.name, "remove"), f"there is no component {name!r} to remove")
@@ -103,6 +113,11 @@ class Preparer:
         for name, table in self.tables.items():
             self._add_component(name, table)
         self._assign_values()
+        return self.system
+
+    def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
+        """Go through all of it; None if there were problems that leave nothing to run."""
+        self.assemble()
         self._connect()
         self._check_inputs()
         flow = None if self.problems else self._power_flow()
@@ -143,15 +158,12 @@ class Preparer:
         return unit_components(table, alpha, rows)
 
     def _alpha(self, table: UnitsTable) -> float:
-        """The converters' share: from the command line, else the scenario, else the table."""
-        for values, where in (
-            (self.overrides, _COMMAND_LINE),
-            (self.scenario.set, self.place("scenarios", self.name, "set")),
-        ):
+        """The converters' share: from the command line, else a parameter file, else the scenario, else the table."""
+        for values, place in reversed(self.layers):
             if _ALPHA in values:
                 value = values[_ALPHA]
                 if isinstance(value, bool | str) or not 0 <= value <= 1:
-                    self.note(f"{where} {_ALPHA}", f"alpha = {value!r}; it must be a number from 0 to 1")
+                    self.note(place(_ALPHA), f"alpha = {value!r}; it must be a number from 0 to 1")
                     return table.alpha
                 return value
         return table.alpha
@@ -207,15 +219,24 @@ class Preparer:
 
     # -- values ----------------------------------------------------------------------------------
 
+    def _scenario_layers(self) -> list[Layer]:
+        """The scenario's parameter files, then what it sets itself."""
+        layers: list[Layer] = []
+        for index, name in enumerate(self.scenario.parameters):
+            try:
+                layers.append(_layer(read_parameter_file(self.directory / name)))
+            except InputError as error:
+                self.note(self.place("scenarios", self.name, "parameters", index), str(error))
+        return [*layers, (self.scenario.set, lambda key: self.place("scenarios", self.name, "set", key))]
+
     def _assign_values(self) -> None:
         for name, table in self.tables.items():
             for group in ("parameters", "inputs"):
                 for path, value in flatten(getattr(table, group)):
                     self._assign(name, ".".join(path), value, self.place("components", name, group, *path))
-        for key, value in self.scenario.set.items():
-            self._assign_key(key, value, self.place("scenarios", self.name, "set", key))
-        for key, value in self.overrides.items():
-            self._assign_key(key, value, f"{_COMMAND_LINE} {key}")
+        for values, place in self.layers:
+            for key, value in values.items():
+                self._assign_key(key, value, place(key))
 
     def _assign_key(self, key: str, value: Value, where: str) -> None:
         """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""

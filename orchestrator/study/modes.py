@@ -114,7 +114,7 @@ def modes_of(
         everything = find_modes(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
         modes = [mode for mode in everything if low <= mode.frequency_hz <= high]
         named = {
-            name: mode for name, mode in _named_modes(case, model, everything).items() if any(mode is m for m in modes)
+            name: mode for name, mode in named_modes(case, model, everything).items() if any(mode is m for m in modes)
         }
     else:
         modes, named = find_critical_modes(model, low, high, critical), {}
@@ -132,7 +132,7 @@ def modes_of(
     )
 
 
-def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
+def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
     """The modes whose shape the case describes."""
 
     def states(patterns: Sequence[str]) -> list[str]:
