@@ -15,7 +15,9 @@ from rich.progress import Progress as ProgressBar
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.python_fmu import export
+from orchestrator import cli_design
 from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.units import to_unit
@@ -41,6 +43,7 @@ examples:
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor sweep two_area --vary grid.X_L=0.01:0.6:60  all modes followed along the line's reactance
+  gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -154,6 +157,11 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--out", type=Path, metavar="FILE.html", help="page (default: DIR/report.html)")
     report.set_defaults(command=_report)
 
+    design = commands.add_parser("design", help="design a POD controller by eigenvalue sensitivity")
+    _case_arguments(design)
+    cli_design.add_arguments(design)
+    design.set_defaults(command=_design)
+
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
@@ -183,6 +191,14 @@ def _case_arguments(parser: argparse.ArgumentParser) -> None:
         type=_assignment,
         metavar="COMPONENT.PARAMETER=VALUE",
         help="override a value (repeatable)",
+    )
+    parser.add_argument(
+        "--parameters",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
     )
     parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
 
@@ -254,7 +270,11 @@ def _value(text: str) -> Value:
 def _prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
     case = load_case(options.case)
     stop = getattr(options, "stop", None)
-    return case, case.prepare(options.scenario, dict(options.set), options.step, stop)
+    return case, case.prepare(options.scenario, dict(options.set), options.step, stop, _parameters(options))
+
+
+def _parameters(options: argparse.Namespace) -> list[ParameterFile]:
+    return [read_parameter_file(path) for path in options.parameters]
 
 
 # -- commands ------------------------------------------------------------------------------------
@@ -300,6 +320,11 @@ def _report(options: argparse.Namespace) -> int:
     return 0
 
 
+def _design(options: argparse.Namespace) -> int:
+    values = {"overrides": dict(options.set), "parameters": _parameters(options), "step_size": options.step}
+    return cli_design.run_design(options, load_case(options.case), _console(stderr=options.json), values)
+
+
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
     folder = _folder(options.out or Path("results") / case.name)
@@ -338,7 +363,8 @@ def _run(options: argparse.Namespace) -> int:
 def _sweep(options: argparse.Namespace) -> int:
     executor = choose_executor(options.workers, options.scheduler)
     case = load_case(options.case)
-    plan = plan_sweep(case, options.vary, options.scenario, dict(options.set), options.step, options.range)
+    values = {key: value for file in _parameters(options) for key, value in file.values.items()} | dict(options.set)
+    plan = plan_sweep(case, options.vary, options.scenario, values, options.step, options.range)
     folder = _folder(options.out or Path("results") / f"{case.name}_sweep")
     console = _console(stderr=options.json)
     with _progress_bar(console) as bar:

@@ -17,7 +17,7 @@ from orchestrator.analysis.linear_model import LinearModel, Vector
 from orchestrator.analysis.modes import Mode, find_modes, least_damped_first, make_mode, to_continuous
 from orchestrator.errors import AnalysisError
 
-_DENSE = 200
+DENSE = 200
 """Up to so many states the full spectrum is cheaper."""
 
 _STRETCH = 1.35
@@ -58,7 +58,7 @@ def find_critical_modes(
             f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping_ratio:g} is none; "
             "the frequencies must rise from above 0, and the damping ratio lie between 0 and 0.9"
         )
-    if len(model.names) <= _DENSE:
+    if len(model.names) <= DENSE:
         found = find_modes(model, lowest_hz, highest_hz)
     else:
         beyond = 1 + _SMALLEST  # a cell does not own its upper edges
@@ -75,7 +75,7 @@ def growth_rate(model: LinearModel) -> float | None:
     """
     if model.step_size is None:
         raise AnalysisError("the growth of a step map was asked for, but the model is continuous")
-    if len(model.names) <= _DENSE:
+    if len(model.names) <= DENSE:
         values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return float(values.real.max())
     n = len(model.names)
@@ -96,11 +96,24 @@ def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     AnalysisError
         If Arnoldi's method does not converge.
     """
-    if len(model.names) <= _DENSE:
+    if len(model.names) <= DENSE:
         values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return complex(values[np.argmin(np.abs(values - wanted))])
     values = _Search(model, wanted).nearest(2)
     return complex(values[np.argmin(np.abs(values - wanted))])
+
+
+def nearest_pairs(model: LinearModel, wanted: complex, count: int) -> list[tuple[complex, Vector, Vector]]:
+    """The eigenvalues λ [rad/s] nearest to a given one, each with its left and right eigenvector.
+
+    Raises
+    ------
+    AnalysisError
+        If Arnoldi's method does not converge.
+    """
+    search = _Search(model, wanted)
+    search.nearest(count)
+    return search.pairs(range(count))
 
 
 @dataclass(frozen=True)
@@ -189,13 +202,16 @@ class _Search:
 
     def modes(self, chosen: Sequence[int]) -> list[Mode]:
         """Modes of some of the values that were found last."""
+        return [make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
+
+    def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:
+        """Eigenvalue, left and right eigenvector of some of the values that were found last."""
         if not chosen:
             return []
         nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
         partners = self._to_lambda(nu.conj())
-        names = self._model.names
         return [
-            make_mode(self._values[k], left[:, np.argmin(np.abs(partners - self._values[k]))], self._right[:, k], names)
+            (complex(self._values[k]), left[:, np.argmin(np.abs(partners - self._values[k]))], self._right[:, k])
             for k in chosen
         ]
 

@@ -3,7 +3,7 @@
 import fnmatch
 from typing import Any
 
-from orchestrator.cases.draft import COMMAND_LINE, Draft
+from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import Value
 from orchestrator.cases.unit_tables import sets_alpha
@@ -18,10 +18,9 @@ def assign_values(draft: Draft) -> None:
         for group in ("parameters", "inputs"):
             for path, value in flatten(getattr(table, group)):
                 _assign(draft, name, ".".join(path), value, draft.place("components", name, group, *path))
-    for key, value in draft.scenario.set.items():
-        _assign_key(draft, key, value, draft.place("scenarios", draft.name, "set", key))
-    for key, value in draft.overrides.items():
-        _assign_key(draft, key, value, f"{COMMAND_LINE} {key}")
+    for layer in draft.layers:
+        for key, value in layer.values.items():
+            _assign_key(draft, key, value, layer.place(key))
 
 
 def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:

@@ -14,16 +14,24 @@ Place = Callable[..., str]
 COMMAND_LINE = "--set"
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Values by ``component.variable``, and where each is written."""
+
+    values: Mapping[str, Value]
+    place: Callable[[str], str]
+
+
 @dataclass
 class Draft:
     """What the steps of the preparation share.
 
     Attributes
     ----------
-    overrides
-        Values of the command line.
     place
         Key path → its text with the line of the file.
+    layers
+        Values from parameter files, the scenario and the command line; a later layer goes before an earlier one.
     problems
         All that is wrong so far.
     data
@@ -39,9 +47,9 @@ class Draft:
     case: CaseTable
     name: str
     scenario: ScenarioTable
-    overrides: Mapping[str, Value]
     directory: Path
     place: Place
+    layers: list[Layer] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     data: NetworkData | None = None
     network: Network | None = None
@@ -65,8 +73,3 @@ class Draft:
     def grid(self) -> str | None:
         """Name of the grid component."""
         return self.case.power_flow.grid if self.case.power_flow else None
-
-    @property
-    def set_place(self) -> str:
-        """Where the scenario sets values."""
-        return self.place("scenarios", self.name, "set")

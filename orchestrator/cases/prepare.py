@@ -1,6 +1,7 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
 import fnmatch
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,7 +12,9 @@ from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.draft import Draft, Place
 from orchestrator.cases.event_tables import scenario_events
+from orchestrator.cases.layers import value_layers
 from orchestrator.cases.network_data import network_data
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
@@ -70,8 +73,10 @@ class Preparer:
         overrides: dict[str, Value],
         directory: Path,
         place: Place,
+        parameters: Sequence[ParameterFile] = (),
     ) -> None:
-        self.draft = draft = Draft(case, name, scenario, overrides, directory, place)
+        self.draft = draft = Draft(case, name, scenario, directory, place)
+        draft.layers = value_layers(draft, parameters, overrides)
         self._read_network()
         self._everything = dict(case.components) | unit_components(draft)
         draft.known |= set(self._everything)
@@ -81,8 +86,8 @@ class Preparer:
     def problems(self) -> list[Problem]:
         return self.draft.problems
 
-    def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
-        """Go through all of it; None if there were problems that leave nothing to run."""
+    def assemble(self) -> System:
+        """The scenario's components with their values; nothing is connected yet."""
         draft = self.draft
         for name in draft.scenario.remove:
             if name not in draft.known:
@@ -91,6 +96,12 @@ class Preparer:
         for name, table in draft.tables.items():
             self._add_component(name, table)
         assign_values(draft)
+        return draft.system
+
+    def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
+        """Go through all of it; None if there were problems that leave nothing to run."""
+        draft = self.draft
+        self.assemble()
         connect(draft)
         check_inputs(draft)
         flow = None if draft.problems else self._power_flow()

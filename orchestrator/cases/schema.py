@@ -207,6 +207,7 @@ class ScenarioTable(Table):
 
     title: str = ""
     remove: list[str] = []
+    parameters: list[str] = []
     set: dict[str, Value] = {}
     events: list[EventTable] | None = None
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.csv_rows import Row, optional_number, place_of, rows_of
-from orchestrator.cases.draft import COMMAND_LINE, Draft
+from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
@@ -147,19 +147,19 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:
-    """Every unit's share: the command line's, else the scenario's, else the row's, else the table's.
+    """Every unit's share: the strongest layer's that has one, else the row's, else the table's.
 
-    Within the first two, a key for this unit goes before the one for all.
+    Within a layer, a key for this unit goes before the one for all.
     """
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
-    for values, where in ((draft.scenario.set, draft.set_place), (draft.overrides, COMMAND_LINE)):
-        for key in sorted((k for k in values if sets_alpha(k)), key=lambda k: k != _ALPHA):
+    for layer in draft.layers:
+        for key in sorted((k for k in layer.values if sets_alpha(k)), key=lambda k: k != _ALPHA):
             label = key.removeprefix(_ALPHA).removeprefix(".")
             if label and label not in alphas:
                 hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
-                draft.note(f"{where} {key}", f"there is no unit {label!r}; {hint}")
+                draft.note(layer.place(key), f"there is no unit {label!r}; {hint}")
                 continue
-            share = _share(draft, values[key], f"{where} {key}")
+            share = _share(draft, layer.values[key], layer.place(key))
             if share is not None:
                 alphas |= {label: share} if label else dict.fromkeys(alphas, share)
     return alphas

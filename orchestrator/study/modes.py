@@ -113,7 +113,7 @@ def modes_of(
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
         everything = find_modes(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
         modes = [mode for mode in everything if low <= mode.frequency_hz <= high]
-        candidates = _named_modes(case, model, everything)
+        candidates = named_modes(case, model, everything)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         modes, named = find_critical_modes(model, low, high, critical), {}
@@ -131,7 +131,7 @@ def modes_of(
     )
 
 
-def _named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
+def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
     """The modes whose shape the case describes."""
 
     def states(patterns: Sequence[str]) -> list[str]:

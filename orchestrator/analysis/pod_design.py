@@ -1,0 +1,146 @@
+"""Equations of the POD design by eigenvalue sensitivity (the paper's section on the design of POD controllers).
+
+Pure functions on complex numbers; what they are given comes from linearisations of the coupled system. Eigenvalues
+are in rad/s with a positive imaginary part, gains in pu of the converter's rating.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass
+
+from orchestrator.errors import AnalysisError
+
+LARGEST_STAGE_ANGLE = 60.0
+"""What one lead/lag stage is customarily asked for at most [°]; beyond it a_j grows out of proportion."""
+
+
+@dataclass(frozen=True)
+class LeadLag:
+    """N_S equal stages (1 + s·T_S1)/(1 + s·T_S2).
+
+    Attributes
+    ----------
+    T_S1, T_S2
+        Lead and lag time constants [s]; both 0 for no compensation.
+    N_S
+        Number of stages.
+    """
+
+    T_S1: float
+    T_S2: float
+    N_S: int
+
+    @property
+    def filtering_ratio(self) -> float:
+        """Ratio a = T_S2/T_S1; 1 where there is no compensation."""
+        return self.T_S2 / self.T_S1 if self.T_S1 else 1.0
+
+    @property
+    def is_lead(self) -> bool:
+        return self.T_S1 > self.T_S2
+
+    @property
+    def stage_angle_deg(self) -> float:
+        """Largest angle of one stage, at ω = 1/√(T_S1·T_S2) [°]; negative for lag."""
+        return math.degrees(math.asin((1 - self.filtering_ratio) / (1 + self.filtering_ratio)))
+
+    def response(self, s: complex) -> complex:
+        """Of all stages together at s [rad/s]."""
+        return ((1 + s * self.T_S1) / (1 + s * self.T_S2)) ** self.N_S
+
+
+NO_COMPENSATION = LeadLag(0.0, 0.0, 0)
+
+
+def damping_ratio(eigenvalue: complex) -> float:
+    """ζ = −Re λ/|λ|; 0 for λ = 0."""
+    size = abs(eigenvalue)
+    return -eigenvalue.real / size if size else 0.0
+
+
+def predicted_mode(required_damping: float, initial: complex) -> complex:
+    """λ_d = −ζ_d·ω_0 + jω_0: the mode that is aimed at, its frequency unchanged."""
+    return complex(-required_damping * initial.imag, initial.imag)
+
+
+def sensitivity(with_gain: complex, without: complex, gain: float) -> complex:
+    """Ŝ = (λ(ΔK) − λ_0)/ΔK, the eigenvalue sensitivity by finite difference [rad/s per pu].
+
+    Raises
+    ------
+    AnalysisError
+        If the controller does not move the mode at all.
+    """
+    moved = with_gain - without
+    if abs(moved) <= 1e-9 * max(1.0, abs(without)):
+        raise AnalysisError(
+            f"a gain of {gain:g} pu moves the mode {without:.4g} rad/s by only {abs(moved):.1e} rad/s, so it has no "
+            "sensitivity to design with; choose another mode, another controller, or a larger --delta-gain"
+        )
+    return moved / gain
+
+
+def angle_deg(value: complex) -> float:
+    """∠ of a complex number in (−180°, 180°]."""
+    degrees = math.degrees(cmath.phase(value))
+    return 180.0 if degrees == -180.0 else degrees
+
+
+def compensation_deg(phase_deg: float) -> float:
+    """What all stages together must add to turn a sensitivity's angle to 180° [°]: lead if φ ≥ 0, else lag."""
+    return 180.0 - phase_deg if phase_deg >= 0 else -180.0 - phase_deg
+
+
+def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
+    """Lead/lag that turns a non-compensated sensitivity to 180°, centred on the mode's frequency.
+
+    φ = (π ∓ φ_NC)/N_S; a = (1 − sin φ)/(1 + sin φ) for lead, its inverse for lag;
+    T_S1 = 1/(ω_0·√a), T_S2 = a·T_S1.
+
+    Parameters
+    ----------
+    phase_deg
+        Angle of the non-compensated sensitivity [°], in (−180, 180].
+    centre
+        ω_0 [rad/s].
+    stages
+        N_S; with 0 there is no compensation.
+
+    Raises
+    ------
+    AnalysisError
+        If a stage would have to turn by 90° or more, which none can.
+    """
+    if stages == 0:
+        return NO_COMPENSATION
+    each = compensation_deg(phase_deg) / stages
+    if abs(each) >= 90:
+        enough = math.ceil(abs(compensation_deg(phase_deg)) / LARGEST_STAGE_ANGLE)
+        raise AnalysisError(
+            f"the sensitivity's angle is {phase_deg:.1f}°, so each of {stages} lead/lag stages would have to turn it "
+            f"by {abs(each):.1f}°; one stage turns by less than 90°, sensibly by {LARGEST_STAGE_ANGLE:g}°; "
+            f"ask for {enough} stages with --stages"
+        )
+    sine = math.sin(math.radians(each))
+    a = (1 - sine) / (1 + sine)
+    T_S1 = 1 / (centre * math.sqrt(a))
+    return LeadLag(T_S1, a * T_S1, stages)
+
+
+def required_gain(target: complex, initial: complex, magnitude: float) -> float:
+    """K = |λ_d − λ_0|/|∂λ/∂K| [pu]."""
+    return abs(target - initial) / magnitude
+
+
+def bounded(gain: float, bounds: tuple[float, float]) -> float:
+    """The gain, brought into [K_min, K_max]."""
+    return min(max(gain, bounds[0]), bounds[1])
+
+
+def local_non_compensated(compensated: complex, mode: complex, filters: LeadLag) -> complex:
+    """The sensitivity that would be there without the lead/lag, from that with it.
+
+    At a mode s = λ the residue is multiplied by the compensation's transfer function at λ; dividing by it is exact for
+    a gain of 0, and at a present gain tells by how much the compensation is to be turned.
+    """
+    return compensated / filters.response(mode)

@@ -1,0 +1,107 @@
+"""Following one mode while a parameter changes: by its eigenvectors, not by its place in a list.
+
+The measure is |l_aᴴ·r_b|·|l_bᴴ·r_a| with lᴴ·r = 1 for both. It is 1 for a mode and itself, 0 for two modes of the
+same matrix, and does not depend on the units of the states, as a comparison of mode shapes alone would.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from orchestrator.analysis.critical_modes import DENSE, nearest_pairs
+from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.modes import to_continuous
+from orchestrator.errors import AnalysisError
+
+_SAME = 0.6
+"""Association from which two modes of neighbouring models count as one and the same."""
+
+_SHORTEST = 1 / 64
+"""Smallest part of a path that is gone in one stride."""
+
+_NEIGHBOURS = 8
+
+_DEFECTIVE = 1e-12
+"""Below this lᴴ·r is rounding: equal stages side by side share one eigenvector, and such a mode is like no other."""
+
+
+@dataclass(frozen=True)
+class Eigenpair:
+    """An eigenvalue λ [rad/s] with its left and right eigenvectors, scaled so that lᴴ·r = 1."""
+
+    eigenvalue: complex
+    left: Vector
+    right: Vector
+
+    def association(self, other: "Eigenpair") -> float:
+        """How much the two are the same mode, from 0 to about 1."""
+        return float(abs(np.vdot(self.left, other.right)) * abs(np.vdot(other.left, self.right)))
+
+
+def eigenpairs(model: LinearModel, lowest_hz: float, highest_hz: float) -> tuple[list[Eigenpair], Vector]:
+    """The pairs of a frequency range [Hz], one of each conjugate two, and all eigenvalues [rad/s]."""
+    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
+    lambdas, alive = to_continuous(values, model.step_size)
+    left, right = left[:, alive], right[:, alive]
+    frequencies = lambdas.imag / (2 * np.pi)
+    chosen = np.flatnonzero((frequencies >= lowest_hz) & (frequencies <= highest_hz) & (lambdas.imag >= 0))
+    return [_pair(complex(lambdas[k]), left[:, k], right[:, k]) for k in chosen], lambdas
+
+
+def pairs_near(model: LinearModel, wanted: complex) -> list[Eigenpair]:
+    """The pairs nearest to a point [rad/s]; of a small model, all pairs of the upper half plane."""
+    if len(model.names) <= DENSE:
+        return eigenpairs(model, 0.0, np.inf)[0]
+    return [_pair(*found) for found in nearest_pairs(model, wanted, _NEIGHBOURS)]
+
+
+def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
+    """The pair whose eigenvalue is nearest to a given one."""
+    return min(pairs_near(model, eigenvalue), key=lambda pair: abs(pair.eigenvalue - eigenvalue))
+
+
+def follow(start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float) -> Eigenpair:
+    """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
+
+    Parameters
+    ----------
+    start
+        The mode at ``begin``.
+    model_at
+        The linear model at any point of the path.
+
+    Raises
+    ------
+    AnalysisError
+        If even a short stride leaves it open which mode it is.
+    """
+    shortest = abs(end - begin) * _SHORTEST
+    here, pair, stride = begin, start, end - begin
+    while here != end:
+        there = end if abs(end - here) <= abs(stride) * (1 + 1e-12) else here + stride
+        found = _recognise(pair, pairs_near(model_at(there), pair.eigenvalue))
+        if found is not None:
+            here, pair, stride = there, found, 2 * stride
+        elif abs(stride) > shortest:
+            stride = (there - here) / 2
+        else:
+            raise AnalysisError(
+                f"the mode {pair.eigenvalue:.4g} rad/s cannot be followed beyond {here:.4g} on the way to {end:.4g}: "
+                "there it merges with another mode; take a smaller gain or other lead/lag time constants"
+            )
+    return pair
+
+
+def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair]) -> Eigenpair | None:
+    best = max(candidates, key=pair.association, default=None)
+    return best if best is not None and pair.association(best) >= _SAME else None
+
+
+def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:
+    product = complex(np.vdot(right, left))  # rᴴl, the conjugate of lᴴr
+    size = float(np.linalg.norm(left) * np.linalg.norm(right))
+    if abs(product) <= _DEFECTIVE * size:
+        left, product = np.zeros_like(left), complex(1)
+    return Eigenpair(eigenvalue, left / product, right)

@@ -1,0 +1,100 @@
+"""Parameter files: values for a case's components, kept apart from the case, with a note where they come from."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.cases.locate import line_of
+from orchestrator.cases.schema import Value
+from orchestrator.cases.values import flatten
+from orchestrator.errors import CaseError, InputError, Problem
+
+_TABLE = "set"
+_EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
+
+
+@dataclass(frozen=True)
+class ParameterFile:
+    """The values of a parameter file.
+
+    Attributes
+    ----------
+    values
+        By ``component.variable``; the component may be a pattern such as ``gfor*``.
+    """
+
+    path: Path
+    text: str
+    values: dict[str, Value]
+
+    def place(self, key: str) -> str:
+        """A key with its file and line."""
+        return _place(self.path, self.text, key)
+
+
+def read_parameter_file(path: Path) -> ParameterFile:
+    """Read a file whose one table ``[set]`` holds values by ``component.variable``.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is not TOML, or it has no table ``[set]``.
+    CaseError
+        With all keys and values that are none.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        raw = tomllib.loads(text)
+    except OSError as error:
+        raise InputError(
+            f"{path}: the parameter file cannot be read: {error.strerror}; `gfor design` writes one"
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    table = raw.get(_TABLE)
+    if not isinstance(table, dict) or not table:
+        raise InputError(
+            f"{path}: a parameter file needs a table [set] with values, such as\n{_EXAMPLE}\n"
+            f"this one has at its top: {', '.join(raw) or 'nothing'}"
+        )
+    problems = [
+        Problem(_place(path, text, key), "this key is unknown; a parameter file has the table [set] and no other")
+        for key in raw
+        if key != _TABLE
+    ]
+    values: dict[str, Value] = {}
+    for parts, value in flatten(table):
+        key = ".".join(parts)
+        if "." not in key:
+            problems.append(
+                Problem(_place(path, text, key), "it is not of the form component.parameter, such as gfor.pod_p.K")
+            )
+        elif not isinstance(value, bool | int | float | str):
+            problems.append(Problem(_place(path, text, key), f"{value!r} is neither a number, a text with a unit, "
+                                                             "nor true or false"))  # fmt: skip
+        else:
+            values[key] = value
+    if problems:
+        raise CaseError(str(path), problems)
+    return ParameterFile(path, text, values)
+
+
+def parameter_file_text(values: Mapping[str, Value], comments: Sequence[str]) -> str:
+    """The text of a parameter file, its origin in comments at the top."""
+    lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
+    lines += ["", f"[{_TABLE}]", *(f'"{key}" = {_toml(value)}' for key, value in values.items()), ""]
+    return "\n".join(lines)
+
+
+def _toml(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if not isinstance(value, str) else '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _place(path: Path, text: str, key: str) -> str:
+    """A quoted key is one part of a path, an unquoted one several; the table's own line comes before both."""
+    lines = [line_of(text, parts) for parts in ((key,), (_TABLE, key), (_TABLE, *key.split(".")))]
+    line = max(filter(None, lines), default=None)
+    return f"{path}, line {line}, {key}" if line else f"{path}, {key}"

@@ -1,0 +1,189 @@
+"""The subcommand ``gfor design``."""
+
+import argparse
+import json
+import math
+import shlex
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.errors import InputError
+from orchestrator.report.design_files import design_json, parameters_of, provenance
+from orchestrator.report.design_sheet import sheet
+from orchestrator.study.design import DesignRequest, design_pod
+from orchestrator.study.design_target import CONTROLLERS
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """All arguments but those that every command on a case has."""
+    defaults = DesignRequest(controller="")
+    parser.add_argument("--controller", required=True, choices=CONTROLLERS, help="the controller to design")
+    parser.add_argument(
+        "--component",
+        metavar="NAME",
+        help="the converter, or a pattern such as 'gfor*' for several with one setting (default: all with this POD)",
+    )
+    parser.add_argument("--mode", metavar="NAME", help="the case's mode to damp (default: its first)")
+    parser.add_argument("--damping", type=_ratio, metavar="ZETA", help="required damping ratio, such as 0.2 or 20%%")
+    parser.add_argument(
+        "--damping-increment",
+        type=_ratio,
+        metavar="DZETA",
+        help=f"required increase of the damping ratio (default: {defaults.damping_increment:g})",
+    )
+    parser.add_argument(
+        "--delta-gain",
+        type=_positive,
+        default=defaults.delta_gain,
+        metavar="DK",
+        help=f"gain of the finite-difference sensitivity [pu] (default: {defaults.delta_gain:g})",
+    )
+    parser.add_argument(
+        "--gain-bounds",
+        type=_bounds,
+        default=defaults.gain_bounds,
+        metavar="MIN:MAX",
+        help="bounds of the gain [pu] (default: 200:400)",
+    )
+    parser.add_argument(
+        "--gain-from",
+        choices=("non-compensated", "compensated"),
+        default="non-compensated",
+        help="sensitivity that the gain is computed from, without or with the lead/lag (default: non-compensated)",
+    )
+    parser.add_argument("--stages", type=int, metavar="N_S", help="lead/lag stages (default: the component's own)")
+    parser.add_argument(
+        "--min-damping",
+        type=_ratio,
+        default=defaults.least_damping,
+        metavar="ZETA",
+        help=f"damping ratio below which no other mode may be pushed (default: {defaults.least_damping:g})",
+    )
+    parser.add_argument("--refine", action="store_true", help="search gain and lead/lag on the closed loop as well")
+    parser.add_argument("--no-margins", action="store_true", help="leave out the margins, which take longest")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.toml", help="parameter file (default: <case>_<controller>.toml, here)"
+    )
+
+
+def run_design(options: argparse.Namespace, case: Case, console: Console, arguments: dict[str, Any]) -> int:
+    """Design, print, and write the parameter file.
+
+    Parameters
+    ----------
+    arguments
+        What every command on a case has: overrides, parameters, step_size.
+    """
+    if len(options.scenario) > 1:
+        raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
+    if options.damping is not None and options.damping_increment is not None:
+        raise InputError("--damping and --damping-increment both say what is required; give one of them")
+    path = _writable(options.out or Path(f"{case.name}_{options.controller}.toml"))
+    wanted = {} if options.damping_increment is None else {"damping_increment": options.damping_increment}
+    request = DesignRequest(
+        controller=options.controller,
+        component=options.component,
+        scenario=next(iter(options.scenario), None),
+        mode=options.mode,
+        damping=options.damping,
+        delta_gain=options.delta_gain,
+        gain_bounds=options.gain_bounds,
+        stages=options.stages,
+        compensated_gain=options.gain_from == "compensated",
+        least_damping=options.min_damping,
+        refine=options.refine,
+        margins=not options.no_margins,
+        **wanted,
+        **arguments,
+    )
+    with console.status("starting") as status:
+        design = design_pod(case, request, status.update)
+    text = parameter_file_text(parameters_of(design), provenance(design, command_line(options)))
+    path.write_text(text, encoding="utf-8")
+    if options.json:
+        print(json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False))
+        return 0
+    for part in sheet(design):
+        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+    console.print(f"Parameter file {path}; use it with: gfor modes {case_argument(options)} --scenario "
+                  f"{design.target.scenario} --parameters {path}", soft_wrap=True, highlight=False)  # fmt: skip
+    return 0
+
+
+def command_line(options: argparse.Namespace) -> str:
+    """The command that was given, with all that is not left to its default."""
+    words = ["gfor", "design", case_argument(options), "--controller", options.controller]
+    single = {"--component": options.component, "--mode": options.mode, "--damping": options.damping,
+              "--damping-increment": options.damping_increment, "--stages": options.stages,
+              "--step": options.step}  # fmt: skip
+    words += [word for key, value in single.items() if value is not None for word in (key, str(value))]
+    low, high = options.gain_bounds
+    words += ["--delta-gain", f"{options.delta_gain:g}", "--gain-bounds", f"{low:g}:{high:g}"]
+    words += ["--gain-from", options.gain_from, "--min-damping", f"{options.min_damping:g}"]
+    for name in options.scenario:
+        words += ["--scenario", name]
+    for key, value in options.set:
+        words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    for file in options.parameters:
+        words += ["--parameters", str(file)]
+    words += ["--refine"] if options.refine else []
+    return " ".join(shlex.quote(word) for word in words)
+
+
+def case_argument(options: argparse.Namespace) -> str:
+    """The case as it was given."""
+    return str(options.case)
+
+
+def _writable(path: Path) -> Path:
+    """The parameter file's path, tried before anything is computed."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        existed = path.exists()
+        path.open("a", encoding="utf-8").close()
+        if not existed:
+            path.unlink()
+    except OSError as error:
+        raise InputError(
+            f"--out {path}: the parameter file cannot be written there: {error.strerror}; choose another place"
+        ) from error
+    return path
+
+
+def _ratio(text: str) -> float:
+    """A damping ratio, as a number below 1 or in percent."""
+    try:
+        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a damping ratio between 0 and 1, such as 0.1 or 10%")
+    return value
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (value > 0 and math.isfinite(value)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a gain above 0, such as 50")
+    return value
+
+
+def _bounds(text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    try:
+        limits = float(low), float(high)
+    except ValueError:
+        limits = (1.0, 0.0)
+    if not colon or not 0 <= limits[0] <= limits[1] < math.inf or limits[1] == 0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} are no bounds; write MIN:MAX in pu with 0 ≤ MIN ≤ MAX, such as 200:400"
+        )
+    return limits

@@ -1,0 +1,132 @@
+"""What a POD design is made for: the scenario, the components with the controller, and the mode."""
+
+import fnmatch
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.schema import Value
+from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import InputError
+
+CONTROLLERS = ("pod_p", "pod_q")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A scenario and the components of it that are given one common setting.
+
+    Attributes
+    ----------
+    key
+        What the components are called in a parameter file: a pattern that fits them and no other, or their names.
+    stages
+        N_S that they are to have.
+    """
+
+    scenario: str
+    components: tuple[str, ...]
+    key: tuple[str, ...]
+    stages: int
+
+
+def find_target(
+    case: Case,
+    controller: str,
+    *,
+    scenario: str | None,
+    pattern: str | None,
+    stages: int | None,
+    overrides: Mapping[str, Value],
+    parameters: Sequence[ParameterFile],
+) -> Target:
+    """The scenario that was asked for, else the one in which all PODs are there and off; and its components.
+
+    Raises
+    ------
+    InputError
+        If there is no such scenario or several, or no component that fits has the controller.
+    """
+    if scenario is not None and scenario not in case.scenarios:
+        raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")
+    names = [scenario] if scenario is not None else list(case.scenarios)
+    plans = {name: case.components_of(name, overrides, parameters) for name in names}
+    if scenario is None:
+        fitting = [name for name, plan in plans.items() if with_controller(plan, controller) and _all_off(plan)]
+        if len(fitting) != 1:
+            what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
+            raise InputError(
+                f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
+                f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}"
+            )
+        (scenario,) = fitting
+    return _components(scenario, plans[scenario], controller, pattern, stages)
+
+
+def _components(
+    scenario: str, plan: Mapping[str, ComponentPlan], controller: str, pattern: str | None, stages: int | None
+) -> Target:
+    having = with_controller(plan, controller)
+    if not having:
+        raise InputError(
+            f"scenario {scenario!r}: no component has the controller {controller} (a parameter {controller}.K); "
+            "choose a scenario with converters"
+        )
+    fitting = fnmatch.filter(plan, pattern) if pattern is not None else having
+    chosen = [name for name in fitting if name in having]
+    if not chosen:
+        raise InputError(
+            f"--component {pattern}: scenario {scenario!r} has no component of that name with {controller}; "
+            f"those with it: {', '.join(having[:12])}{' …' if len(having) > 12 else ''}"
+        )
+    key = (pattern,) if pattern is not None and chosen == fitting else tuple(chosen)
+    present = {int(_value(plan[name], f"{controller}.N_S")) for name in chosen}
+    if stages is None and len(present) > 1:
+        raise InputError(
+            f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
+            f"{', '.join(map(str, sorted(present)))}); give them one number with --stages"
+        )
+    return Target(scenario, tuple(chosen), key, stages if stages is not None else present.pop())
+
+
+def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
+    """Names of the components that have a controller."""
+    wanted = [f"{controller}.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
+    return [name for name, c in plan.items() if all(v in c.description.variables for v in wanted)]
+
+
+def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
+    return not any(
+        _value(plan[name], f"{controller}.enabled")
+        for controller in CONTROLLERS
+        for name in with_controller(plan, controller)
+    )
+
+
+def _value(plan: ComponentPlan, variable: str) -> float | bool:
+    """What a parameter is set to, else its start value."""
+    if variable in plan.parameters:
+        return plan.parameters[variable]
+    start = plan.description.variables[variable].start or "0"
+    return start == "true" if start in ("true", "false") else float(start)
+
+
+def mode_name(case: Case, wanted: str | None) -> str:
+    """The name of the mode to design for: the one that was asked for, else the case's first.
+
+    Raises
+    ------
+    InputError
+        If the case names no such mode.
+    """
+    names = [table.name for table in case.table.analysis.modes]
+    if not names:
+        raise InputError(
+            f"{case.name}: the case names no mode to design for; add one to its file, such as\n"
+            '[analysis]\nmodes = [{ name = "local", states = ["sg1.machine.omega"] }]'
+        )
+    name = wanted if wanted is not None else names[0]
+    if name not in names:
+        raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join(names)}")
+    return name

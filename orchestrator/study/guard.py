@@ -1,0 +1,104 @@
+"""What a POD setting does to all the other modes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import Mode, find_spectrum, to_continuous
+from orchestrator.analysis.pod_design import damping_ratio
+
+Naming = Callable[[LinearModel, list[Mode]], Mode | None]
+
+GUARDED = (0.1, 2.0)
+"""Frequencies [Hz] of the modes whose damping is guarded; what is unstable is seen at any frequency."""
+
+_GROWTH = 1e-3
+"""Real parts up to this [1/s] are the zero eigenvalue of the free angle, in its numerical accuracy."""
+
+_SAME = 1e-5
+"""Eigenvalues nearer to each other, relative to their size, are the same one, computed in two ways."""
+
+_EQUAL = 1e-3
+"""Damping ratios that differ by less count as equal."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All modes but the target.
+
+    Attributes
+    ----------
+    others
+        Those from 0.1 to 2 Hz, least damped first.
+    growth
+        Largest real part of any eigenvalue [1/s], the target's included.
+    named
+        The mode that the case's own rule gives the target's name; normally the target itself.
+    """
+
+    others: tuple[Mode, ...]
+    growth: float
+    named: Mode | None
+
+    @property
+    def other_named(self) -> Mode | None:
+        """The mode of the target's name, where that is not the mode that was followed."""
+        return self.named if any(self.named is mode for mode in self.others) else None
+
+    @property
+    def worst(self) -> Mode | None:
+        return self.others[0] if self.others else None
+
+    @property
+    def is_unstable(self) -> bool:
+        return self.growth > _GROWTH
+
+    def without(self, mode: Mode) -> "Surroundings":
+        """The same, with a mode taken out of the others."""
+        return replace(self, others=tuple(m for m in self.others if m is not mode))
+
+    def effective_damping(self, target: float) -> float:
+        """The target's damping ratio, or that of the mode that now bears its name where that is less.
+
+        A strong controller can make two modes trade places; then neither may be called the target alone.
+        """
+        return min(target, self.other_named.damping_ratio) if self.other_named else target
+
+    def below(self, damping: float) -> int:
+        """How many modes have less than this damping ratio."""
+        return sum(mode.damping_ratio < damping for mode in self.others)
+
+
+def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
+    """Everything but the mode at ``target`` [rad/s]; ``naming`` finds the mode that bears the target's name."""
+    spectrum = find_spectrum(model, *GUARDED)
+    others = tuple(spectrum.modes)
+    if target is not None:
+        others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
+    return Surroundings(others, spectrum.growth_rate, naming(model, spectrum.modes))
+
+
+def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
+    """What a design does that it must not: make unstable, or push a mode below the least damping that was above it."""
+    if after.is_unstable and after.growth > before.growth + _GROWTH:
+        return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
+    worst = after.worst
+    if worst is None or worst.damping_ratio >= least:
+        return None
+    was = before.worst.damping_ratio if before.worst else least
+    if after.below(least) > before.below(least) or worst.damping_ratio < min(was, least) - _EQUAL:
+        return (
+            f"the mode at {worst.frequency_hz:.3f} Hz ({worst.participation[0][0]}) has {worst.damping_percent:.2f} % "
+            f"of damping, below {100 * least:g} %"
+        )
+    return None
+
+
+def least_damping(model: LinearModel) -> tuple[float, float]:
+    """Smallest damping ratio from 0.1 to 2 Hz (1 where there is no mode), and the largest real part of all [1/s]."""
+    values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+    frequencies = values.imag / (2 * np.pi)
+    inside = values[(frequencies >= GUARDED[0]) & (frequencies <= GUARDED[1])]
+    return min(map(damping_ratio, inside.tolist()), default=1.0), float(values.real.max())

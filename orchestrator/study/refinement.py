@@ -1,0 +1,231 @@
+"""Refinement of a POD design on the real closed loop, until the required damping is met or out of reach.
+
+The paper's design stops at a prediction from the sensitivity at a small gain. Here the gain is searched with the mode
+itself, and where the gain alone does not do, the lead/lag is centred anew on the mode where it is, with the
+sensitivity that it has there.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from orchestrator.analysis.pod_design import LeadLag, angle_deg, compensation_deg, lead_lag, local_non_compensated
+from orchestrator.errors import AnalysisError
+from orchestrator.study.closed_loop import Placed, PodLoop
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On a setting: the damping ratio that counts, and what it does to other modes that it must not."""
+
+    damping: float
+    broken: str | None
+
+
+Judge = Callable[[Placed], Verdict]
+
+_GAINS = 9
+_TURNS = (15.0, -15.0, 30.0, -30.0, 45.0, -45.0)
+"""Angles [°] by which the compensation is turned to either side, once re-centring brings nothing more."""
+_ROUNDS = 5
+_WORTH = 5e-4
+"""A damping ratio that is better by less is not worth another round."""
+_SMALL_GAIN = 0.1
+"""For the sensitivity at a gain of 0 [pu]."""
+_TOLERANCE = 2e-4
+"""The gain is searched until the damping ratio is met within this."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The target mode over the range of the gain, with one lead/lag.
+
+    Attributes
+    ----------
+    why
+        Where the lead/lag comes from.
+    points
+        With rising gain.
+    chosen
+        The smallest gain that meets the requirement, else the gain of the best damping.
+    """
+
+    why: str
+    filters: LeadLag
+    points: tuple[Placed, ...]
+    chosen: Placed
+
+
+@dataclass
+class Refinement:
+    """What was tried, and what came of it.
+
+    Attributes
+    ----------
+    chosen
+        The best setting that breaks no other mode; None if there is none within the bounds.
+    met
+        Whether it has the required damping.
+    """
+
+    sweeps: list[Sweep] = field(default_factory=list)
+    chosen: Placed | None = None
+    met: bool = False
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def best(self) -> Placed:
+        """The best damping of all that was tried, whatever it does to other modes."""
+        return max((s.chosen for s in self.sweeps), key=lambda p: p.damping_ratio)
+
+    @property
+    def highest_swept(self) -> Placed:
+        """The best damping at any gain of any sweep."""
+        return max((p for s in self.sweeps for p in (*s.points, s.chosen)), key=lambda p: p.damping_ratio)
+
+
+def refine(
+    loop: PodLoop,
+    off: Placed,
+    filters: LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    judge: Judge,
+) -> Refinement:
+    """Search gain and lead/lag on the closed loop.
+
+    Parameters
+    ----------
+    off
+        The target with the controller off.
+    filters
+        The design's lead/lag, to begin with.
+    required
+        Damping ratio of the target.
+    bounds
+        Of the gain [pu].
+    judge
+        Looks at all modes with a setting.
+    """
+    result, best = Refinement(), -np.inf
+    for why, candidate in _candidates(loop, result, filters):
+        try:
+            found = sweep(loop, off, candidate, required, bounds, why)
+        except AnalysisError as error:
+            result.notes.append(f"{why}: {error}")
+            continue
+        result.sweeps.append(found)
+        allowed = _guarded(loop, found, judge, result.notes)
+        if allowed is None:
+            continue
+        damping = judge(allowed).damping
+        if damping < allowed.damping_ratio:
+            result.notes.append(
+                f"{why}: at a gain of {allowed.setting.gain:.4g} the target trades places with another mode, which "
+                f"then bears its name with {100 * damping:.2f} %"
+            )
+        if damping > best:
+            best, result.chosen = damping, allowed
+        if damping >= required - _TOLERANCE:
+            result.met = True
+            break
+    return result
+
+
+def sweep(
+    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], why: str
+) -> Sweep:
+    """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it."""
+    points: list[Placed] = []
+    here = off
+    for gain in np.linspace(*bounds, _GAINS).tolist():
+        here = loop.place(here, gain, filters)
+        points.append(here)
+    above = next((k for k, p in enumerate(points) if p.damping_ratio >= required), None)
+    if above == 0:
+        chosen = points[0]
+    elif above is not None:
+        chosen = _crossing(loop, points[above - 1], points[above], required)
+    else:
+        chosen = _peak(loop, points)
+    return Sweep(why, filters, tuple(points), chosen)
+
+
+def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Placed:
+    """The smallest gain between two that has the required damping: regula falsi that does not stall."""
+    for k in range(20):
+        if high.damping_ratio - required <= _TOLERANCE:
+            break
+        share = (required + _TOLERANCE / 2 - low.damping_ratio) / (high.damping_ratio - low.damping_ratio)
+        share = min(max(share, 0.05), 0.95) if k % 3 < 2 else 0.5
+        middle = loop.place(low, low.setting.gain + share * (high.setting.gain - low.setting.gain))
+        low, high = (low, middle) if middle.damping_ratio >= required else (middle, high)
+    return high
+
+
+def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
+    """The best damping around the best of some gains."""
+    k = max(range(len(points)), key=lambda i: points[i].damping_ratio)
+    best, step = points[k], points[1].setting.gain - points[0].setting.gain
+    low, high = points[0].setting.gain, points[-1].setting.gain
+    for _ in range(3):
+        step /= 2
+        for gain in (best.setting.gain - step, best.setting.gain + step):
+            if low <= gain <= high and gain > 0:
+                best = max(best, loop.place(best, gain), key=lambda p: p.damping_ratio)
+    return best
+
+
+def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[tuple[str, LeadLag]]:
+    """Lead/lag settings to try, each from what the sweeps before it brought."""
+    yield "as designed", first
+    if first.N_S == 0 or not result.sweeps:
+        return
+    base = result.sweeps[0].chosen
+    for k in range(1, _ROUNDS + 1):
+        try:
+            candidate = recentred(loop, base)
+        except AnalysisError as error:
+            result.notes.append(f"re-centring {k}: {error}")
+            break
+        count = len(result.sweeps)
+        yield f"re-centred, round {k}", candidate
+        if len(result.sweeps) == count or result.sweeps[-1].chosen.damping_ratio < base.damping_ratio + _WORTH:
+            break
+        base = result.sweeps[-1].chosen
+    base = result.best
+    for turn in _TURNS:
+        filters = base.setting.filters
+        total = filters.N_S * filters.stage_angle_deg + turn
+        if abs(total) < 85 * filters.N_S:
+            phase = 180 - total if total >= 0 else -180 - total
+            yield f"turned by {turn:+.0f}°", lead_lag(phase, base.eigenvalue.imag, filters.N_S)
+
+
+def recentred(loop: PodLoop, here: Placed) -> LeadLag:
+    """The design's formulas again, at the mode where it is and with the sensitivity that it has there."""
+    gain, filters = here.setting.gain, here.setting.filters
+    change = 0.01 * gain or _SMALL_GAIN
+    moved = loop.place(here, gain + change)
+    slope = (moved.eigenvalue - here.eigenvalue) / change
+    phase = angle_deg(local_non_compensated(slope, here.eigenvalue, filters))
+    if abs(compensation_deg(phase)) >= 85 * filters.N_S:
+        raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
+    return lead_lag(phase, here.eigenvalue.imag, filters.N_S)
+
+
+def _guarded(loop: PodLoop, found: Sweep, judge: Judge, notes: list[str]) -> Placed | None:
+    """The sweep's choice, or the largest gain below it that leaves the other modes alone; None if none does."""
+    reason = judge(found.chosen).broken
+    if reason is None:
+        return found.chosen
+    notes.append(f"{found.why}: at a gain of {found.chosen.setting.gain:.4g} {reason}")
+    good = found.points[0]
+    if good.setting.gain >= found.chosen.setting.gain or judge(good).broken is not None:
+        return None
+    bad = found.chosen
+    for _ in range(5):
+        middle = loop.place(good, (good.setting.gain + bad.setting.gain) / 2)
+        good, bad = (good, middle) if judge(middle).broken else (middle, bad)
+    return good
