@@ -21,7 +21,8 @@ from orchestrator.cases.parameter_files import ParameterFile, read_parameter_fil
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.units import to_unit
-from orchestrator.cli_sweep import choose_executor, sweep
+from orchestrator.cli_sweep import INTERRUPTED, choose_executor, present
+from orchestrator.cli_sweep import run as run_points
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
@@ -42,7 +43,7 @@ examples:
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
-  gfor sweep two_area --vary grid.X_L=0.01:0.6:60  all modes followed along the line's reactance
+  gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
@@ -373,7 +374,8 @@ def _sweep(options: argparse.Namespace) -> int:
         def report(done: int, total: int) -> None:
             bar.update(task, completed=done, total=total)
 
-        return sweep(plan, executor, folder, console, report, as_json=options.json)
+        result = run_points(plan, executor, folder, report)
+    return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
 
 
 def _folder(path: Path) -> Path:

@@ -15,7 +15,7 @@ from orchestrator.errors import InputError
 from orchestrator.report import sweep_tables
 from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
 from orchestrator.report.sweep_plots import save_sweep_plots
-from orchestrator.study.sweep import SweepPlan, run_sweep
+from orchestrator.study.sweep import SweepPlan, SweepResult, run_sweep
 from orchestrator.study.sweep_point import PointStore
 
 INTERRUPTED = 130
@@ -37,16 +37,8 @@ def choose_executor(workers: int | None, scheduler: str | None) -> Executor:
     return Processes(workers) if workers > 1 else Serial()
 
 
-def sweep(
-    plan: SweepPlan,
-    executor: Executor,
-    folder: Path,
-    console: Console,
-    report: Callable[[int, int], None],
-    *,
-    as_json: bool,
-) -> int:
-    """Run a sweep, write its files and print its summary; 1 if no point has modes, 130 after Ctrl-C."""
+def run(plan: SweepPlan, executor: Executor, folder: Path, report: Callable[[int, int], None]) -> SweepResult | None:
+    """Run a sweep; None, with a word on how to continue, after Ctrl-C."""
     done = (0, plan.number_of_points)
 
     def progress(number: int, total: int) -> None:
@@ -55,27 +47,33 @@ def sweep(
         report(number, total)
 
     try:
-        result = run_sweep(plan, executor, PointStore(folder / "points"), progress)
+        return run_sweep(plan, executor, PointStore(folder / "points"), progress)
     except KeyboardInterrupt:
-        Console(stderr=True, soft_wrap=True, highlight=False).print(
-            f"interrupted: {done[0]} of {done[1]} points are in {folder}; the same command continues from there"
+        _errors().print(
+            f"interrupted: {done[0]} of {done[1]} points are in {escape(str(folder))}; "
+            "the same command continues from there"
         )
-        return INTERRUPTED
+        return None
+
+
+def present(result: SweepResult, folder: Path, console: Console, *, as_json: bool) -> int:
+    """Write a sweep's files and print its summary; returns 1 if no point has modes."""
     samples = Samples(result)
     save_sweep(samples, folder)
     plots = save_sweep_plots(samples, folder)
-    remarks = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
     if as_json:
         print(json.dumps(sweep_json(samples), indent=1, ensure_ascii=False))
     else:
         console.print(sweep_tables.trajectories(samples), "")
     for text in sweep_tables.remarks(samples):
-        remarks.print(escape(text))
+        _errors().print(escape(text))
     if not as_json:
         stored = f", {result.stored} were there already" if result.stored else ""
-        console.print(
-            f"{result.computed} points computed{stored}. Results in {folder}: sweep.nc, sweep.csv, "
-            f"{', '.join(p.name for p in plots)}",
-            soft_wrap=True,
-        )
+        files = ", ".join(["sweep.nc", "sweep.csv", *(path.name for path in plots)])
+        words = f"{result.computed} points computed{stored}. Results in {folder}: {files}"
+        console.print(escape(words), soft_wrap=True)
     return 0 if any(s.trajectories for s in result.scenarios) else 1
+
+
+def _errors() -> Console:
+    return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)

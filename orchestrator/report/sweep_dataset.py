@@ -23,7 +23,14 @@ _FIGURES = {
     "damping": ("%", "Damping ratio"),
     "similarity": ("1", "Similarity to the same trajectory at the point before"),
 }
+_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}
+"""xarray's own attributes have the short names."""
+
 _BEGINNINGS = "start followed refined entered broken"
+
+
+Curve = list[tuple["Place", dict[str, Any]]]
+"""A trajectory's figures by place."""
 
 
 def swing_states(sweep: "ScenarioSweep", patterns: list[str]) -> list[str]:
@@ -33,18 +40,24 @@ def swing_states(sweep: "ScenarioSweep", patterns: list[str]) -> list[str]:
 
 
 class Samples:
-    """Figures of the trajectories, point by point; None of it is computed twice."""
+    """Figures of the trajectories, point by point."""
 
     def __init__(self, result: "SweepResult") -> None:
         self.result = result
+        self._curves: dict[int, Curve] = {}
         self.axes = result.plan.axes
         patterns = result.plan.case.table.analysis.swing
         self.states = [*dict.fromkeys(s for sweep in result.scenarios for s in swing_states(sweep, patterns))]
         everything = (r.modes.names for s in result.scenarios for r in s.points.values() if r.modes)
         self.components = [*dict.fromkeys(name.partition(".")[0] for names in everything for name in names)]
 
-    def of(self, sweep: "ScenarioSweep", trajectory: "Trajectory") -> Iterator[tuple["Place", dict[str, Any]]]:
+    def of(self, sweep: "ScenarioSweep", trajectory: "Trajectory") -> "Curve":
         """Places of the grid, in order, with the figures of a trajectory there."""
+        if id(trajectory) not in self._curves:
+            self._curves[id(trajectory)] = list(self._samples(sweep, trajectory))
+        return self._curves[id(trajectory)]
+
+    def _samples(self, sweep: "ScenarioSweep", trajectory: "Trajectory") -> Iterator[tuple["Place", dict[str, Any]]]:
         for place, point in trajectory.points.items():
             modes = sweep.points[place].modes
             if modes is None:
@@ -105,7 +118,7 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
             errors[(s, *place)] = sweep.points[place].error or ""
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
     data: dict[str, Any] = {
-        name: (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
+        _IN_DATASET.get(name, name): (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
         for name, array in figures.items()
     }
     of = "Participation in the mode of"

@@ -11,17 +11,16 @@ from matplotlib.figure import Figure
 
 from orchestrator.report.mode_plots import damping_rays
 from orchestrator.report.plots import STYLE, colour, save_figure
-from orchestrator.report.sweep_dataset import Samples
+from orchestrator.report.sweep_dataset import Curve, Samples
 
 if TYPE_CHECKING:
     from orchestrator.study.sweep import ScenarioSweep
-    from orchestrator.study.sweep_trajectories import Place, Trajectory
+    from orchestrator.study.sweep_trajectories import Trajectory
 
 _LEAST_DAMPED = 75.0
 """Modes that are damped more than this [%] all along are left out of the plane."""
 
 _DASHES = ("-", "--", ":", "-.")
-Curve = list[tuple["Place", dict[str, Any]]]
 
 
 def save_sweep_plots(samples: Samples, folder: Path) -> list[Path]:
@@ -51,7 +50,7 @@ def plot_trajectories(samples: Samples, path: Path) -> bool:
     drawn: list[tuple[int, Trajectory, Curve]] = []
     for k, sweep in enumerate(samples.result.scenarios):
         for trajectory in sweep.trajectories:
-            curve = list(samples.of(sweep, trajectory))
+            curve = samples.of(sweep, trajectory)
             if any(sample["damping"] < _LEAST_DAMPED for _, sample in curve):
                 drawn.append((k, trajectory, curve))
     points = [sample for _, _, curve in drawn for _, sample in curve if sample["damping"] < _LEAST_DAMPED]
@@ -96,7 +95,7 @@ def axis_label(axis: Any) -> str:
 
 def _named(samples: Samples) -> list[tuple[int, "ScenarioSweep", "Trajectory", Curve]]:
     return [
-        (k, sweep, trajectory, list(samples.of(sweep, trajectory)))
+        (k, sweep, trajectory, samples.of(sweep, trajectory))
         for k, sweep in enumerate(samples.result.scenarios)
         for trajectory in sweep.trajectories
         if trajectory.carries is not None

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.report.sweep_dataset import Samples
@@ -14,31 +15,31 @@ _FAILURES_SHOWN = 5
 
 
 def trajectories(samples: Samples) -> Table:
-    """Where each trajectory leads: those with a name, or all where the case gives none."""
-    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    """Where each trajectory leads, its least damping and its least similarity from point to point.
+
+    Those with a name, or all where the case gives none.
+    """
+    title = escape(f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}")
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
-    for column in ("Scenario", "Mode", "From", "To"):
-        table.add_column(column, overflow="fold")
-    for column in ("f [Hz]", "Damping [%]", "Least damping [%]", "Named at", "Least similarity"):
-        table.add_column(column, justify="right")
+    table.add_column("Mode", overflow="fold")
+    for column in ("f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity"):
+        table.add_column(escape(column), justify="right")
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
-            curve = list(samples.of(sweep, trajectory))
+            curve = samples.of(sweep, trajectory)
             if not curve or (anything and trajectory.carries is None):
                 continue
-            (start, first), (stop, last) = curve[0], curve[-1]
+            (_, first), (_, last) = curve[0], curve[-1]
             where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
             alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
+            named = sum(f["named"] for _, f in curve)
             table.add_row(
-                sweep.prepared.title,
-                trajectory.name,
-                _values(samples, start),
-                _values(samples, stop),
+                f"{sweep.prepared.title}: {trajectory.name}",
                 f"{first['frequency']:.3f} → {last['frequency']:.3f}",
                 f"{first['damping']:.2f} → {last['damping']:.2f}",
                 f"{least['damping']:.2f} at {_values(samples, where)}",
-                f"{sum(f['named'] for _, f in curve)} of {len(curve)}",
+                f"{len(curve)}" if named in (0, len(curve)) else f"{len(curve)}, named at {named}",
                 f"{min(alike):.2f}" if alike else "–",
             )
         table.add_section()

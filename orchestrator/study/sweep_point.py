@@ -5,6 +5,7 @@ Everything here can be sent to another process or another machine.
 
 import hashlib
 import json
+import os
 import threading
 import zipfile
 import zlib
@@ -236,7 +237,7 @@ class PointStore:
         arrays: dict[str, Any] = {}
         if record.modes is not None:
             arrays = {name: getattr(record.modes, name) for name in ("eigenvalues", "left", "right")}
-        partial = self._path(record.key).with_suffix(".part")
+        partial = self._path(record.key).with_suffix(f".{os.getpid()}.part")
         try:
             with partial.open("wb") as file:
                 np.savez(file, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8), **arrays)

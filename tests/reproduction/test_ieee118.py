@@ -138,6 +138,7 @@ def test_the_sparse_search_finds_what_the_full_spectrum_has():
         assert one.by_component == pytest.approx(other.by_component, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_who_swings_against_whom():
     result = compute_modes(*prepare("base"), (0.3, 1.3))
     together, against = result.swing_of(result.named["1-2"])

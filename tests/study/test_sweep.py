@@ -73,6 +73,7 @@ def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
             first, second = (here.isel(trajectory=k) for k in (0, 1))
             assert first["frequency"].values == pytest.approx(np.sqrt(gain * FULL_TURN) / FULL_TURN, rel=1e-5)
             assert second["frequency"].values == pytest.approx(np.sqrt(other * FULL_TURN) / FULL_TURN, rel=1e-5)
+            assert first["eigenvalue_imag"].values == pytest.approx(first["frequency"].values * FULL_TURN)
             assert np.all(first["named"] == 1)
             assert first["component_participation"].sel(component="a1").values == pytest.approx(0.5, abs=1e-3)
             assert float(second["participation"].sum("state").max()) < 1e-6

@@ -70,7 +70,7 @@ def _trajectories(
     for s, shade in shades.items():
         one = shown.sel(scenario=s)
         for t in range(one.sizes["trajectory"]):
-            real, hz, percent = (one[q].isel(trajectory=t).values for q in ("real", "frequency", "damping"))
+            real, hz, percent = (one[q].isel(trajectory=t).values for q in ("eigenvalue_real", "frequency", "damping"))
             there = np.isfinite(real) & (real > -3)
             if not there.any():
                 continue
