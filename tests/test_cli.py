@@ -57,10 +57,10 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
     assert first == "examples:"
     assert len(lines) >= 5
     assert all(line.startswith("  gfor ") for line in lines)
-    assert {line.split()[1] for line in lines} == {"run", "modes", "build", "info"}
+    assert {line.split()[1] for line in lines} == {"run", "modes", "design", "build", "info"}
 
 
-@pytest.mark.parametrize("command", ["run", "modes", "build", "info"])
+@pytest.mark.parametrize("command", ["run", "modes", "design", "build", "info"])
 def test_every_command_has_help(gfor, command):
     code, out, _ = gfor(command, "--help")
     assert code == 0
