@@ -105,8 +105,10 @@ def run_design(options: argparse.Namespace, case: Case, console: Console, argume
         design = design_pod(case, request, status.update)
     text = parameter_file_text(parameters_of(design), provenance(design, command_line(options)))
     path.write_text(text, encoding="utf-8")
+    content = json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False)
+    path.with_suffix(".json").write_text(content + "\n", encoding="utf-8")  # for `gfor report`
     if options.json:
-        print(json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False))
+        print(content)
         return 0
     for part in sheet(design):
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)

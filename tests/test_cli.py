@@ -61,7 +61,7 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
     assert {line.split()[1] for line in lines} <= known
 
 
-@pytest.mark.parametrize("command", ["run", "modes", "sweep", "build", "info"])
+@pytest.mark.parametrize("command", ["run", "modes", "linearize", "sweep", "design", "report", "build", "info"])
 def test_every_command_has_help(gfor, command):
     code, out, _ = gfor(command, "--help")
     assert code == 0

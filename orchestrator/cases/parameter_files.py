@@ -59,7 +59,10 @@ def read_parameter_file(path: Path) -> ParameterFile:
             f"this one has at its top: {', '.join(raw) or 'nothing'}"
         )
     problems = [
-        Problem(_place(path, text, key), "this key is unknown; a parameter file has the table [set] and no other")
+        Problem(
+            _named(path, line_of(text, (key,)), key),
+            "this key is unknown; a parameter file has the table [set] and no other",
+        )
         for key in raw
         if key != _TABLE
     ]
@@ -95,6 +98,9 @@ def _toml(value: Value) -> str:
 
 def _place(path: Path, text: str, key: str) -> str:
     """A quoted key is one part of a path, an unquoted one several; the table's own line comes before both."""
-    lines = [line_of(text, parts) for parts in ((key,), (_TABLE, key), (_TABLE, *key.split(".")))]
-    line = max(filter(None, lines), default=None)
+    lines = [line_of(text, (_TABLE, *parts)) for parts in ((key,), key.split("."))]
+    return _named(path, max(filter(None, lines), default=None), key)
+
+
+def _named(path: Path, line: int | None, key: str) -> str:
     return f"{path}, line {line}, {key}" if line else f"{path}, {key}"

@@ -26,7 +26,7 @@ def design_json(d: "PodDesign") -> dict[str, Any]:
         "K": setting.gain,
         "K_unbounded": d.unbounded_gain,
         "predicted_mode": _complex(d.predicted),
-        "achieved_mode": _complex(d.final.eigenvalue),
+        "achieved_mode": _complex(d.achieved),
         "requirement": {
             "damping_ratio": d.required_damping,
             "increment": d.required_damping - damping_ratio(d.initial),
@@ -37,7 +37,8 @@ def design_json(d: "PodDesign") -> dict[str, Any]:
         "met": d.met,
         "verdict": verdict(d),
         "target_damping_ratio": damping_ratio(d.initial),
-        "achieved_damping_ratio": d.final.damping_ratio,
+        "achieved_damping_ratio": d.achieved_damping,
+        "followed_mode": _complex(d.final.eigenvalue),
         "compensated_sensitivity": _polar(S.compensated),
         "K_non_compensated": d.gain_non_compensated,
         "K_compensated": d.gain_compensated,
@@ -76,8 +77,7 @@ def provenance(d: "PodDesign", command: str) -> list[str]:
         + (" and refined on the closed loop" if d.refinement else ""),
         f"command: {command}",
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
-        f"with it: {mode_text(d.final.eigenvalue)}; required: {percent(d.required_damping)} "
-        f"({'met' if d.met else 'not met'})",
+        f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
     ]
 
@@ -106,6 +106,8 @@ def _margins_json(m: "Margins") -> dict[str, Any]:
         "damping_limit": m.limit,
         "gain_up": m.up,
         "gain_down": m.down,
+        "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
+        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
         "largest_factor_tried": m.reach,
         "damping_ratio_with": m.variations,
     }

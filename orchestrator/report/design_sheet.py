@@ -107,7 +107,7 @@ def _result(d: "PodDesign") -> Table:
     table = _table("Result", "", "Without POD", "With the final setting")
     table.add_row("Setting", "off", f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
                                     f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s")  # fmt: skip
-    table.add_row(f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.final.eigenvalue))
+    table.add_row(f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved))
     table.add_row("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.after.worst))
     table.add_row("Largest real part of all", f"{d.before.growth:+.3g} 1/s", f"{d.after.growth:+.3g} 1/s")
     return table
@@ -117,8 +117,11 @@ def _margins(m: "Margins", d: "PodDesign") -> Table:
     table = _table("Margins of the final setting", "Quantity", "Value")
     gain = d.final.setting.gain
     lost = f"no eigenvalue unstable, no mode from 0.1 to 2 Hz below {percent(m.limit)}"
-    up = f"× {m.up:.2f} (K = {m.up * gain:.0f})" if m.up is not None else f"more than × {m.reach:g}, the most tried"
-    down = f"× {m.down:.2f} (K = {m.down * gain:.0f})" if m.down is not None else "down to 0"
+    up, down = f"more than × {m.reach:g}, the most tried", "down to 0"
+    if m.up is not None and m.lost_up is not None:
+        up = f"× {m.up:.2f} (K = {m.up * gain:.0f}), then {mode_text(m.lost_up)} is lost"
+    if m.down is not None and m.lost_down is not None:
+        down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
     table.add_row(f"Gain up, {lost}", up)
     table.add_row("Gain down, the same", down)
     for name, damping in m.variations.items():
@@ -134,12 +137,12 @@ def _notes(d: "PodDesign") -> Iterable[str]:
 
 def verdict(d: "PodDesign") -> str:
     """In words: whether the requirement is met, by how much, and why not."""
-    reached = percent(d.final.damping_ratio)
-    text = f"the target has {reached} of damping, {percent(d.required_damping)} are required"
-    if named := d.after.other_named:
+    text = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
+    if d.after.other_named:
         text += (
-            f"; with this gain two modes have traded places, and what the case calls {d.mode_name} is now at "
-            f"{named.frequency_hz:.3f} Hz with {percent(named.damping_ratio)}"
+            f"; with this gain two modes have traded places: the one that was followed is at "
+            f"{eigenvalue_text(d.final.eigenvalue)} rad/s with {percent(d.final.damping_ratio)}, the one that the case "
+            f"now calls {d.mode_name} has {percent(d.after.other_named.damping_ratio)}, and the lesser counts"
         )
     if d.broken:
         text += f"; but {d.broken}"
@@ -147,13 +150,8 @@ def verdict(d: "PodDesign") -> str:
         if not d.refinement and d.active_bound == "lower":
             text += f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it"
         return text
-    if d.refinement and not d.refinement.met:
-        best, low_high = d.refinement.highest_swept, d.request.gain_bounds
-        return text + (
-            f"; out of reach within the bounds: {len(d.refinement.sweeps)} lead/lag settings were swept over the gains "
-            f"from {low_high[0]:g} to {low_high[1]:g} pu, and the best damping at any of them was "
-            f"{percent(best.damping_ratio)}, with {_setting(best)}"
-        )
+    if d.refinement:
+        return text + _out_of_reach(d, d.refinement)
     if d.active_bound == "upper":
         text += (
             f"; the upper bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: raise "
@@ -163,6 +161,22 @@ def verdict(d: "PodDesign") -> str:
         text += "; more gain than the sensitivity asks for does not help here: see with --refine what does"
     else:
         text += "; the sensitivity at ΔK does not hold as far as the mode has to move: use --refine"
+    return text
+
+
+def _out_of_reach(d: "PodDesign", r: "Refinement") -> str:
+    """What the sweeps have shown."""
+    low, high = d.request.gain_bounds
+    best = r.highest_swept
+    text = (
+        f"; no setting within the bounds was found that meets it: {len(r.sweeps)} lead/lag settings were swept over "
+        f"gains from {low:g} to {high:g} pu. The best damping of the followed mode at any of them was "
+        f"{percent(best.damping_ratio)}, with {_setting(best)}"
+    )
+    if best.damping_ratio > d.final.damping_ratio + 5e-4:
+        text += ", which the limits for the other modes rule out, or the trading of places, as said above"
+    if d.final.setting.gain == low > 0:
+        text += ". The setting chosen is at the lower bound of the gain: a lower one in --gain-bounds may allow more"
     return text
 
 

@@ -27,7 +27,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 from orchestrator.study.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.study.design_target import Target, find_target, mode_name
+from orchestrator.study.design_target import Target, check_range, find_target, mode_name
 from orchestrator.study.guard import GUARDED, Naming, Surroundings, breach, surroundings
 from orchestrator.study.margins import Margins, compute_margins
 from orchestrator.study.modes import named_modes, running
@@ -140,12 +140,16 @@ class PodDesign:
 
     @property
     def damping_met(self) -> bool:
-        return self.effective_damping >= self.required_damping - _MET
+        return self.achieved_damping >= self.required_damping - _MET
 
     @property
-    def effective_damping(self) -> float:
-        """The final damping ratio; see `Surroundings.effective_damping`."""
-        return self.after.effective_damping(self.final.damping_ratio)
+    def achieved(self) -> complex:
+        """The mode [rad/s] that counts with the final setting; see `Surroundings.counting`."""
+        return self.after.counting(self.final.eigenvalue)
+
+    @property
+    def achieved_damping(self) -> float:
+        return damping_ratio(self.achieved)
 
     @property
     def active_bound(self) -> str | None:
@@ -190,6 +194,8 @@ def design_pod(case: Case, request: DesignRequest, report: Report = lambda text:
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
         return named_modes(case, model, modes).get(name)
 
+    for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
+        check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)
     with running(prepared) as master:
         report("operating point")
         find_operating_point(master)
@@ -232,7 +238,7 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
 
     def judge(placed: Placed) -> Verdict:
         after = around(placed)
-        damping = after.effective_damping(placed.damping_ratio)
+        damping = damping_ratio(after.counting(placed.eigenvalue))
         return Verdict(damping, breach(before, after, request.least_damping))
 
     report("sensitivity of the mode")

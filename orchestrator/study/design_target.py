@@ -1,6 +1,7 @@
 """What a POD design is made for: the scenario, the components with the controller, and the mode."""
 
 import fnmatch
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -87,7 +88,27 @@ def _components(
             f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
             f"{', '.join(map(str, sorted(present)))}); give them one number with --stages"
         )
+    if stages is not None:
+        check_range(plan, chosen, f"{controller}.N_S", stages, "--stages")
     return Target(scenario, tuple(chosen), key, stages if stages is not None else present.pop())
+
+
+def check_range(
+    plan: Mapping[str, ComponentPlan], components: Sequence[str], variable: str, value: float, option: str
+) -> None:
+    """A value must be one that every component's FMU takes.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    for name in components:
+        info = plan[name].description.variables[variable]
+        low = info.minimum if info.minimum is not None else -math.inf
+        high = info.maximum if info.maximum is not None else math.inf
+        if not low <= value <= high:
+            raise InputError(f"{option}: {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}")
 
 
 def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:

@@ -14,7 +14,7 @@ Naming = Callable[[LinearModel, list[Mode]], Mode | None]
 GUARDED = (0.1, 2.0)
 """Frequencies [Hz] of the modes whose damping is guarded; what is unstable is seen at any frequency."""
 
-_GROWTH = 1e-3
+GROWTH = 1e-3
 """Real parts up to this [1/s] are the zero eigenvalue of the free angle, in its numerical accuracy."""
 
 _SAME = 1e-5
@@ -53,18 +53,19 @@ class Surroundings:
 
     @property
     def is_unstable(self) -> bool:
-        return self.growth > _GROWTH
+        return self.growth > GROWTH
 
     def without(self, mode: Mode) -> "Surroundings":
         """The same, with a mode taken out of the others."""
         return replace(self, others=tuple(m for m in self.others if m is not mode))
 
-    def effective_damping(self, target: float) -> float:
-        """The target's damping ratio, or that of the mode that now bears its name where that is less.
+    def counting(self, target: complex) -> complex:
+        """The target [rad/s], or the mode that now bears its name where that has less damping.
 
         A strong controller can make two modes trade places; then neither may be called the target alone.
         """
-        return min(target, self.other_named.damping_ratio) if self.other_named else target
+        candidates = [target, *([self.other_named.eigenvalue] if self.other_named else [])]
+        return min(candidates, key=damping_ratio)
 
     def below(self, damping: float) -> int:
         """How many modes have less than this damping ratio."""
@@ -82,7 +83,7 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
     """What a design does that it must not: make unstable, or push a mode below the least damping that was above it."""
-    if after.is_unstable and after.growth > before.growth + _GROWTH:
+    if after.is_unstable and after.growth > before.growth + GROWTH:
         return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
     worst = after.worst
     if worst is None or worst.damping_ratio >= least:
@@ -96,9 +97,10 @@ def breach(before: Surroundings, after: Surroundings, least: float) -> str | Non
     return None
 
 
-def least_damping(model: LinearModel) -> tuple[float, float]:
-    """Smallest damping ratio from 0.1 to 2 Hz (1 where there is no mode), and the largest real part of all [1/s]."""
+def extremes(model: LinearModel) -> tuple[complex, complex]:
+    """The eigenvalue [rad/s] of least damping from 0.1 to 2 Hz (−1 where there is none), and that which grows most."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+    values = values[values.imag >= 0]
     frequencies = values.imag / (2 * np.pi)
     inside = values[(frequencies >= GUARDED[0]) & (frequencies <= GUARDED[1])]
-    return min(map(damping_ratio, inside.tolist()), default=1.0), float(values.real.max())
+    return min(inside.tolist(), key=damping_ratio, default=complex(-1)), complex(values[np.argmax(values.real)])

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from orchestrator.analysis.pod_design import LeadLag
+from orchestrator.analysis.pod_design import LeadLag, damping_ratio
 from orchestrator.study.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.study.guard import least_damping
+from orchestrator.study.guard import GROWTH, extremes
 
 _STRIDE = 2**0.5
 _REACH = 8.0
@@ -13,8 +13,6 @@ _REACH = 8.0
 _HALVINGS = 4
 VARIATION = 0.2
 """Relative change of K, T_S1 and T_S2, one at a time."""
-
-_GROWTH = 1e-3
 
 
 @dataclass(frozen=True)
@@ -25,6 +23,8 @@ class Margins:
     ----------
     limit
         Damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost.
+    lost_up, lost_down
+        The eigenvalue [rad/s] that is lost at the edge.
     up, down
         Factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that
         happens neither up to ``reach`` (up) nor down to a gain of 0 (down).
@@ -35,6 +35,8 @@ class Margins:
     limit: float
     up: float | None
     down: float | None
+    lost_up: complex | None
+    lost_down: complex | None
     variations: dict[str, float]
     reach: float = _REACH
 
@@ -51,32 +53,38 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
     least
         Least damping ratio; the limit is lower where a mode is already below it.
     """
-    damping, growth = least_damping(loop.model(nominal.setting))
-    limit = min(least, damping)
+    weakest, fastest = extremes(loop.model(nominal.setting))
+    limit, growth = min(least, damping_ratio(weakest)), max(GROWTH, fastest.real)
 
-    def holds(factor: float) -> bool:
+    def lost(factor: float) -> complex | None:
         setting = replace(nominal.setting, gain=nominal.setting.gain * factor)
-        now, real = least_damping(loop.model(setting))
-        return now >= limit - 1e-9 and real <= max(_GROWTH, growth)
+        weakest, fastest = extremes(loop.model(setting))
+        if fastest.real > growth:
+            return fastest
+        return weakest if damping_ratio(weakest) < limit - 1e-9 else None
 
-    return Margins(limit, _edge(holds, _STRIDE), _edge(holds, 1 / _STRIDE), _variations(loop, off, nominal.setting))
+    (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
+    return Margins(limit, up, down, lost_up, lost_down, _variations(loop, off, nominal.setting))
 
 
-def _edge(holds: Callable[[float], bool], stride: float) -> float | None:
-    """The factor up to which all holds, on the way from 1 to 8, or to 1/8 and then 0."""
+def _edge(lost: Callable[[float], complex | None], stride: float) -> tuple[float | None, complex | None]:
+    """The factor up to which all holds, on the way from 1 to 8, or to 1/8 and then 0; and what is lost beyond it."""
     good, bad = 1.0, stride
-    while holds(bad):
+    while (what := lost(bad)) is None:
         good = bad
         if not 1.01 / _REACH < good < 0.99 * _REACH:
-            if stride > 1 or holds(0.0):
-                return None
             bad = 0.0
+            if stride > 1 or (what := lost(bad)) is None:
+                return None, None
             break
         bad *= stride
     for _ in range(_HALVINGS):
         middle = (good + bad) / 2
-        good, bad = (middle, bad) if holds(middle) else (good, middle)
-    return good
+        if (found := lost(middle)) is None:
+            good = middle
+        else:
+            bad, what = middle, found
+    return good, what
 
 
 def _variations(loop: PodLoop, off: Placed, setting: PodSetting) -> dict[str, float]:

@@ -26,8 +26,8 @@ class Verdict:
 Judge = Callable[[Placed], Verdict]
 
 _GAINS = 9
-_TURNS = (15.0, -15.0, 30.0, -30.0, 45.0, -45.0)
-"""Angles [°] by which the compensation is turned to either side, once re-centring brings nothing more."""
+_TURN = 15.0
+"""Angle [°] by which the compensation is turned, to either side as long as that helps, once re-centring does not."""
 _ROUNDS = 5
 _WORTH = 5e-4
 """A damping ratio that is better by less is not worth another round."""
@@ -65,12 +65,15 @@ class Refinement:
     ----------
     chosen
         The best setting that breaks no other mode; None if there is none within the bounds.
+    score
+        Its damping ratio that counts.
     met
         Whether it has the required damping.
     """
 
     sweeps: list[Sweep] = field(default_factory=list)
     chosen: Placed | None = None
+    score: float = -1.0
     met: bool = False
     notes: list[str] = field(default_factory=list)
 
@@ -108,7 +111,7 @@ def refine(
     judge
         Looks at all modes with a setting.
     """
-    result, best = Refinement(), -np.inf
+    result = Refinement()
     for why, candidate in _candidates(loop, result, filters):
         try:
             found = sweep(loop, off, candidate, required, bounds, why)
@@ -125,8 +128,8 @@ def refine(
                 f"{why}: at a gain of {allowed.setting.gain:.4g} the target trades places with another mode, which "
                 f"then bears its name with {100 * damping:.2f} %"
             )
-        if damping > best:
-            best, result.chosen = damping, allowed
+        if damping > result.score:
+            result.score, result.chosen = damping, allowed
         if damping >= required - _TOLERANCE:
             result.met = True
             break
@@ -194,13 +197,23 @@ def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[t
         if len(result.sweeps) == count or result.sweeps[-1].chosen.damping_ratio < base.damping_ratio + _WORTH:
             break
         base = result.sweeps[-1].chosen
-    base = result.best
-    for turn in _TURNS:
-        filters = base.setting.filters
-        total = filters.N_S * filters.stage_angle_deg + turn
-        if abs(total) < 85 * filters.N_S:
-            phase = 180 - total if total >= 0 else -180 - total
-            yield f"turned by {turn:+.0f}°", lead_lag(phase, base.eigenvalue.imag, filters.N_S)
+    base = result.chosen or result.best
+    for direction in (+1, -1):
+        turn, reached = direction * _TURN, result.score
+        while (candidate_turned := _turned(base, turn)) is not None:
+            yield f"turned by {turn:+.0f}°", candidate_turned
+            if result.score < reached + _WORTH:
+                break
+            turn, reached = turn + direction * _TURN, result.score
+
+
+def _turned(base: Placed, turn: float) -> LeadLag | None:
+    """The lead/lag of a setting with its angle changed, centred on the mode there; None if its stages cannot."""
+    filters = base.setting.filters
+    total = filters.N_S * filters.stage_angle_deg + turn
+    if abs(total) >= 85 * filters.N_S or base.eigenvalue.imag <= 0:
+        return None
+    return lead_lag(180 - total if total >= 0 else -180 - total, base.eigenvalue.imag, filters.N_S)
 
 
 def recentred(loop: PodLoop, here: Placed) -> LeadLag:
@@ -210,6 +223,8 @@ def recentred(loop: PodLoop, here: Placed) -> LeadLag:
     moved = loop.place(here, gain + change)
     slope = (moved.eigenvalue - here.eigenvalue) / change
     phase = angle_deg(local_non_compensated(slope, here.eigenvalue, filters))
+    if here.eigenvalue.imag <= 0:
+        raise AnalysisError(f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on")
     if abs(compensation_deg(phase)) >= 85 * filters.N_S:
         raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
     return lead_lag(phase, here.eigenvalue.imag, filters.N_S)

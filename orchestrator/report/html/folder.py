@@ -83,6 +83,12 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
     return results
 
 
+def _designs(place: Path) -> list[dict[str, Any]]:
+    """The calculation sheets among the JSON files of a folder."""
+    contents = [json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "*.json")]
+    return [c for c in contents if isinstance(c, dict) and {"controller", "target_mode", "T_S1"} <= c.keys()]
+
+
 def _files(place: Path, pattern: str) -> list[Path]:
     return [place] if place.is_file() and place.match(pattern) else sorted(place.glob(pattern))
 

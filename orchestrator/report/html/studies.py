@@ -161,7 +161,18 @@ def design(sheet: dict[str, Any]) -> str:
         percent = -100 * mode["real"] / np.hypot(mode["real"], mode["imag"])
         rows.append([name, eigenvalue(mode["real"], mode["imag"]), f"{mode['imag'] / 2 / np.pi:.3f}", damping(percent)])
     kind = "lead" if sensitivity["phase_deg"] >= 0 else "lag"
-    return (
+    extra = []
+    if "verdict" in sheet:
+        state = "good" if sheet.get("met") else "bad"
+        extra.append(f'<p class="{state}">{escape(sheet["verdict"])}</p>')
+    if sheet.get("components"):
+        extra.append(
+            f"<p>Case {escape(sheet['case'])}, scenario {escape(sheet['scenario'])}, {escape(sheet['mode'])} mode; "
+            f"set on {escape(', '.join(sheet['components'][:6]))}"
+            + (f" … {len(sheet['components'])} in all" if len(sheet["components"]) > 6 else "")
+            + f". Finite difference with ΔK = {sheet['requirement']['delta_gain']:g}.</p>"
+        )
+    return "".join(extra) + (
         f"<p>Non-compensated eigenvalue sensitivity {sensitivity['magnitude']:.4g} ∠ "
         f"{number(sensitivity['phase_deg'], 1)}°: a {kind} is needed.</p>"
         + table("Setting", ["Parameter", "Value"], settings)

@@ -1,0 +1,151 @@
+"""``gfor design`` as a user meets it: the sheet, the JSON, the parameter file, and what it says of bad input."""
+
+import json
+import re
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.cli import main
+
+
+@pytest.fixture
+def gfor(capsys, tmp_path, monkeypatch):
+    """Run the command in an empty folder; returns exit code, standard output and standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture
+def design(gfor):
+    def run(*arguments):
+        code, out, err = gfor("design", "two_area", "--no-margins", *arguments)
+        assert (code, err) == (0, ""), err
+        return out
+
+    return run
+
+
+@pytest.mark.parametrize(("controller", "T_S1", "T_S2"), [("pod_p", 0.20, 0.37), ("pod_q", 0.26, 0.29)])
+def test_json_has_the_design(gfor, controller, T_S1, T_S2):
+    code, out, _ = gfor("design", "two_area", "--controller", controller, "--json", "--set", "grid.X_L=0.1")
+    assert code == 0
+    d = json.loads(out)
+    assert list(d)[:10] == ["controller", "target_mode", "sensitivity", "T_S1", "T_S2", "N_S", "K", "K_unbounded",
+                            "predicted_mode", "achieved_mode"]  # fmt: skip
+    assert (d["controller"], d["N_S"], d["K"]) == (controller, 2, 200.0)
+    assert d["T_S1"] == pytest.approx(T_S1, abs=0.01)
+    assert d["T_S2"] == pytest.approx(T_S2, abs=0.01)
+    target, aimed = (complex(d[k]["real"], d[k]["imag"]) for k in ("target_mode", "predicted_mode"))
+    required = d["requirement"]["damping_ratio"]
+    assert required == pytest.approx(0.1 - target.real / abs(target))
+    assert aimed == pytest.approx(complex(-required * target.imag, target.imag))
+    assert d["K_unbounded"] == pytest.approx(abs(aimed - target) / d["sensitivity"]["magnitude"])
+    assert -180 < d["sensitivity"]["phase_deg"] <= 180
+    assert d["met"] is True
+    assert d["margins"]["gain_up"] is None or d["margins"]["gain_up"] > 1
+
+
+def test_the_parameter_file_gives_the_mode_that_was_promised(gfor, design):
+    achieved = json.loads(design("--controller", "pod_p", "--json"))["achieved_mode"]
+    for command in (["--scenario", "gfor", "--parameters", "two_area_pod_p.toml"],):
+        _, out, _ = gfor("modes", "two_area", "--json", *command)
+        (mode,) = [m for m in json.loads(out)["scenarios"][0]["modes"] if m["name"] == "electromechanical"]
+        assert mode["real"] == pytest.approx(achieved["real"], abs=1e-5)
+        assert mode["imag"] == pytest.approx(achieved["imag"], abs=1e-5)
+
+
+def test_the_parameter_file_says_where_it_comes_from(design, tmp_path):
+    design("--controller", "pod_q", "--out", "new/mine.toml", "--set", "grid.X_L=0.2", "--damping", "30%")
+    file = read_parameter_file(tmp_path / "new" / "mine.toml")
+    assert list(file.values) == [f"gfor.pod_q.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
+    assert file.values["gfor.pod_q.enabled"] is True
+    (command,) = re.findall("^# command: (.*)$", file.text, re.MULTILINE)
+    assert command.startswith("gfor design two_area --controller pod_q --damping 0.3 ")
+    assert "--set grid.X_L=0.2" in command
+
+
+def test_a_pattern_that_fits_is_kept_in_the_parameter_file(design, tmp_path):
+    design("--controller", "pod_q", "--component", "gfor*")
+    assert '"gfor*.pod_q.K" = 200.0' in (tmp_path / "two_area_pod_q.toml").read_text()
+
+
+def test_the_sheet_shows_formulas_figures_and_units(design):
+    out = design("--controller", "pod_p")
+    for words in ("Ŝ_NC = (λ_NC − λ₀)/ΔK", "rad/s per pu ∠ -145.8", "lag", "T_S1 = 1/(ω₀√a)", "K ∈ [200, 400] pu",
+                  "200.00 pu (lower bound active)", "met: the target has 22.7"):  # fmt: skip
+        assert words in out.replace("-145.77", "-145.8")
+    assert re.search(r"│ 1 +│ Target mode, POD off", out)
+
+
+def test_the_sheet_says_why_a_requirement_is_not_met(design):
+    out = design("--controller", "pod_p", "--set", "grid.X_L=0.01")
+    assert "not met: the target has 7.3" in out
+    assert "the upper bound of the gain is active" in out
+    out = design("--controller", "pod_p", "--gain-bounds", "0:400")
+    assert "not met" in out
+    assert "use --refine" in out
+    out = design("--controller", "pod_p", "--gain-bounds", "0:400", "--refine")
+    assert "\nmet: the target has 20.6" in out
+
+
+def test_no_stages_leave_the_lead_lag_out(design):
+    d = json.loads(design("--controller", "pod_q", "--stages", "0", "--json"))
+    assert (d["T_S1"], d["T_S2"], d["N_S"]) == (0, 0, 0)
+    assert d["K_unbounded"] == pytest.approx(d["K_compensated"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "the following arguments are required: --controller"),
+        (["--controller", "pod_x"], "invalid choice: 'pod_x'"),
+        (["--scenario", "base"], "scenario 'base': no component has the controller pod_p"),
+        (["--scenario", "none"], "--scenario: there is no scenario 'none'; the case has: base, gfor"),
+        (["--scenario", "gfor", "--scenario", "pod_q"], "a design is made for one scenario, not for gfor and pod_q"),
+        (["--component", "sg*"], "--component sg*: scenario 'gfor' has no component of that name with pod_p; those"),
+        (["--mode", "1-2"], "--mode: the case names no mode '1-2'; it names: electromechanical"),
+        (["--damping", "0.05"], "has a damping ratio of 0.1059 already; ask for more"),
+        (["--damping", "20"], "'20' is not a damping ratio between 0 and 1, such as 0.1 or 10%"),
+        (["--damping", "0.2", "--damping-increment", "0.1"], "both say what is required; give one of them"),
+        (["--gain-bounds", "400:200"], "'400:200' are no bounds; write MIN:MAX in pu"),
+        (["--gain-bounds", "0:1e6"], "--gain-bounds: 1e+06 is out of range: gfor.pod_p.K takes from 0 to 100000"),
+        (["--delta-gain", "0"], "'0' is not a gain above 0"),
+        (["--stages", "4"], "--stages: 4 is out of range: gfor.pod_p.N_S takes from 0 to 3"),
+        (["--set", "gfor.pod_p.T_X=1"], "--set gfor.pod_p.T_X: component 'gfor' has no variable 'pod_p.T_X'"),
+        (["--parameters", "none.toml"], "none.toml: the parameter file cannot be read"),
+        (["--out", "."], "--out .: the parameter file cannot be written there: Is a directory"),
+    ],
+)
+def test_input_that_cannot_be_used(gfor, tmp_path, arguments, words):
+    controller = [] if not arguments or "--controller" in arguments else ["--controller", "pod_p"]
+    code, out, err = gfor("design", "two_area", *controller, *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("error:") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_too_few_stages(gfor):
+    code, _, err = gfor("design", "two_area", "--controller", "pod_q", "--set", "grid.X_L=0.6", "--stages", "1")
+    assert code == 1
+    assert "ask for 2 stages with --stages" in err
+
+
+def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):
+    text = load_case("two_area").text.replace('title = "SG + GFOR"', 'title = "SG + GFOR"\n[scenarios.second]')
+    (tmp_path / "open.toml").write_text(text, encoding="utf-8")
+    code, _, err = gfor("design", "open.toml", "--controller", "pod_p")
+    assert code == 2
+    assert "more than one scenario (gfor, second) has components with pod_p and every POD off" in err
+    assert "name one with --scenario" in err
