@@ -54,6 +54,8 @@ def run(plan: SweepPlan, executor: Executor, folder: Path, report: Callable[[int
             "the same command continues from there"
         )
         return None
+    finally:
+        executor.close()
 
 
 def present(result: SweepResult, folder: Path, console: Console, *, as_json: bool) -> int:

@@ -39,6 +39,9 @@ class DaskCluster:
             finally:
                 client.cancel(futures)
 
+    def close(self) -> None:
+        """See `Executor.close`; the workers are the cluster's own."""
+
     def _client(self, distributed: Any) -> Any:
         try:
             client = distributed.Client(self.address, timeout=_PATIENCE, set_as_default=False)

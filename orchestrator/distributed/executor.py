@@ -28,3 +28,7 @@ class Executor(Protocol):
         computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`.
         """
         ...
+
+    def close(self) -> None:
+        """Let go of the workers; they serve several runs until then."""
+        ...

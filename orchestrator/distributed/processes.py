@@ -26,6 +26,7 @@ class Processes:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None  # starting a worker takes seconds
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
@@ -43,7 +44,7 @@ class Processes:
         """Compute what is waiting; ends early, with what was under way, if a worker dies."""
         under_way: dict[Future[Result], int] = {}
         suspects: list[int] = []
-        pool = _pool(min(self.workers, len(waiting)))
+        pool, whole = self._running_pool(), False
         try:
             while waiting or under_way:
                 try:
@@ -61,14 +62,27 @@ class Processes:
                         yield index, future.result()
                 if suspects:
                     break
+            whole = not (waiting or under_way or suspects)
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            if not whole:  # a worker died, a task failed, or nobody wants the rest
+                self.close()
         for future, index in under_way.items():
             if future.done() and not future.cancelled() and future.exception() is None:
                 yield index, future.result()
             else:
                 suspects.append(index)
         return sorted(suspects)
+
+    def _running_pool(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            self._pool = _pool(self.workers)
+        return self._pool
+
+    def close(self) -> None:
+        """See `Executor.close`."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            pool.shutdown(wait=True, cancel_futures=True)
 
     def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
         for _ in range(ATTEMPTS - 1):

@@ -14,3 +14,6 @@ class Serial:
         """See `Executor.run`."""
         for index, task in enumerate(tasks):
             yield index, function(task)
+
+    def close(self) -> None:
+        """See `Executor.close`."""

@@ -18,6 +18,8 @@ NUMBERS = range(8)
 def test_every_task_is_answered_once(executor):
     assert sorted(executor.run(double, NUMBERS)) == [(n, 2 * n) for n in NUMBERS]
     assert list(executor.run(double, [])) == []
+    assert sorted(executor.run(double, NUMBERS)) == [(n, 2 * n) for n in NUMBERS]
+    executor.close()
 
 
 @pytest.mark.parametrize("executor", [Serial(), Processes(2)])
