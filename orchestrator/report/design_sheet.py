@@ -166,7 +166,9 @@ def verdict(d: "PodDesign") -> str:
 
 def _out_of_reach(d: "PodDesign", r: "Refinement") -> str:
     """What the sweeps have shown."""
-    low, high = d.request.gain_bounds
+    if not r.sweeps:
+        return "; the refinement could not follow the mode with any setting within the bounds"
+    low, high = d.request.gain_bounds[0], max(s.points[-1].setting.gain for s in r.sweeps)
     best = r.highest_swept
     text = (
         f"; no setting within the bounds was found that meets it: {len(r.sweeps)} lead/lag settings were swept over "

@@ -37,8 +37,7 @@ Report = Callable[[str], None]
 
 _OFF = PodSetting(0.0, NO_COMPENSATION)
 
-_MET = 5e-4
-"""A damping ratio that falls short by less counts as met: 0.05 points."""
+_MET = 5e-4  # a damping ratio that falls short by less counts as met: 0.05 points
 
 
 @dataclass(frozen=True)
@@ -95,10 +94,8 @@ class PodDesign:
     ----------
     initial, required_damping, predicted
         λ_0 [rad/s], ζ_d, λ_d [rad/s].
-    filters, unbounded_gain, gain
-        By the paper's equations.
-    designed
-        The closed loop with them.
+    filters, gain, designed
+        By the paper's equations, and the closed loop with them.
     final
         The closed loop with the final setting: the refined one, else the same.
     before, after

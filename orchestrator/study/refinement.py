@@ -143,7 +143,12 @@ def sweep(
     points: list[Placed] = []
     here = off
     for gain in np.linspace(*bounds, _GAINS).tolist():
-        here = loop.place(here, gain, filters)
+        try:
+            here = loop.place(here, gain, filters)
+        except AnalysisError:
+            if not points:
+                raise
+            break  # so far the mode can be followed, and so far it was swept
         points.append(here)
     above = next((k for k, p in enumerate(points) if p.damping_ratio >= required), None)
     if above == 0:
@@ -169,6 +174,8 @@ def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Plac
 
 def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
     """The best damping around the best of some gains."""
+    if len(points) == 1:
+        return points[0]
     k = max(range(len(points)), key=lambda i: points[i].damping_ratio)
     best, step = points[k], points[1].setting.gain - points[0].setting.gain
     low, high = points[0].setting.gain, points[-1].setting.gain

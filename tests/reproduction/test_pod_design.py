@@ -114,6 +114,13 @@ def test_no_other_mode_is_made_unstable_for_the_targets_sake():
     assert refined.final.setting.gain < plain.gain
 
 
+@pytest.mark.parametrize("gains", [(200, 200), (0, 1)])
+def test_narrow_bounds_are_swept_as_well(gains):
+    d = design("pod_p", gain_bounds=gains, refine=True)
+    assert gains[0] <= d.final.setting.gain <= gains[1]
+    assert d.met == (gains == (200, 200))
+
+
 def test_margins_say_where_a_mode_is_lost():
     d = design("pod_q", overrides={"grid.X_L": 0.01}, margins=True)
     assert d.margins.down is None
