@@ -15,7 +15,7 @@ from rich.progress import Progress as ProgressBar
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_design
+from orchestrator import cli_compare, cli_design
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -45,6 +45,8 @@ examples:
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
+  gfor compare results/two_area/gfor results/two_area/pod_p
+  gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -151,6 +153,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     vary.add_argument("--json", action="store_true", help="print JSON")
     vary.set_defaults(command=_sweep)
+
+    comparison = commands.add_parser("compare", help="two recorded runs: differences, and what each rings with")
+    cli_compare.add_compare(comparison)
+    comparison.set_defaults(command=lambda options: cli_compare.run_compare(options, _console()))
+
+    identify = commands.add_parser("identify", help="the modes in a recorded signal (matrix pencil)")
+    cli_compare.add_identify(identify)
+    identify.set_defaults(command=lambda options: cli_compare.run_identify(options, _console()))
 
     report = commands.add_parser("report", help="one self-contained HTML page from the folder of a run")
     report.add_argument("folder", type=Path, metavar="DIR", help="folder of `gfor run`")

@@ -1,0 +1,66 @@
+"""``gfor compare`` and ``gfor identify`` on recorded runs."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from orchestrator.cli import main
+
+TIMES = np.arange(0, 15, 0.01)
+
+
+def save(folder, eigenvalue, offset=0.0, times=TIMES):
+    """A run in which one signal rings with a known mode and another stays."""
+    ring = 1 + 1e-3 * np.real(np.exp(eigenvalue * times))
+    data = {
+        "a.omega": ("time", ring, {"units": "pu"}),
+        "b.omega": ("time", np.ones_like(times) + offset, {"units": "pu"}),
+    }
+    folder.mkdir()
+    xr.Dataset(data, coords={"time": times}).to_netcdf(folder / "trajectory.nc", engine="scipy")
+    return folder
+
+
+@pytest.fixture
+def runs(tmp_path):
+    return save(tmp_path / "one", -0.3 + 4j), save(tmp_path / "two", -0.9 + 5j, 1e-4, TIMES[::2])
+
+
+def test_two_runs_side_by_side(runs, capsys):
+    assert main(["compare", *map(str, runs), "--signal", "a.omega - b.omega", "--signal", "b.omega", "--json"]) == 0
+    ring, still = json.loads(capsys.readouterr().out)
+    assert [m["damping_percent"] for m in ring["modes"]] == pytest.approx(
+        [100 * 0.3 / abs(-0.3 + 4j), 100 * 0.9 / abs(-0.9 + 5j)], abs=0.05
+    )
+    assert ring["unit"] == "pu"
+    assert still["largest"] == pytest.approx(1e-4)
+    assert still["modes"] == [None, None]
+
+
+def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
+    assert main(["compare", *map(str, runs)]) == 0
+    out = capsys.readouterr().out
+    assert out.index("b.omega") < out.index("a.omega")
+
+
+def test_the_modes_of_a_signal(runs, capsys):
+    assert main(["identify", str(runs[0]), "a.omega", "--start", "1", "--json"]) == 0
+    (mode,) = json.loads(capsys.readouterr().out)
+    assert (mode["real"], mode["imag"]) == pytest.approx((-0.3, 4.0), abs=1e-3)
+    assert mode["amplitude"] == pytest.approx(0.5e-3 * np.exp(-0.3), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["identify", "{0}", "a.speed"], "was not recorded; there are: a.omega, b.omega"),
+        (["identify", "{0}", "b.omega"], "constant"),
+        (["identify", "{0}/..", "a.omega"], "choose a scenario in it: one, two"),
+        (["compare", "{0}", "nowhere"], "there is no trajectory.nc"),
+    ],
+)
+def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
+    assert main([a.replace("{0}", str(runs[0])) for a in arguments]) in (1, 2)
+    assert word in capsys.readouterr().err
