@@ -47,7 +47,7 @@ def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
 
 def test_the_modes_of_a_signal(runs, capsys):
     assert main(["identify", str(runs[0]), "a.omega", "--start", "1", "--json"]) == 0
-    (mode,) = json.loads(capsys.readouterr().out)
+    mode, *_ = json.loads(capsys.readouterr().out)
     assert (mode["real"], mode["imag"]) == pytest.approx((-0.3, 4.0), abs=1e-3)
     assert mode["amplitude"] == pytest.approx(0.5e-3 * np.exp(-0.3), rel=0.01)
 

@@ -79,7 +79,8 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
     What has less than a thousandth of the strongest's amplitude is left out.
     """
     window = curve.sel(time=slice(start, stop))
-    found = identify_modes(window["time"].values, window.values)
+    # Oscillations are small beside the value that they are around, and would count as noise beside it.
+    found = identify_modes(window["time"].values, window.values - float(window.mean()))
     return [m for m in found if m.amplitude >= _WEAKEST * found[0].amplitude]
 
 
