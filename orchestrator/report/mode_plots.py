@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestrator.cases.schema import ReferenceModeTable
-from orchestrator.report.plots import STYLE, colour, save_figure
+from orchestrator.report.plots import STYLE, add_legend, colour, save_figure
 
 if TYPE_CHECKING:
     from orchestrator.study.modes import ModesResult
@@ -52,7 +52,7 @@ def plot_eigenvalues(results: Sequence["ModesResult"], title: str, path: Path) -
         axis.set_xlabel("Real part [1/s]")
         axis.set_ylabel("Frequency [Hz]")
         axis.set_title(title, loc="left")
-        figure.legend(loc="outside lower center", ncols=3)
+        add_legend(figure, *axis.get_legend_handles_labels())
         save_figure(figure, path)
 
 
@@ -96,7 +96,7 @@ def plot_participation(results: Sequence["ModesResult"], path: Path) -> bool:
             axis.grid(visible=False, axis="x")
             axis.set_title(f"Mode {name}" if len(names) > 1 else f"{name.capitalize()} mode", loc="left")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))
+        add_legend(figure, handles, labels)
         save_figure(figure, path)
     return True
 

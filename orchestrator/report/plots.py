@@ -27,6 +27,8 @@ STYLE: dict[Any, Any] = {
 _COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour in every plot."""
 _DPI = 150
+_LEGEND_WIDTH = 96
+"""Characters that fit in a line of a legend, marks included."""
 
 
 def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -> bool:
@@ -55,9 +57,15 @@ def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -
         axes[0].set_title(f"{table.title}{dashed}", loc="left")
         axes[-1].set_xlabel("Time [s]")
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)))
+        add_legend(figure, handles, labels)
         save_figure(figure, path)
     return True
+
+
+def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """Below the axes, in as many columns as the longest label leaves room for."""
+    columns = max(1, min(3, _LEGEND_WIDTH // (6 + max(map(len, labels), default=1))))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def colour(index: int) -> str:
