@@ -27,12 +27,17 @@ class Exchange:
     ----------
     inputs, outputs
         Batches of the connected variables. The outputs' values are a window of the system's vector y.
+    window
+        Where in y that is.
     sources
         For each input the index in y of the output that feeds it.
     """
 
-    def __init__(self, component: Component, inputs: RealBatch, outputs: RealBatch, sources: NDArray[np.int64]) -> None:
-        self.component, self.inputs, self.outputs, self.sources = component, inputs, outputs, sources
+    def __init__(
+        self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
+    ) -> None:
+        self.component, self.inputs, self.outputs = component, inputs, outputs
+        self.window, self.sources = window, sources
 
 
 class Loop(Protocol):
@@ -135,10 +140,13 @@ class CompiledLoop:
 
 
 class PythonLoop:
-    """Steps a system in Python."""
+    """Steps a system in Python, also one whose inputs are extrapolated."""
 
-    def __init__(self, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> None:
-        self._groups, self._y = groups, y
+    def __init__(
+        self, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], extrapolation: float = 0.0
+    ) -> None:
+        self._groups, self._y, self._extrapolation = groups, y, extrapolation
+        self._before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
 
@@ -146,9 +154,10 @@ class PythonLoop:
         self.completed = 0
         for k in range(index, index + count):
             time = k * step_size
+            known = self._extrapolated() if self._extrapolation else self._y
             for group, spent in zip(self._groups, self._spent, strict=True):
                 for i, exchange in enumerate(group):
-                    np.take(self._y, exchange.sources, out=exchange.inputs.values, mode="clip")
+                    np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
                     start = perf_counter()
                     component = exchange.component
                     if exchange.inputs.names:
@@ -160,14 +169,21 @@ class PythonLoop:
                     if exchange.outputs.names:
                         component = exchange.component
                         component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
+                    known[exchange.window] = exchange.outputs.values
                     spent[i] += perf_counter() - start
             self.completed += 1
+
+    def _extrapolated(self) -> NDArray[np.float64]:
+        """All outputs as they would go on rising; what has stepped since then is overwritten group by group."""
+        known = self._y + self._extrapolation * (self._y - (self._y if self._before is None else self._before))
+        self._before = self._y.copy()
+        return known
 
     def seconds(self) -> list[float]:
         return [seconds for group in self._spent for seconds in group]
 
 
-def make_loop(groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> Loop:
-    """The compiled loop where there is one, else the loop in Python."""
-    library = _library()
-    return PythonLoop(groups, y) if library is None else CompiledLoop(library, groups, y)
+def make_loop(groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], extrapolation: float = 0.0) -> Loop:
+    """The compiled loop where there is one, else the loop in Python; only that one extrapolates."""
+    library = None if extrapolation else _library()
+    return PythonLoop(groups, y, extrapolation) if library is None else CompiledLoop(library, groups, y)

@@ -1,4 +1,4 @@
-"""In which order the components of a system step within one communication step.
+"""In which order the components of a system step within one communication step, and what they know of one another.
 
 Components of one group step side by side: all take their inputs, all step, all give their outputs.
 Groups follow one another, and each sees the new outputs of those before it. One group is the Jacobi
@@ -6,18 +6,38 @@ scheme; several are Gauss-Seidel.
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 from orchestrator.errors import InputError
 
 SCHEDULES = ("gauss-seidel", "jacobi")
 
+FirstInputs = Literal["consistent", "once", "start", "zero"]
+"""What connected inputs hold in the first step.
+
+``consistent``: outputs were propagated until nothing changed any more (what this master does). Others', which propagate
+nothing before initialisation has ended: ``once``: outputs as read then, with inputs still at their start values;
+``start``: the inputs' start values; ``zero``: 0.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Groups of component names, in order."""
+    """Groups of component names, in order.
+
+    Parameters
+    ----------
+    first_inputs
+        What connected inputs hold in the first step.
+    extrapolation
+        Inputs are held at y + extrapolation·(y − y before), y being the output that feeds them at a communication point
+        and the one before it; 0 takes y itself.
+    """
 
     name: str
     groups: tuple[tuple[str, ...], ...]
+    first_inputs: FirstInputs = "consistent"
+    extrapolation: float = 0.0
 
     def check(self, components: set[str]) -> None:
         """Raise unless every component is in exactly one group.
