@@ -4,7 +4,7 @@ Where no library can be compiled for the platform, the same loop runs in Python.
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from time import perf_counter
@@ -140,12 +140,24 @@ class CompiledLoop:
 
 
 class PythonLoop:
-    """Steps a system in Python, also one whose inputs are extrapolated."""
+    """Steps a system in Python.
+
+    Parameters
+    ----------
+    extrapolation
+        See `Schedule`.
+    hand_over
+        Sets all inputs before each step; by default each component takes its own as it steps.
+    """
 
     def __init__(
-        self, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], extrapolation: float = 0.0
+        self,
+        groups: Sequence[Sequence[Exchange]],
+        y: NDArray[np.float64],
+        extrapolation: float = 0.0,
+        hand_over: Callable[[], None] | None = None,
     ) -> None:
-        self._groups, self._y, self._extrapolation = groups, y, extrapolation
+        self._groups, self._y, self._extrapolation, self._hand_over = groups, y, extrapolation, hand_over
         self._before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
@@ -155,12 +167,14 @@ class PythonLoop:
         for k in range(index, index + count):
             time = k * step_size
             known = self._extrapolated() if self._extrapolation else self._y
+            if self._hand_over is not None:
+                self._hand_over()
             for group, spent in zip(self._groups, self._spent, strict=True):
                 for i, exchange in enumerate(group):
                     np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
                     start = perf_counter()
                     component = exchange.component
-                    if exchange.inputs.names:
+                    if exchange.inputs.names and self._hand_over is None:
                         component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
                     component.step(time, step_size)
                     spent[i] += perf_counter() - start
@@ -183,7 +197,14 @@ class PythonLoop:
         return [seconds for group in self._spent for seconds in group]
 
 
-def make_loop(groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], extrapolation: float = 0.0) -> Loop:
-    """The compiled loop where there is one, else the loop in Python; only that one extrapolates."""
-    library = None if extrapolation else _library()
-    return PythonLoop(groups, y, extrapolation) if library is None else CompiledLoop(library, groups, y)
+def make_loop(
+    groups: Sequence[Sequence[Exchange]],
+    y: NDArray[np.float64],
+    extrapolation: float = 0.0,
+    hand_over: Callable[[], None] | None = None,
+) -> Loop:
+    """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
+    library = None if extrapolation or hand_over else _library()
+    if library is None:
+        return PythonLoop(groups, y, extrapolation, hand_over)
+    return CompiledLoop(library, groups, y)

@@ -74,7 +74,9 @@ class Master:
             self.close()
             raise
         groups = [[self.exchanges[name] for name in group] for group in schedule.groups]
-        self._loop = make_loop(groups, self.y, schedule.extrapolation)
+        self._wires = self._single_wires() if schedule.wire_by_wire else []
+        self._handed_over = False
+        self._loop = make_loop(groups, self.y, schedule.extrapolation, self._hand_over if self._wires else None)
 
     # -- life cycle ------------------------------------------------------------------------------
 
@@ -108,6 +110,15 @@ class Master:
                 np.array([sources.index(c.source) for c in feeding], dtype=np.int64),
             )
         return exchanges
+
+    def _single_wires(self) -> list[tuple[RealBatch, RealBatch]]:
+        """Source and target of every connection by themselves, sharing their value."""
+        wires = []
+        for wire in self.system.connections:
+            source = RealBatch(self.components[wire.source.component], [wire.source.variable])
+            target = RealBatch(self.components[wire.target.component], [wire.target.variable], source.values)
+            wires.append((source, target))
+        return wires
 
     def _initialise(self) -> None:
         """Bring all FMUs through initialisation, with the first inputs that the schedule gives them."""
@@ -179,6 +190,22 @@ class Master:
         if len(exchange.sources):
             np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
             exchange.inputs.write()
+
+    def exchange(self) -> None:
+        """Send every component the newest outputs of its partners, all at once or as the schedule has it."""
+        for source, target in self._wires:
+            source.read()
+            target.write()
+        if not self._wires:
+            for name in self.components:
+                self.exchange_inputs(name)
+        self._handed_over = True
+
+    def _hand_over(self) -> None:
+        """Exchange before a step, unless it was done to observe: wire by wire, a second time would give other values."""
+        if not self._handed_over:
+            self.exchange()
+        self._handed_over = False
 
     def advance(self, count: int) -> None:
         """Do ``count`` communication steps and nothing else.

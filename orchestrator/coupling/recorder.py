@@ -68,8 +68,7 @@ class Recorder:
 
     def observe(self, master: "Master") -> None:
         if self.after_exchange:
-            for name in master.components:
-                master.exchange_inputs(name)
+            master.exchange()
         self._times[self._count] = master.time
         row = self._values[self._count]
         for batch, columns in self._batches:

@@ -32,12 +32,17 @@ class Schedule:
     extrapolation
         Inputs are held at y + extrapolation·(y − y before), y being the output that feeds them at a communication point
         and the one before it; 0 takes y itself.
+    wire_by_wire
+        Between two steps connections are served one after the other, in the order in which they were made: an output
+        that depends directly on inputs is read after those that were set before it. This needs a single group, and
+        inputs that are held.
     """
 
     name: str
     groups: tuple[tuple[str, ...], ...]
     first_inputs: FirstInputs = "consistent"
     extrapolation: float = 0.0
+    wire_by_wire: bool = False
 
     def check(self, components: set[str]) -> None:
         """Raise unless every component is in exactly one group.
@@ -53,6 +58,8 @@ class Schedule:
             "not components": set(listed) - components,
             "listed more than once": {name for name in listed if listed.count(name) > 1},
         }
+        if self.wire_by_wire and (len(self.groups) > 1 or self.extrapolation):
+            raise InputError(f"schedule {self.name!r}: wire_by_wire needs a single group and no extrapolation")
         faults = [f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names]
         if faults:
             raise InputError(f"schedule {self.name!r}: {'; '.join(faults)}; list every component exactly once")

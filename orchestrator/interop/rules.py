@@ -1,0 +1,83 @@
+"""What tells one master from another: every choice that changes a result to its last digits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from orchestrator.coupling.schedule import FirstInputs, Schedule
+from orchestrator.errors import InputError
+
+Steps = Literal["side by side", "in turn"]
+"""Jacobi: all components step with the outputs of the step before. Gauss-Seidel: each sees those that stepped before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class MasterRules:
+    """The schedule of a master.
+
+    Attributes
+    ----------
+    name, title
+        For the command line, and for people; the version that was looked at.
+    steps
+        Jacobi or Gauss-Seidel.
+    first_inputs
+        What connected inputs hold in the first step; see `FirstInputs`.
+    early_label
+        A row labelled t holds what t/H + ``early_label`` steps gave: 1 where the time is noted before the step and the
+        outputs after it.
+    after_exchange
+        Outputs are recorded after the inputs for the next step were handed over; else with the inputs of the step.
+    extrapolation, wire_by_wire
+        See `Schedule`.
+    last_label
+        ``stop``, or ``before stop``: the loop runs while the time, summed up step by step, is less than the stop time.
+    source
+        Where each of these is to be seen.
+    """
+
+    name: str
+    title: str
+    steps: Steps
+    first_inputs: FirstInputs = "consistent"
+    early_label: int = 0
+    after_exchange: bool = False
+    extrapolation: float = 0.0
+    wire_by_wire: bool = False
+    last_label: Literal["stop", "before stop"] = "stop"
+    source: str = ""
+
+    def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
+        """The schedule for a system.
+
+        Parameters
+        ----------
+        components
+            All of them, in the order in which the master was given them.
+        order
+            The order in which they step, where that is another; for Gauss-Seidel only.
+
+        Raises
+        ------
+        InputError
+            If an order is given to a master that has none, or does not list every component once.
+        """
+        if self.steps == "side by side":
+            if order is not None:
+                raise InputError(f"{self.title} steps all components side by side, so that they have no order")
+            groups: tuple[tuple[str, ...], ...] = (tuple(components),)
+        else:
+            groups = tuple((name,) for name in (order or components))
+        chosen = Schedule(self.name, groups, self.first_inputs, self.extrapolation, self.wire_by_wire)
+        chosen.check(set(components))
+        return chosen
+
+    def rows(self, step_size: float, stop_time: float) -> int:
+        """How many rows the master records, one a step, from label 0 on."""
+        if self.last_label == "stop":
+            return round(stop_time / step_size) + 1
+        time, rows = 0.0, 0
+        while time < stop_time:
+            time += step_size
+            rows += 1
+        return rows
