@@ -13,10 +13,10 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
-from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design
+from orchestrator import cli_compare, cli_design, cli_interop
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -48,6 +48,8 @@ examples:
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
+  gfor which-master --build probes               two FMUs that tell which schedule a tool runs
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -91,6 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
     run.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     run.add_argument("--json", action="store_true", help="print the summary as JSON")
+    cli_interop.add_like(run)
     run.set_defaults(command=_run)
 
     modes = commands.add_parser("modes", help="steady state and eigenvalues of a case's scenarios")
@@ -186,6 +189,10 @@ def _parser() -> argparse.ArgumentParser:
         help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
     build.set_defaults(command=_build)
+
+    which = commands.add_parser("which-master", help="which schedule another tool runs, told by a pair of probe FMUs")
+    cli_interop.add_which_master(which, sorted(TARGETS))
+    which.set_defaults(command=_which_master)
 
     info = commands.add_parser("info", help="show what an FMU declares")
     info.add_argument("file", type=Path, metavar="FILE.fmu")
@@ -348,6 +355,8 @@ def _design(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     case, scenarios = _prepare(options)
+    if options.like:
+        return cli_interop.run_like_master(case, scenarios, options)
     folder = _folder(options.out or Path("results") / case.name)
     console = _console(stderr=options.json)
     results: list[RunResult] = []
@@ -474,6 +483,19 @@ def _build(options: argparse.Namespace) -> int:
             print(export_native(model, options.dest, platforms, options.fmi))
         else:
             print(export(model, options.dest, platforms))
+    return 0
+
+
+def _which_master(options: argparse.Namespace) -> int:
+    if (options.build is None) == (options.result is None):
+        raise InputError("give either the tool's RESULT.csv, or --build DIR for the probe pair")
+    if options.build is None:
+        return cli_interop.run_which_master(options, _console(stderr=options.json))
+    folder, host = _folder(options.build), host_platform()
+    platforms = tuple(options.platform or ([host] if host else []))
+    for name in ("probe_a", "probe_b"):
+        print(export_native(build_model(name), folder, platforms))
+    print(cli_interop.write_instructions(folder, options, platforms))
     return 0
 
 

@@ -202,7 +202,7 @@ class Master:
         self._handed_over = True
 
     def _hand_over(self) -> None:
-        """Exchange before a step, unless it was done to observe: wire by wire, a second time would give other values."""
+        """Exchange before a step, unless an observer had it done: wire by wire, a second time gives other values."""
         if not self._handed_over:
             self.exchange()
         self._handed_over = False

@@ -77,5 +77,5 @@ def emulate(
     with Master(system, schedule, step_size, stop_time) as master:
         master.run(clock.time(rules.early_label), events)
         master.run(clock.time(last + rules.early_label), events, [recorder, *observers])
-    times = np.arange(len(recorder.times)) * every * step_size
+    times = np.array([clock.time(row * every) for row in range(len(recorder.times))])
     return Emulation(times, recorder.values, tuple(record))

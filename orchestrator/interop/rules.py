@@ -8,7 +8,7 @@ from orchestrator.coupling.schedule import FirstInputs, Schedule
 from orchestrator.errors import InputError
 
 Steps = Literal["side by side", "in turn"]
-"""Jacobi: all components step with the outputs of the step before. Gauss-Seidel: each sees those that stepped before it."""
+"""Jacobi: all components step with the outputs of the step before. Gauss-Seidel: each sees those that stepped first."""
 
 
 @dataclass(frozen=True, slots=True)

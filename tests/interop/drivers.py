@@ -1,4 +1,4 @@
-"""Other people's masters, driven as their documentation says: ``python drivers.py MASTER JOB.json RESULT.json``.
+"""Other people's masters, driven as their documentation says: ``python drivers.py MASTER JOB.json RESULT.json …``.
 
 A job says what to couple and needs nothing of this project to be read, so that this file runs under any Python that
 has the master, also in an environment of its own::
@@ -14,7 +14,6 @@ The result has ``rows``: [label in s, value, ...] as the master records them, on
 master chose one. Masters may abort when their process ends; the result is complete before.
 """
 
-import asyncio
 import csv
 import ctypes
 import json
@@ -156,12 +155,13 @@ def fmpy_container(job):
     for component, name in job["record"]:
         expose(component, name, causality="output", variability="continuous", initial="calculated")
 
-    def wired(component, name):  # fmpy 0.3.32 writes a connection's type as FMI 2.0 calls it, which its container refuses
+    def wired(
+        component, name
+    ):  # fmpy 0.3.32 writes a connection's type as FMI 2.0 calls it, which its container refuses
         return [evolve(variables[component][name], type="Float64")]
 
     connections = [
-        Connection(components[a], wired(a, out), components[b], wired(b, into))
-        for (a, out), (b, into) in job["wires"]
+        Connection(components[a], wired(a, out), components[b], wired(b, into)) for (a, out), (b, into) in job["wires"]
     ]
     folder = Path(tempfile.mkdtemp(prefix="container_"))
     try:
@@ -223,6 +223,7 @@ def mosaik(job):
     """Each FMU behind a simulator of mosaik's API; values go on at once in the given order, the others a step later."""
     import mosaik as package  # noqa: PLC0415
 
+    TABLE.clear()
     world = package.World(
         {"FMU": {"python": "mosaik_adapter:Adapter"}, "Rows": {"python": "mosaik_adapter:Rows"}},
         time_resolution=job["step_size"],
@@ -239,9 +240,7 @@ def mosaik(job):
         if place(a) < place(b):
             world.connect(entities[a], entities[b], (out, into))
         else:
-            world.connect(
-                entities[a], entities[b], (out, into), time_shifted=True, initial_data={out: first[a][out]}
-            )
+            world.connect(entities[a], entities[b], (out, into), time_shifted=True, initial_data={out: first[a][out]})
     for component, variable in job["record"]:
         world.connect(entities[component], collector, (variable, ".".join((component, variable))))
     world.run(until=steps_of(job), print_progress=False)
@@ -341,11 +340,12 @@ MASTERS = {
 
 
 def main():
-    name, job_path, result_path = sys.argv[1:]
-    sys.modules["drivers"] = sys.modules["__main__"]
-    job = json.loads(Path(job_path).read_text(encoding="utf-8"))
-    rows, order = MASTERS[name](job)
-    Path(result_path).write_text(json.dumps({"rows": rows, "order": order}), encoding="utf-8")
+    name, *paths = sys.argv[1:]
+    sys.modules["drivers"] = sys.modules["__main__"]  # mosaik's adapter looks for it by that name
+    for job_path, result_path in zip(paths[::2], paths[1::2], strict=True):
+        job = json.loads(Path(job_path).read_text(encoding="utf-8"))
+        rows, order = MASTERS[name](job)
+        Path(result_path).write_text(json.dumps({"rows": rows, "order": order}), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -16,9 +16,7 @@ def job_of(system: System, step_size: float, stop_time: float, record: list[str]
         "references": {
             name: {v.name: v.reference for v in plan.description.variables.values()} for name, plan in plans.items()
         },
-        "wires": [
-            [[end.component, end.variable] for end in (wire.source, wire.target)] for wire in system.connections
-        ],
+        "wires": [[[end.component, end.variable] for end in (wire.source, wire.target)] for wire in system.connections],
         "step_size": step_size,
         "stop_time": stop_time,
         "record": [list(name.split(".", 1)) for name in record],
@@ -39,7 +37,7 @@ def write_ssp(job: dict, path: Path) -> None:
                 kind = "input" if (component, variable) in targets else "output"
                 lines.append(f'<ssd:Connector name={quoteattr(variable)} kind="{kind}"><ssc:Real/></ssd:Connector>')
         lines.append("</ssd:Connectors>")
-        lines.append('<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>')
+        lines.append("<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>")
         lines.append('<ssv:ParameterSet version="1.0" name="start"><ssv:Parameters>')
         for variable, value in job["parameters"].get(name, {}).items():
             kind, text = ("Boolean", str(value).lower()) if isinstance(value, bool) else ("Real", repr(value))
@@ -57,7 +55,7 @@ def write_ssp(job: dict, path: Path) -> None:
         'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
         'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">'
         f'<ssd:System name="system"><ssd:Elements>{"".join(lines)}</ssd:Elements>'
-        f'<ssd:Connections>{"".join(wires)}</ssd:Connections></ssd:System></ssd:SystemStructureDescription>\n'
+        f"<ssd:Connections>{''.join(wires)}</ssd:Connections></ssd:System></ssd:SystemStructureDescription>\n"
     )
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("SystemStructure.ssd", ssd)

@@ -1,0 +1,43 @@
+"""Our emulation of other people's masters, held against them: the same systems, the same FMUs, the same digits."""
+
+import pytest
+
+from orchestrator.interop.masters import MASTERS
+from tests.interop import table
+from tests.interop.measurement import libpython, measure, why_not
+from tests.interop.systems import KINDS, SYSTEMS
+
+pytestmark = [pytest.mark.interop, pytest.mark.slow]
+
+EVERYTHING = [(master, kind) for master in MASTERS for kind in KINDS]
+
+
+@pytest.mark.parametrize(("master", "kind"), EVERYTHING)
+def test_the_emulation_gives_what_the_master_gives(master, kind, results, tmp_path):
+    if why_not(master):
+        pytest.skip(why_not(master))
+    if master == "ecos_executable" and kind == "Python-backed" and libpython() is None:
+        pytest.skip("this Python is linked statically: there is no libpython to preload")
+    results[master, kind] = outcomes = measure(master, kind, tmp_path)
+    assert set(outcomes) == set(SYSTEMS)
+    for system, outcome in outcomes.items():
+        assert outcome.moved > 0.1, system  # a system that stands still would tell nothing
+        assert outcome.difference <= table.LIMIT, system
+        assert outcome.rows == outcome.expected - (master == "libcosim"), system
+
+
+def test_a_host_that_is_not_python_needs_a_preload_for_python_backed_fmus(tmp_path):
+    if why_not("ecos_executable"):
+        pytest.skip(why_not("ecos_executable"))
+    with pytest.raises(AssertionError, match="ecos: return code"):  # native FMUs run in this very environment
+        measure("ecos_executable", "Python-backed", tmp_path, preload=False)
+
+
+def test_the_readme_has_the_rows_and_verdicts_that_were_measured(results):
+    shown = table.in_readme()
+    if shown is None:
+        pytest.skip("README.md has no table of masters between its markers")
+    missing = [f"{master}, {kind}" for master, kind in EVERYTHING if (master, kind) not in results]
+    if missing:
+        pytest.skip(f"not measured in this session: {'; '.join(missing)}")
+    assert table.verdicts(shown) == table.verdicts(table.table(results))
