@@ -1,9 +1,13 @@
-"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs."""
+"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs.
+
+Where an FMU gives directional derivatives, they are the independent way to the same.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.coupling.loop import Exchange
@@ -128,6 +132,57 @@ def linearize_component(
         A_c=slopes[:, :n] if len(rates) == n and derivatives else None,
         B_c=slopes[:, n:] if len(rates) == n and derivatives else None,
         disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs),
+    )
+
+
+def linearize_by_derivatives(
+    exchange: Exchange, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
+) -> ComponentLinearization:
+    """The same from the FMU's own directional derivatives, without a perturbation and without a step.
+
+    The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
+
+    Parameters
+    ----------
+    inputs, observed
+        As `linearize_component`.
+
+    Raises
+    ------
+    AnalysisError
+        If the FMU gives no directional derivatives, or none of its states.
+    """
+    component = exchange.component
+    states = component.description.states
+    rates = [f"der({s})" for s in states]
+    if not component.description.gives_directional_derivatives:
+        raise AnalysisError(
+            f"component {component.name!r}: its FMU gives no directional derivatives; native FMUs do (--native), "
+            "or linearise by perturbation"
+        )
+    n, p = len(states), len(exchange.outputs.names)
+    entries = (*exchange.inputs.names, *inputs)
+    whole = component.jacobian([*rates, *exchange.outputs.names, *observed], [*states, *entries])
+    A_c, B_c = whole[:n, :n], whole[:n, n:]
+    held = np.zeros((n + len(entries),) * 2)
+    held[:n] = step_size * whole[:n]
+    step_map = scipy.linalg.expm(held)
+    C, D = whole[n:, :n], whole[n:, n:]
+    return ComponentLinearization(
+        component.name,
+        states,
+        entries,
+        exchange.outputs.names,
+        A=step_map[:n, :n],
+        B=step_map[:n, n:],
+        C=C[:p],
+        D=D[:p],
+        observed=tuple(observed),
+        C_o=C[p:],
+        D_o=D[p:],
+        A_c=A_c,
+        B_c=B_c,
+        disagreement=0.0,
     )
 
 
