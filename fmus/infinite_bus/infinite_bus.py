@@ -13,7 +13,10 @@ from fmus.toolchain.port import SYSTEM_BASE
 
 SYSTEM_BASE_MVA = 100.0
 TOLERANCE = 1e-9
-"""What happens at a time happens in the first internal step that begins later than this [s] before it."""
+"""How much before its time [s] something happens: far more than the clock's rounding, far less than an internal step.
+
+A Runge-Kutta step that ends at that time sees it in its last stage, with a sixth of its weight.
+"""
 
 
 def infinite_bus() -> Model:

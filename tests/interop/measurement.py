@@ -63,8 +63,8 @@ def why_not(master: str) -> str | None:
         if COFMUPY_PYTHON.exists():
             return None
         return (
-            "CoFMuPy has no environment: python3 -m venv .venv-cofmupy && .venv-cofmupy/bin/pip install cofmupy==1.0.0; "
-            "or name its Python in GFOR_COFMUPY_PYTHON"
+            "CoFMuPy has no environment: python3 -m venv .venv-cofmupy && "
+            ".venv-cofmupy/bin/pip install cofmupy==1.0.0; or name its Python in GFOR_COFMUPY_PYTHON"
         )
     modules, package = PACKAGES[master]
     if all(importlib.util.find_spec(module) for module in modules):

@@ -14,6 +14,9 @@ LEAFLETS = {
     "synchronous_generator_st1": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st4b": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "two_area_grid": ROOT / "fmus" / "grid" / "README.md",
+    "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
+    "probe_a": ROOT / "fmus" / "probe" / "README.md",
+    "probe_b": ROOT / "fmus" / "probe" / "README.md",
 }
 KINDS = {
     Input: "input",
