@@ -362,9 +362,10 @@ def _design(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    rules = cli_interop.like_of(options)
     case, scenarios = _prepare(options)
-    if options.like:
-        return cli_interop.run_like_master(case, scenarios, options)
+    if rules is not None:
+        return cli_interop.run_like_master(case, scenarios, rules, options)
     folder = _folder(options.out or Path("results") / case.name)
     console = _console(stderr=options.json)
     results: list[RunResult] = []

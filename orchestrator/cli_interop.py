@@ -17,6 +17,7 @@ from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
 from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.rules import MasterRules
 from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Verdict, identify
 from orchestrator.report.storage import save_dataset
 from orchestrator.study.like import run_like
@@ -63,9 +64,23 @@ def add_which_master(parser: argparse.ArgumentParser, platforms: Sequence[str]) 
 # -- gfor run --like -------------------------------------------------------------------------------
 
 
-def run_like_master(case: Case, scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> int:
+def like_of(options: argparse.Namespace) -> MasterRules | None:
+    """The master that a run is to follow; None for our own.
+
+    Raises
+    ------
+    InputError
+        If it is not known, or an order is given without it.
+    """
+    if options.order and not options.like:
+        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+    return master_rules(options.like) if options.like else None
+
+
+def run_like_master(
+    case: Case, scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace
+) -> int:
     """Run scenarios as another master would; their trajectories are all that is written."""
-    rules = master_rules(options.like)
     order = options.order.split(",") if options.order else None
     folder = options.out or Path("results") / f"{case.name}_like_{rules.name}"
     for prepared in scenarios:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import get_args
 
@@ -56,36 +57,36 @@ def probe_system() -> System:
     return system
 
 
-def candidates(step_size: float, steps: int) -> Iterator[tuple[Candidate, NDArray[np.float64]]]:
-    """Every schedule with its trajectory: row k holds `SIGNALS` after k + ``early_label`` steps, NaN where unknown.
+Trajectory = tuple[Candidate, NDArray[np.float64]]
+"""A schedule, and what it shows: row k holds `SIGNALS` after k + ``early_label`` steps, NaN where unknown."""
 
-    Those without extrapolation come first.
-    """
-    for schedule in _schedules():
+
+@cache
+def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tuple[Trajectory, ...]:
+    """Every schedule with one kind of extrapolation, and its trajectory of ``steps`` + 1 rows."""
+    found = []
+    for schedule in _schedules(extrapolation):
         for after_exchange, values in enumerate(_trajectories(schedule, step_size, steps + 1)):
             for early in LABELS:
                 rows = np.full((steps + 1, len(SIGNALS)), np.nan)
                 source = values[max(0, early) : steps + 1 + early]
                 rows[max(0, -early) : max(0, -early) + len(source)] = source
-                yield (
-                    Candidate(
-                        schedule.name,
-                        schedule.first_inputs,
-                        schedule.extrapolation,
-                        early,
-                        bool(after_exchange),
-                        schedule.wire_by_wire,
-                    ),
-                    rows,
-                )
+                found.append((_candidate(schedule, early, after_exchange=bool(after_exchange)), rows))
+    return tuple(found)
 
 
-def _schedules() -> Iterator[Schedule]:
-    for extrapolation, order, first in product(EXTRAPOLATIONS, ORDERS, get_args(FirstInputs)):
+def _schedules(extrapolation: float) -> Iterator[Schedule]:
+    for order, first in product(ORDERS, get_args(FirstInputs)):
         yield Schedule(order, ORDERS[order], first, extrapolation)
         if order == "side by side" and not extrapolation and first in ("consistent", "once"):
             # what is handed over wire by wire is read when its turn comes, also the first time
             yield Schedule(order, ORDERS[order], first, wire_by_wire=True)
+
+
+def _candidate(schedule: Schedule, early_label: int, *, after_exchange: bool) -> Candidate:
+    return Candidate(
+        schedule.name, schedule.first_inputs, schedule.extrapolation, early_label, after_exchange, schedule.wire_by_wire
+    )
 
 
 def _trajectories(schedule: Schedule, step_size: float, steps: int) -> list[NDArray[np.float64]]:

@@ -24,8 +24,9 @@ ECOS_EXECUTABLE = MasterRules(
     title="the executable ecos 0.7.2",
     steps="side by side",
     after_exchange=True,
-    last_label="before stop",
-    source="Ecos behind a command line; its CSV has six decimals",
+    last_label="sum up to stop",
+    source="Ecos behind a command line; its CSV has six decimals; how many rows it writes was measured, with steps "
+    "of 0.1, 0.125 and 0.3 s",
 )
 
 FMPY_CONTAINER = MasterRules(
@@ -45,7 +46,7 @@ FMPY_SSP = MasterRules(
     steps="side by side",
     first_inputs="zero",
     early_label=1,
-    last_label="before stop",
+    last_label="sum below stop",
     source="fmpy/ssp/simulation.py: connectors start from 0 and nothing is propagated; the row is written after the "
     "step, with the time before it; the loop runs while the summed-up time is less than the stop time",
 )
@@ -92,7 +93,7 @@ COFMUPY = MasterRules(
     steps="side by side",
     first_inputs="zero",
     early_label=1,
-    last_label="before stop",
+    last_label="sum below stop",
     source="default_master.py: inputs start from 0; the time is noted before the step; the loop runs while the "
     "summed-up time is less than the end",
 )
@@ -103,7 +104,7 @@ COFMUPY_GAUSS_SEIDEL = MasterRules(
     steps="in turn",
     first_inputs="zero",
     early_label=1,
-    last_label="before stop",
+    last_label="sum below stop",
     source="as above; components of a loop step in the order of a Python set, which differs from process to process "
     "unless PYTHONHASHSEED is set: read coordinator.master.sequence_order",
 )

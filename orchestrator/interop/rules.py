@@ -10,6 +10,13 @@ from orchestrator.errors import InputError
 Steps = Literal["side by side", "in turn"]
 """Jacobi: all components step with the outputs of the step before. Gauss-Seidel: each sees those that stepped first."""
 
+LastLabel = Literal["stop", "before stop", "sum below stop", "sum up to stop"]
+"""The label of the last row.
+
+The stop time; a step before it; or, where the time is summed up step by step, so that rounding decides: the last label
+below the stop time, or the last that a step reaches without going beyond it.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class MasterRules:
@@ -31,7 +38,7 @@ class MasterRules:
     extrapolation, wire_by_wire
         See `Schedule`.
     last_label
-        ``stop``, or ``before stop``: the loop runs while the time, summed up step by step, is less than the stop time.
+        See `LastLabel`.
     source
         Where each of these is to be seen.
     """
@@ -44,7 +51,7 @@ class MasterRules:
     after_exchange: bool = False
     extrapolation: float = 0.0
     wire_by_wire: bool = False
-    last_label: Literal["stop", "before stop"] = "stop"
+    last_label: LastLabel = "stop"
     source: str = ""
 
     def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
@@ -74,10 +81,10 @@ class MasterRules:
 
     def rows(self, step_size: float, stop_time: float) -> int:
         """How many rows the master records, one a step, from label 0 on."""
-        if self.last_label == "stop":
-            return round(stop_time / step_size) + 1
-        time, rows = 0.0, 0
-        while time < stop_time:
+        if not self.last_label.startswith("sum"):
+            return round(stop_time / step_size) + (self.last_label == "stop")
+        time, steps, ahead = 0.0, 0, step_size if self.last_label == "sum up to stop" else 0.0
+        while time + ahead < stop_time or (ahead and time + ahead == stop_time):
             time += step_size
-            rows += 1
-        return rows
+            steps += 1
+        return steps + bool(ahead)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.interop.candidates import SIGNALS, Candidate, candidates
+from orchestrator.interop.candidates import EXTRAPOLATIONS, SIGNALS, Candidate, candidates
 from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import ProbeResult
 from orchestrator.interop.rules import MasterRules
@@ -112,13 +112,13 @@ def _differences(
 ) -> Iterator[tuple[float, Candidate]]:
     """Largest difference from each schedule. Extrapolation is looked at only where nothing fits without it."""
     best = np.inf
-    for candidate, rows in candidates(step_size, intervals):
-        if candidate.extrapolation and best <= _FITS:
+    for extrapolation in EXTRAPOLATIONS:
+        if extrapolation and best <= _FITS:
             return
-        gaps = np.abs(rows[index] - values)
-        difference = float(np.nanmax(gaps))
-        best = min(best, difference)
-        yield difference, candidate
+        for candidate, rows in candidates(step_size, intervals, extrapolation):
+            difference = float(np.nanmax(np.abs(rows[index] - values)))
+            best = min(best, difference)
+            yield difference, candidate
 
 
 def _check_steps(result: ProbeResult, step_size: float) -> None:

@@ -41,9 +41,9 @@ def in_short(rules: MasterRules) -> str:
     words += ["wire by wire"] if rules.wire_by_wire else []
     words += ["read after exchange"] if rules.after_exchange else []
     words += ["labels one step early"] if rules.early_label else []
-    steps = 0 if rules.last_label == "stop" else -1
-    count = rules.early_label + steps
-    return ", ".join([*words, "N" if count == 0 else f"N{count:+d}".replace("-", "−")]) + " steps"
+    count = rules.early_label - (rules.last_label == "before stop")
+    steps = "N by a summed-up time" if rules.last_label.startswith("sum") else "N" if count == 0 else f"N{count:+d}"
+    return ", ".join([*words, f"{steps} steps"])
 
 
 def verdicts(text: str) -> dict[str, list[str]]:
