@@ -1,9 +1,9 @@
 """Speed and size of the 118-bus study: ``python -m tests.benchmarks.ieee118``.
 
 Prints, taken in one run: memory of 57 FMUs; communication steps per second against 57 empty pythonfmu models
-with the same connections in the same loop, and against native FMUs; the share of time outside the FMUs; the time from instantiated FMUs
-to modes, against perturbing the coupled system state by state; and how all that grows with the size of ring
-networks.
+with the same connections in the same loop, and against native FMUs; the share of time outside the FMUs; the time
+from instantiated FMUs to modes, against perturbing the coupled system state by state; and how all that grows with
+the size of ring networks.
 """
 
 import os
