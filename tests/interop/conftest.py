@@ -15,4 +15,5 @@ def results(request):
     measured = {}
     yield measured
     if request.config.getoption("--write-table", default=False):
+        assert not table.missing(measured), f"no table is written without {', '.join(table.missing(measured))}"
         table.write(measured)

@@ -12,9 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.interop.candidates import SIGNALS, probe_system
 from orchestrator.interop.emulation import emulate
 from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.rules import MasterRules
+from orchestrator.interop.which_master import STEP_SIZE as PROBE_STEP_SIZE
+from orchestrator.interop.which_master import STOP_TIME as PROBE_STOP_TIME
 from tests.interop.jobs import job_of, write_ssp
 from tests.interop.systems import MAGNIFIED, STEP_SIZE, STOP_TIME, SYSTEMS, with_magnifier
 
@@ -80,24 +83,37 @@ def measure(master: str, kind: str, folder: Path, *, preload: bool | None = None
     preload
         Whether libpython is loaded into a host that is not Python; by default where the FMUs need it.
     """
-    rules, command, systems = MASTERS[master], [_python(master), str(DRIVERS), _driver(master)], {}
-    for number, (name, coupled) in enumerate(SYSTEMS.items()):
+    jobs, systems = {}, {}
+    for name, coupled in SYSTEMS.items():
         system, record = coupled.build(kind), list(coupled.record)
         if master == "ecos_executable":
             system, record = with_magnifier(system, coupled.record, kind)
-        job = job_of(system, STEP_SIZE, STOP_TIME, record) | {"ssp": str(folder / f"{number}.ssp")}
-        write_ssp(job, Path(job["ssp"]))
-        if master == "ecos_executable":
-            job |= ecos_host(preload=kind == "Python-backed" if preload is None else preload)
-        (folder / f"{number}.json").write_text(json.dumps(job), encoding="utf-8")
-        command += [str(folder / f"{number}.json"), str(folder / f"{number}.out")]
-        systems[name] = system, record, folder / f"{number}.out"
+        jobs[name] = job_of(system, STEP_SIZE, STOP_TIME, record)
+        systems[name] = system, record
+    preload = kind == "Python-backed" if preload is None else preload
+    results = run(master, jobs, folder, preload=preload)
+    return {name: compare(MASTERS[master], *systems[name], results[name]) for name in jobs}
+
+
+def run_probes(master: str, folder: Path) -> dict:
+    """What a master gives for the probe pair."""
+    job = job_of(probe_system(), PROBE_STEP_SIZE, PROBE_STOP_TIME, list(SIGNALS))
+    return run(master, {"probes": job}, folder, preload=True)["probes"]
+
+
+def run(master: str, jobs: dict[str, dict], folder: Path, *, preload: bool) -> dict[str, dict]:
+    """Results of a master in a process of its own, which may abort when it ends."""
+    command, results = [_python(master), str(DRIVERS), _driver(master)], {}
+    for number, (name, job) in enumerate(jobs.items()):
+        ssp, path, results[name] = (folder / f"{number}.{ending}" for ending in ("ssp", "json", "out"))
+        write_ssp(job, ssp)
+        host = ecos_host(preload=preload) if master == "ecos_executable" else {}
+        path.write_text(json.dumps(job | {"ssp": str(ssp)} | host), encoding="utf-8")
+        command += [str(path), str(results[name])]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT, cwd=folder)
-    outcomes = {}
-    for name, (system, record, result) in systems.items():
-        assert result.exists(), f"{master}, {name}: return code {done.returncode}\n{done.stdout}\n{done.stderr}"[-4000:]
-        outcomes[name] = compare(rules, system, record, json.loads(result.read_text(encoding="utf-8")))
-    return outcomes
+    said = f"return code {done.returncode}\n{done.stdout}\n{done.stderr}"[-4000:]
+    assert all(result.exists() for result in results.values()), f"{master}: {said}"
+    return {name: json.loads(result.read_text(encoding="utf-8")) for name, result in results.items()}
 
 
 def compare(rules: MasterRules, system, record: list[str], result: dict) -> Outcome:

@@ -16,6 +16,11 @@ PRELOAD = {"ecos_executable": "libpython for Python-backed FMUs, nothing for nat
 Results = dict[tuple[str, str], dict[str, Outcome]]
 
 
+def missing(results: Results) -> list[str]:
+    """What was not measured."""
+    return [f"{master}, {kind}" for master in MASTERS for kind in KINDS if (master, kind) not in results]
+
+
 def table(results: Results) -> str:
     """All masters, with the largest difference for each system and kind of FMU."""
     columns = [f"{system}, {kind}" for system in SYSTEMS for kind in KINDS]
@@ -24,14 +29,14 @@ def table(results: Results) -> str:
         "|---|---|" + "---|" * len(columns) + "---|",
     ]
     for master, rules in MASTERS.items():
-        figures = [figure(results.get((master, kind), {}).get(system)) for system in SYSTEMS for kind in KINDS]
+        figures = [figure(results[master, kind][system]) for system in SYSTEMS for kind in KINDS]
         cells = [rules.title, in_short(rules), *figures, PRELOAD.get(master, "–")]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def figure(outcome: Outcome | None) -> str:
-    return "not run" if outcome is None else "0" if outcome.difference == 0 else f"{outcome.difference:.0e}"
+def figure(outcome: Outcome) -> str:
+    return f"{outcome.difference:.0e}" if outcome.difference else "0"
 
 
 def in_short(rules: MasterRules) -> str:
@@ -42,8 +47,10 @@ def in_short(rules: MasterRules) -> str:
     words += ["read after exchange"] if rules.after_exchange else []
     words += ["labels one step early"] if rules.early_label else []
     count = rules.early_label - (rules.last_label == "before stop")
-    steps = "N by a summed-up time" if rules.last_label.startswith("sum") else "N" if count == 0 else f"N{count:+d}"
-    return ", ".join([*words, f"{steps} steps"])
+    summed = rules.last_label.startswith("sum")
+    return ", ".join(
+        [*words, "ends by a summed-up time" if summed else "N steps" if count == 0 else f"N{count:+d} steps"]
+    )
 
 
 def verdicts(text: str) -> dict[str, list[str]]:

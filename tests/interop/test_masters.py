@@ -2,9 +2,12 @@
 
 import pytest
 
+from orchestrator.interop.candidates import SIGNALS
 from orchestrator.interop.masters import MASTERS
+from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.which_master import identify
 from tests.interop import table
-from tests.interop.measurement import libpython, measure, why_not
+from tests.interop.measurement import libpython, measure, run_probes, why_not
 from tests.interop.systems import KINDS, SYSTEMS
 
 pytestmark = [pytest.mark.interop, pytest.mark.slow]
@@ -26,6 +29,22 @@ def test_the_emulation_gives_what_the_master_gives(master, kind, results, tmp_pa
         assert outcome.rows == outcome.expected - (master == "libcosim"), system
 
 
+@pytest.mark.parametrize("master", MASTERS)
+def test_which_master_recognises_it(master, tmp_path):
+    if why_not(master):
+        pytest.skip(why_not(master))
+    result = run_probes(master, tmp_path)
+    path = tmp_path / "result.csv"
+    rows = [["time", *SIGNALS], *result["rows"]]
+    path.write_text("\n".join(",".join(map(str, row)) for row in rows), encoding="utf-8")
+    verdict = identify(read_probe_result(path))
+    assert master in verdict.masters
+    for name in ("order", "extrapolation", "early_label", "after_exchange", "wire_by_wire"):
+        assert len(verdict.answers(name)) == 1, name
+    if result["order"]:
+        assert verdict.answers("order") == [", then ".join(result["order"])]
+
+
 def test_a_host_that_is_not_python_needs_a_preload_for_python_backed_fmus(tmp_path):
     if why_not("ecos_executable"):
         pytest.skip(why_not("ecos_executable"))
@@ -37,7 +56,6 @@ def test_the_readme_has_the_rows_and_verdicts_that_were_measured(results):
     shown = table.in_readme()
     if shown is None:
         pytest.skip("README.md has no table of masters between its markers")
-    missing = [f"{master}, {kind}" for master, kind in EVERYTHING if (master, kind) not in results]
-    if missing:
-        pytest.skip(f"not measured in this session: {'; '.join(missing)}")
+    if table.missing(results):
+        pytest.skip(f"not measured in this session: {'; '.join(table.missing(results))}")
     assert table.verdicts(shown) == table.verdicts(table.table(results))
