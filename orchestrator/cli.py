@@ -15,7 +15,7 @@ from rich.progress import Progress as ProgressBar
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design
+from orchestrator import cli_compare, cli_design, cli_ssp
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -43,6 +43,7 @@ examples:
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
+  gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
@@ -131,6 +132,12 @@ def _parser() -> argparse.ArgumentParser:
     linearize.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
     linearize.set_defaults(command=_linearize)
 
+    ssp = commands.add_parser("export-ssp", help="write a case's scenarios as SSP archives for other tools")
+    _case_arguments(ssp)
+    ssp.add_argument("--stop", type=_seconds, metavar="T", help="stop time [s] (default: the case's)")
+    cli_ssp.add_arguments(ssp)
+    ssp.set_defaults(command=_export_ssp)
+
     vary = commands.add_parser("sweep", help="modes over a grid of parameters, followed from point to point")
     _case_arguments(vary)
     vary.add_argument(
@@ -191,7 +198,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _case_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("case", metavar="CASE", help="a built-in case (two_area) or the path of a case file")
+    parser.add_argument(
+        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+    )
     parser.add_argument(
         "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
     )
@@ -324,6 +333,10 @@ def _linearize(options: argparse.Namespace) -> int:
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
     return 0
+
+
+def _export_ssp(options: argparse.Namespace) -> int:
+    return cli_ssp.run_export(*_prepare(options), options.out)
 
 
 def _report(options: argparse.Namespace) -> int:

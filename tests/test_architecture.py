@@ -14,15 +14,22 @@ FLOORS = (
     ("orchestrator.errors",),
     ("orchestrator.fmi",),
     ("orchestrator.coupling",),
+    ("orchestrator.ssp",),
     ("orchestrator.analysis", "orchestrator.cases", "orchestrator.distributed"),
     ("orchestrator.report",),
     ("orchestrator.study",),
-    ("orchestrator.cli_compare", "orchestrator.cli_design", "orchestrator.cli_sweep"),
+    ("orchestrator.cli_compare", "orchestrator.cli_design", "orchestrator.cli_ssp", "orchestrator.cli_sweep"),
     ("orchestrator.cli",),
 )
 """Lowest first; those on one floor do not know each other."""
 
-COMMANDS = ("orchestrator.cli", "orchestrator.cli_compare", "orchestrator.cli_design", "orchestrator.cli_sweep")
+COMMANDS = (
+    "orchestrator.cli",
+    "orchestrator.cli_compare",
+    "orchestrator.cli_design",
+    "orchestrator.cli_ssp",
+    "orchestrator.cli_sweep",
+)
 
 
 def modules():
@@ -170,7 +177,10 @@ def test_there_is_no_cycle():
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("pint", {"orchestrator.cases.units"}),
-        ("argparse", {"orchestrator.cli", "orchestrator.cli_compare", "orchestrator.cli_design"}),
+        (
+            "argparse",
+            {"orchestrator.cli", "orchestrator.cli_compare", "orchestrator.cli_design", "orchestrator.cli_ssp"},
+        ),
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):

@@ -50,6 +50,22 @@ class ComponentLinearization:
     disagreement: float
 
 
+def obstacle(component: Component) -> str | None:
+    """Why a component cannot be perturbed and put back; None where it can."""
+    description = component.description
+    if not description.can_save_state:
+        return (
+            f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
+            "so it cannot be perturbed and put back; ask for an export that can"
+        )
+    if description.states and not description.states_are_settable:
+        return (
+            f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
+            "linearisation by perturbation needs; our FMUs declare it under VendorAnnotations"
+        )
+    return None
+
+
 class StateAccess:
     """Reads and sets the continuous states of one component.
 
@@ -60,19 +76,10 @@ class StateAccess:
     """
 
     def __init__(self, component: Component) -> None:
-        description = component.description
-        if not description.can_save_state:
-            raise AnalysisError(
-                f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-                "so it cannot be perturbed and put back; ask for an export that can"
-            )
-        if description.states and not description.states_are_settable:
-            raise AnalysisError(
-                f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-                "linearisation by perturbation needs; our FMUs declare it under VendorAnnotations"
-            )
-        self.batch = RealBatch(component, description.states)
-        self._buffer = RealBatch(component, description.states)
+        if reason := obstacle(component):
+            raise AnalysisError(reason)
+        self.batch = RealBatch(component, component.description.states)
+        self._buffer = RealBatch(component, component.description.states)
 
     def read(self) -> Matrix:
         return self.batch.read().copy()
