@@ -14,6 +14,7 @@ from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
 from orchestrator import cli_compare, cli_design, cli_ssp
 from orchestrator.cases.case import Case, load_case
@@ -183,11 +184,13 @@ def _parser() -> argparse.ArgumentParser:
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
+    build.add_argument("--native", action="store_true", help="compiled FMUs with no Python in them")
+    build.add_argument("--fmi", choices=("2.0", "3.0"), default="2.0", help="version of FMI (3.0: native only)")
     build.add_argument(
         "--platform",
         action="append",
         choices=sorted(TARGETS),
-        help="compile the kernel for this platform (repeatable; default: this machine's)",
+        help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
     build.set_defaults(command=_build)
 
@@ -221,6 +224,13 @@ def _case_arguments(parser: argparse.ArgumentParser) -> None:
         help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
     )
     parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    parser.add_argument(
+        "--native",
+        dest="set",
+        action="append_const",
+        const=("*.native", True),
+        help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
+    )
 
 
 # -- arguments -----------------------------------------------------------------------------------
@@ -459,6 +469,8 @@ def _progress_bar(console: Console) -> ProgressBar:
 
 
 def _build(options: argparse.Namespace) -> int:
+    if options.fmi != "2.0" and not options.native:
+        raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     models = []
     for name in names:
@@ -471,7 +483,10 @@ def _build(options: argparse.Namespace) -> int:
         models.append(build_model(name))
     for model in models:
         platforms = tuple(options.platform) if options.platform else None
-        print(export(model, options.dest, platforms))
+        if options.native:
+            print(export_native(model, options.dest, platforms, options.fmi))
+        else:
+            print(export(model, options.dest, platforms))
     return 0
 
 

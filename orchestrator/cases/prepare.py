@@ -8,11 +8,13 @@ from pathlib import Path
 
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, network_of
+from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.draft import Draft, Place
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.layers import value_layers
+from orchestrator.cases.native import is_native
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.power_flow import PowerFlow
@@ -56,10 +58,11 @@ class PreparedScenario:
 
 
 @cache
-def catalogue_fmu(model: str, network: Network | None = None) -> FmuDescription:
+def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
     """FMU of a model of the catalogue, built once a machine."""
     arguments = {"network": network} if network is not None else {}
-    return read_description(cached(build_model(model, **arguments)))
+    build = cached_native if native else cached
+    return read_description(build(build_model(model, **arguments)))
 
 
 class Preparer:
@@ -189,13 +192,13 @@ class Preparer:
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
             return
         try:
-            self.draft.system.add(name, self._description(table))
+            self.draft.system.add(name, self._description(table, is_native(self.draft, name, table)))
         except InputError as error:
             self.draft.note(where, str(error))
         except KeyError as error:
             self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))
 
-    def _description(self, table: ComponentTable) -> FmuDescription:
+    def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
         if table.fmu is not None:
             return read_description(self.draft.directory / table.fmu)
         own = table.model == "grid"
@@ -203,7 +206,7 @@ class Preparer:
             raise InputError(
                 "the model 'grid' needs a [network] table and a [power_flow] table that names this component"
             )
-        return catalogue_fmu(table.model or "", self.draft.network if own else None)
+        return catalogue_fmu(table.model or "", self.draft.network if own else None, native)
 
     # -- operating point -------------------------------------------------------------------------
 

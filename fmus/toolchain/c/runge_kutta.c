@@ -1,7 +1,7 @@
 /* Classical Runge-Kutta of order 4; no workspace. */
-EXPORT int workspace_size(void) { return 0; }
+KERNEL int workspace_size(void) { return 0; }
 
-EXPORT int advance(double *z, double h, int n, double *workspace) {
+KERNEL int advance(double *z, double h, int n, double *workspace) {
     (void)workspace;
     double k1[NX], k2[NX], k3[NX], k4[NX], t[NX], *x = z + X;
     for (int step = 0; step < n; ++step) {
