@@ -16,7 +16,7 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design, cli_ssp
+from orchestrator import cli_compare, cli_design, cli_linear_model, cli_ssp
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -27,6 +27,7 @@ from orchestrator.cli_sweep import run as run_points
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.linear_model import read_embedded_model
 from orchestrator.report import tables
 from orchestrator.report.html.page import write_report
 from orchestrator.report.linear_model_files import save_linear_model
@@ -192,6 +193,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=sorted(TARGETS),
         help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
+    cli_linear_model.add_arguments(build)
     build.set_defaults(command=_build)
 
     info = commands.add_parser("info", help="show what an FMU declares")
@@ -481,12 +483,13 @@ def _build(options: argparse.Namespace) -> int:
                 f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
             )
         models.append(build_model(name))
+    extra = cli_linear_model.extra_members(options, [model.name for model in models])
     for model in models:
         platforms = tuple(options.platform) if options.platform else None
         if options.native:
-            print(export_native(model, options.dest, platforms, options.fmi))
+            print(export_native(model, options.dest, platforms, options.fmi, extra))
         else:
-            print(export(model, options.dest, platforms))
+            print(export(model, options.dest, platforms, extra))
     return 0
 
 
@@ -505,6 +508,9 @@ def _info(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
+    embedded = read_embedded_model(options.file)
+    if embedded is not None:
+        console.print(_escape(cli_linear_model.in_words(embedded)), highlight=False)
     for table in tables.fmu_variables(description):
         console.print("", table)
     return 0

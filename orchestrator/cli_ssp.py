@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.archive import write_archive
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.ssp.study import study_of
-from orchestrator.ssp.writing import write_ssp
+from orchestrator.ssp.writing import ssp_members
 
 _TABLES: dict[str, Any] = {
     "source": True,
@@ -48,7 +49,6 @@ def run_export(case: Case, scenarios: Sequence[PreparedScenario], out: Path | No
     for prepared in scenarios:
         target = out if out is not None and single else (out or Path()) / f"{case.name}_{prepared.name}.ssp"
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
             _write(case, prepared, target)
         except OSError as error:
             raise InputError(f"--out {target}: it cannot be written: {error.strerror}; choose another place") from error
@@ -63,7 +63,7 @@ def _write(case: Case, prepared: PreparedScenario, target: Path) -> None:
     study = study_of(
         prepared.name, prepared.title, prepared.step_size, prepared.schedule, prepared.events, _filled(tables)
     )
-    write_ssp(target, case.name, case.table.title, prepared.system, prepared.stop_time, study)
+    write_archive(target, ssp_members(case.name, case.table.title, prepared.system, prepared.stop_time, study))
 
 
 def _filled(tables: dict[str, Any]) -> dict[str, Any]:

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
+from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.linear_model import EmbeddedModel
 
 PERTURBATIONS = (1e-5, 2e-5)
 """Central differences are taken with both, relative to max(1, |value|); they should agree."""
@@ -51,33 +54,35 @@ class ComponentLinearization:
 
 
 def obstacle(component: Component) -> str | None:
-    """Why a component cannot be perturbed and put back; None where it can."""
+    """Why a component can neither be perturbed and put back, nor has a linear model inside; None where it can."""
     description = component.description
     if not description.can_save_state:
         return (
             f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
             "so it cannot be perturbed and put back; ask for an export that can"
         )
-    if description.states and not description.states_are_settable:
+    if description.states and not description.states_are_settable and embedded_model(component) is None:
         return (
             f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-            "linearisation by perturbation needs; our FMUs declare it under VendorAnnotations"
+            "linearisation by perturbation needs, and has no linear model inside; our FMUs declare the one under "
+            "VendorAnnotations, and `gfor build --with-linear-model` packs the other"
         )
     return None
 
 
 class StateAccess:
-    """Reads and sets the continuous states of one component.
+    """Reads and sets the continuous states of one component; those that cannot be set stay as they are.
 
     Raises
     ------
     AnalysisError
-        If the FMU does not let a master set its states, or cannot save and restore its state.
+        If the component can neither be perturbed and put back, nor has a linear model inside.
     """
 
     def __init__(self, component: Component) -> None:
         if reason := obstacle(component):
             raise AnalysisError(reason)
+        self._settable = component.description.states_are_settable
         self.batch = RealBatch(component, component.description.states)
         self._buffer = RealBatch(component, component.description.states)
 
@@ -85,8 +90,9 @@ class StateAccess:
         return self.batch.read().copy()
 
     def write(self, values: Matrix) -> None:
-        self._buffer.values[:] = values
-        self._buffer.write()
+        if self._settable:
+            self._buffer.values[:] = values
+            self._buffer.write()
 
 
 def linearize_component(
@@ -100,6 +106,8 @@ def linearize_component(
 ) -> ComponentLinearization:
     """Perturb one component around where it is, and put it back.
 
+    Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
+
     Parameters
     ----------
     inputs, observed
@@ -108,6 +116,9 @@ def linearize_component(
         Also difference the FMU's own derivatives, if it declares them; it costs a third more.
     """
     component = exchange.component
+    StateAccess(component)  # refuses what can be neither perturbed nor looked up
+    if (inside := embedded_model(component)) is not None:
+        return _from_inside(exchange, inside, step_size, inputs, observed)
     names = component.description.states
     rates = [f"der({s})" for s in names] if derivatives else []
     rates = rates if all(r in component.description.variables for r in rates) else []
@@ -138,6 +149,43 @@ def linearize_component(
     )
 
 
+def _from_inside(
+    exchange: Exchange, model: EmbeddedModel, step_size: float, inputs: Sequence[str], observed: Sequence[str]
+) -> ComponentLinearization:
+    """The model inside an FMU, taken over one communication step with its inputs held."""
+    component = exchange.component
+    check_operating_point(component, model)
+    entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
+    missing = [v for v in entries if v not in model.inputs] + [v for v in exits if v not in model.outputs]
+    if missing:
+        raise AnalysisError(
+            f"component {component.name!r}: the linear model inside its FMU has no {', '.join(map(repr, missing))}; it "
+            f"has the inputs {', '.join(model.inputs)} and the outputs {', '.join(model.outputs)}"
+        )
+    columns = [list(model.inputs).index(v) for v in entries]
+    rows = [list(model.outputs).index(v) for v in exits]
+    n, m, p = len(model.states), len(columns), len(exchange.outputs.names)
+    A_c, B_c = model.A, model.B[:, columns]
+    over_step = scipy.linalg.expm(step_size * np.block([[A_c, B_c], [np.zeros((m, n + m))]]))
+    C, D = model.C[rows], model.D[np.ix_(rows, columns)]
+    return ComponentLinearization(
+        component.name,
+        tuple(model.states),
+        entries,
+        exchange.outputs.names,
+        A=over_step[:n, :n],
+        B=over_step[:n, n:],
+        C=C[:p],
+        D=D[:p],
+        observed=tuple(observed),
+        C_o=C[p:],
+        D_o=D[p:],
+        A_c=A_c,
+        B_c=B_c,
+        disagreement=0.0,
+    )
+
+
 def _differences(
     component: Component,
     inputs: Sequence[str],
@@ -148,7 +196,6 @@ def _differences(
     rates: Sequence[str],
 ) -> tuple[Matrix, Matrix, Matrix]:
     """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input."""
-    StateAccess(component)  # refuses what cannot be perturbed
     names = (*component.description.states, *inputs)
     z_0 = RealBatch(component, names).read().copy()
     perturbed = [RealBatch(component, [name]) for name in names]

@@ -2,6 +2,7 @@
 
 import hashlib
 import posixpath
+import uuid
 import zipfile
 import zlib
 from pathlib import Path
@@ -97,7 +98,7 @@ class SspArchive:
         target = folder / member
         if not target.exists():
             target.parent.mkdir(parents=True, exist_ok=True)
-            partial = target.with_name(f"{target.name}.{hashlib.sha256(repr(target).encode()).hexdigest()[:8]}.part")
+            partial = target.with_name(f"{target.name}.{uuid.uuid4().hex}.part")
             partial.write_bytes(self.read(member))
             partial.replace(target)
         return target

@@ -1,6 +1,5 @@
 """A coupled system as an SSP archive."""
 
-import zipfile
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -12,17 +11,12 @@ from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SY
 from orchestrator.ssp.parameter_sets import write_parameter_set, write_units
 from orchestrator.ssp.study import Study, write_osp_step, write_study
 
-_TIMESTAMP = (2020, 1, 1, 0, 0, 0)
-"""No date is written: equal contents give equal files."""
 
-
-def write_ssp(target: Path, name: str, title: str, system: System, stop_time: float, study: Study) -> None:
-    """Write an archive with the system's FMUs, values and connections.
+def ssp_members(name: str, title: str, system: System, stop_time: float, study: Study) -> dict[str, bytes]:
+    """What the archive holds, by path: the structure, the components' values and their FMUs.
 
     Parameters
     ----------
-    target
-        The .ssp file.
     name, title
         Of the system, as tools show them.
     system
@@ -42,19 +36,12 @@ def write_ssp(target: Path, name: str, title: str, system: System, stop_time: fl
     sets, files = {}, dict[str, str]()
     for component, plan in system.components.items():
         if plan.parameters or plan.inputs:
-            files[component] = f"resources/{plain_name(component, list(files.values()))}.ssv"
+            stems = [Path(file).stem for file in files.values()]
+            files[component] = f"resources/{plain_name(component, stems)}.ssv"
             sets[files[component]] = write_parameter_set(component, plan, tool)
     contents = {SYSTEM_FILE: _text(_description(name, title, system, fmus, files, stop_time, study, tool))}
     contents |= {member: _text(root) for member, root in sets.items()}
-    contents |= {member: path.read_bytes() for path, member in fmus.items()}
-    partial = target.with_name(f"{target.name}.part")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-        for member, content in contents.items():
-            entry = zipfile.ZipInfo(member, _TIMESTAMP)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content)
-    partial.replace(target)
+    return contents | {member: path.read_bytes() for path, member in fmus.items()}
 
 
 def _file_names(system: System) -> dict[Path, str]:
