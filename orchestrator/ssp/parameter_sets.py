@@ -9,6 +9,10 @@ from orchestrator.errors import InputError
 from orchestrator.ssp.names import SSP_VERSION, children, tag
 
 
+SET_NAME = "initialValues"
+"""One name for the sets of all components: some tools ask by name which to apply."""
+
+
 @dataclass(frozen=True, slots=True)
 class SspValue:
     """A value as a parameter set has it; ``unit`` is empty where none is given."""
@@ -20,7 +24,7 @@ class SspValue:
 def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
     """All values that a component is given before initialisation, each in its variable's own unit."""
     variables = plan.description.variables
-    root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=name, generationTool=tool)
+    root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=SET_NAME, generationTool=tool)
     parameters = SubElement(root, tag("ssv:Parameters"))
     values = plan.parameters | plan.inputs
     for variable, value in values.items():
