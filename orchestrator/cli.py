@@ -112,6 +112,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PERCENT",
         help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
     )
+    modes.add_argument(
+        "--directional",
+        action="store_true",
+        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
+    )
     modes.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
@@ -317,7 +322,10 @@ def _modes(options: argparse.Namespace) -> int:
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = _folder(options.out) if options.out else None
-    results = [compute_modes(case, prepared, options.range, options.critical) for prepared in scenarios]
+    results = [
+        compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+        for prepared in scenarios
+    ]
     plots = save_modes(case, results, folder) if folder else []
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))

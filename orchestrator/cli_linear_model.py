@@ -43,7 +43,7 @@ def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, b
         raise InputError(f"{OPTION} needs one model to build, not {len(models)}; name it before the options")
     case = load_case(options.linear_case)
     scenario = _one("--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}")
-    (prepared,) = case.prepare([scenario])
+    (prepared,) = case.prepare([scenario], {"*.native": True} if options.native else {})
     component = _component(options.component, models[0], prepared)
     return linear_model_members(component_model(case.name, prepared, component))
 

@@ -1,4 +1,7 @@
-"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs."""
+"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs.
+
+Where an FMU gives directional derivatives, they are the independent way to the same.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +11,7 @@ import scipy.linalg
 
 from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.state_access import StateAccess
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
@@ -51,48 +55,6 @@ class ComponentLinearization:
     A_c: Matrix | None
     B_c: Matrix | None
     disagreement: float
-
-
-def obstacle(component: Component) -> str | None:
-    """Why a component can neither be perturbed and put back, nor has a linear model inside; None where it can."""
-    description = component.description
-    if not description.can_save_state:
-        return (
-            f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-            "so it cannot be perturbed and put back; ask for an export that can"
-        )
-    if description.states and not description.states_are_settable and embedded_model(component) is None:
-        return (
-            f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-            "linearisation by perturbation needs, and has no linear model inside; our FMUs declare the one under "
-            "VendorAnnotations, and `gfor build --with-linear-model` packs the other"
-        )
-    return None
-
-
-class StateAccess:
-    """Reads and sets the continuous states of one component; those that cannot be set stay as they are.
-
-    Raises
-    ------
-    AnalysisError
-        If the component can neither be perturbed and put back, nor has a linear model inside.
-    """
-
-    def __init__(self, component: Component) -> None:
-        if reason := obstacle(component):
-            raise AnalysisError(reason)
-        self._settable = component.description.states_are_settable
-        self.batch = RealBatch(component, component.description.states)
-        self._buffer = RealBatch(component, component.description.states)
-
-    def read(self) -> Matrix:
-        return self.batch.read().copy()
-
-    def write(self, values: Matrix) -> None:
-        if self._settable:
-            self._buffer.values[:] = values
-            self._buffer.write()
 
 
 def linearize_component(
@@ -149,6 +111,38 @@ def linearize_component(
     )
 
 
+def linearize_by_derivatives(
+    exchange: Exchange, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
+) -> ComponentLinearization:
+    """The same from the FMU's own directional derivatives, without a perturbation and without a step.
+
+    The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
+
+    Parameters
+    ----------
+    inputs, observed
+        As `linearize_component`.
+
+    Raises
+    ------
+    AnalysisError
+        If the FMU gives no directional derivatives, or none of its states.
+    """
+    component = exchange.component
+    states = component.description.states
+    rates = [f"der({s})" for s in states]
+    if not component.description.gives_directional_derivatives:
+        raise AnalysisError(
+            f"component {component.name!r}: its FMU gives no directional derivatives; native FMUs do (--native), "
+            "or linearise by perturbation"
+        )
+    n = len(states)
+    entries = (*exchange.inputs.names, *inputs)
+    whole = component.jacobian([*rates, *exchange.outputs.names, *observed], [*states, *entries])
+    blocks = whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
+    return _over_step(exchange, step_size, states, entries, observed, *blocks)
+
+
 def _from_inside(
     exchange: Exchange, model: EmbeddedModel, step_size: float, inputs: Sequence[str], observed: Sequence[str]
 ) -> ComponentLinearization:
@@ -164,17 +158,31 @@ def _from_inside(
         )
     columns = [list(model.inputs).index(v) for v in entries]
     rows = [list(model.outputs).index(v) for v in exits]
-    n, m, p = len(model.states), len(columns), len(exchange.outputs.names)
-    A_c, B_c = model.A, model.B[:, columns]
-    over_step = scipy.linalg.expm(step_size * np.block([[A_c, B_c], [np.zeros((m, n + m))]]))
-    C, D = model.C[rows], model.D[np.ix_(rows, columns)]
+    blocks = model.A, model.B[:, columns], model.C[rows], model.D[np.ix_(rows, columns)]
+    return _over_step(exchange, step_size, tuple(model.states), entries, observed, *blocks)
+
+
+def _over_step(
+    exchange: Exchange,
+    step_size: float,
+    states: tuple[str, ...],
+    entries: tuple[str, ...],
+    observed: Sequence[str],
+    A_c: Matrix,
+    B_c: Matrix,
+    C: Matrix,
+    D: Matrix,
+) -> ComponentLinearization:
+    """A continuous model, and its exact map over a communication step with the inputs held."""
+    (n, m), p = B_c.shape, len(exchange.outputs.names)
+    step_map = scipy.linalg.expm(step_size * np.block([[A_c, B_c], [np.zeros((m, n + m))]]))
     return ComponentLinearization(
-        component.name,
-        tuple(model.states),
+        exchange.component.name,
+        states,
         entries,
         exchange.outputs.names,
-        A=over_step[:n, :n],
-        B=over_step[:n, n:],
+        A=step_map[:n, :n],
+        B=step_map[:n, n:],
         C=C[:p],
         D=D[:p],
         observed=tuple(observed),

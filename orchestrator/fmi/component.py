@@ -275,6 +275,27 @@ class Component:
             found[name] = bool(value) if variable.type == "Boolean" else float(value)
         return found
 
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
+        """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
+
+        Returns
+        -------
+        ndarray
+            Shape (unknowns, knowns).
+
+        Raises
+        ------
+        ComponentError
+            If the FMU refuses.
+        """
+        variables = self.description.variables
+        rows = [variables[name].reference for name in unknowns]
+        columns = [
+            self._call("fmi2GetDirectionalDerivative", self._fmu.getDirectionalDerivative, rows, [reference], [1.0])
+            for reference in (variables[name].reference for name in knowns)
+        ]
+        return np.array(columns).reshape(len(knowns), len(unknowns)).T
+
     # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:

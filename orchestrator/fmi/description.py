@@ -51,6 +51,8 @@ class FmuDescription:
         an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
     can_save_state
         ``canGetAndSetFMUstate``.
+    gives_directional_derivatives
+        ``providesDirectionalDerivative``.
     units
         Exponents of SI base units, factor and offset of every unit that the FMU defines, as text.
     default_step_size
@@ -67,6 +69,7 @@ class FmuDescription:
     states: tuple[str, ...]
     states_are_settable: bool
     can_save_state: bool
+    gives_directional_derivatives: bool
     output_dependencies: dict[str, tuple[str, ...] | None]
     platforms: tuple[str, ...]
     units: dict[str, dict[str, str]]
@@ -175,6 +178,7 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
         states_are_settable=tool is not None and tool.get("settable") == "true",
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
+        gives_directional_derivatives=bool(md.coSimulation.providesDirectionalDerivative),
         output_dependencies=dependencies,
         platforms=platforms,
         units=_units(root),

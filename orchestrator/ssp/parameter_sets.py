@@ -8,7 +8,6 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import SSP_VERSION, children, tag
 
-
 SET_NAME = "initialValues"
 """One name for the sets of all components: some tools ask by name which to apply."""
 

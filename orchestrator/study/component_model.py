@@ -1,6 +1,6 @@
 """The linear model of one component at the steady state of a scenario, to be packed into its FMU."""
 
-from orchestrator.analysis.component_linearization import PERTURBATIONS, linearize_component
+from orchestrator.analysis.component_linearization import PERTURBATIONS, linearize_by_derivatives, linearize_component
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import AnalysisError
@@ -10,9 +10,10 @@ from orchestrator.study.modes import running
 
 
 def component_model(case: str, prepared: PreparedScenario, name: str) -> EmbeddedModel:
-    """The continuous linear model of one component at the scenario's steady state, by perturbation of its FMU.
+    """The continuous linear model of one component at the scenario's steady state.
 
-    Its inputs and outputs are all that the FMU has of type Real.
+    It is made of the FMU's own directional derivatives where it gives them, else by perturbation. Its inputs and
+    outputs are all that the FMU has of type Real.
 
     Raises
     ------
@@ -28,7 +29,12 @@ def component_model(case: str, prepared: PreparedScenario, name: str) -> Embedde
         point = find_operating_point(master)
         exchange = master.exchanges[name]
         open_inputs = [v for v in inputs if v not in exchange.inputs.names]
-        c = linearize_component(exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True)
+        exact = plan.description.gives_directional_derivatives
+        c = (
+            linearize_by_derivatives(exchange, prepared.step_size, open_inputs, outputs)
+            if exact
+            else linearize_component(exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True)
+        )
         if c.A_c is None or c.B_c is None:
             raise AnalysisError(
                 f"component {name!r}: its FMU does not give its derivatives, so no continuous model can be made"
@@ -52,7 +58,7 @@ def component_model(case: str, prepared: PreparedScenario, name: str) -> Embedde
             "component": name,
             "communication_step_s": prepared.step_size,
             "residual_per_step": point.residual,
-            "perturbation": PERTURBATIONS[0],
+            "derivatives": "directional derivatives" if exact else f"central differences of {PERTURBATIONS[0]:g}",
             "fmu_guid": plan.description.guid,
         },
     )

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import xarray as xr
 
-from orchestrator.analysis.component_linearization import obstacle
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.state_access import obstacle
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master

@@ -163,13 +163,26 @@ def test_equal_models_give_equal_files(fmu, tmp_path):
     assert (tmp_path / "gfor.fmu").read_bytes() == fmu.read_bytes()
 
 
-def test_native_fmus_carry_it_too(tmp_path):
-    arguments = ["build", "synchronous_generator_st4b", "--native", "--platform", "linux64"]
+def test_native_fmus_carry_it_too_and_exactly(tmp_path, fmu):
+    arguments = ["build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
+    assert main([*arguments, "--scenario", "pod_pq", "--dest", str(tmp_path)]) == 0
+    path = tmp_path / "gfor.fmu"
+    assert validate_fmu(str(path)) == []
+    model = read_embedded_model(path)
+    for found, wanted in zip((model.A, model.B, model.C, model.D), exact(model), strict=True):
+        assert found == pytest.approx(wanted, rel=1e-13, abs=1e-9)
+    assert model.origin["derivatives"] == "directional derivatives"
+    assert read_embedded_model(fmu).origin["derivatives"] == "central differences of 1e-05"
+
+
+@pytest.mark.slow
+def test_fmus_of_fmi_3_carry_it_too(tmp_path):
+    arguments = ["build", "synchronous_generator_st4b", "--native", "--fmi", "3.0", "--platform", "linux64"]
     arguments += ["--with-linear-model", "two_area", "--scenario", "gfor", "--component", "sg1"]
     assert main([*arguments, "--dest", str(tmp_path)]) == 0
     path = tmp_path / "synchronous_generator_st4b.fmu"
     assert validate_fmu(str(path)) == []
-    assert len(read_embedded_model(path).states) == len(read_description(path).states)
+    assert read_embedded_model(path).origin["component"] == "sg1"
 
 
 def test_info_tells_of_it(fmu, fmu_path, capsys):
