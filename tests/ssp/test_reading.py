@@ -198,29 +198,30 @@ def test_modes_and_linear_model_of_a_foreign_system(tmp_path, capsys):
     assert (tmp_path / "linear" / "foreign" / "A.csv").exists()
 
 
-def without_settable_states(path):
-    """The archive with FMUs as others make them: nothing in them says that states can be set."""
+def with_other_fmus(path, target, old, new):
+    """The archive with another text in its FMUs' model descriptions."""
 
-    def plain(content):
+    def changed(content):
         out = io.BytesIO()
-        with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(out, "w") as new:
-            for name in old.namelist():
-                text = old.read(name)
+        with zipfile.ZipFile(io.BytesIO(content)) as fmu, zipfile.ZipFile(out, "w") as other:
+            for name in fmu.namelist():
+                text = fmu.read(name)
                 if name == "modelDescription.xml":
-                    text = text.replace(b'settable="true"', b'settable="false"')
-                new.writestr(name, text)
+                    assert old in text
+                    text = text.replace(old, new)
+                other.writestr(name, text)
         return out.getvalue()
 
-    with zipfile.ZipFile(path) as archive:
-        contents = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in contents.items():
-            archive.writestr(name, plain(content) if name.endswith(".fmu") else content)
-    return path
+    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(target, "w") as other:
+        for name in archive.namelist():
+            content = archive.read(name)
+            other.writestr(name, changed(content) if name.endswith(".fmu") else content)
+    return target
 
 
 def test_what_cannot_be_linearised_is_simulated_all_the_same(tmp_path, capsys):
-    path = without_settable_states(write(tmp_path / "ring.ssp", system("top", IN_RING, RING)))
+    plain = write(tmp_path / "ring.ssp", system("top", IN_RING, RING))
+    path = with_other_fmus(plain, tmp_path / "closed.ssp", b'settable="true"', b'settable="false"')
     out = tmp_path / "results"
     assert main(["run", str(path), "--out", str(out)]) == 0
     captured = capsys.readouterr()
@@ -233,6 +234,16 @@ def test_what_cannot_be_linearised_is_simulated_all_the_same(tmp_path, capsys):
     assert main(["report", str(out)]) == 0
     assert main(["modes", str(path)]) == 1
     assert "does not let a master set its continuous states" in capsys.readouterr().err
+
+
+def test_outputs_that_are_no_real_numbers_are_not_recorded(tmp_path):
+    plain = write(tmp_path / "gain.ssp", system("top", [component("a", "gain")]), models=["gain"])
+    real = b'causality="output" variability="continuous" initial="calculated">\n      <Real unit="1" />'
+    whole = b'causality="output" variability="discrete" initial="calculated">\n      <Integer />'
+    scenario = prepared(with_other_fmus(plain, tmp_path / "whole.ssp", real, whole))
+    assert scenario.system.components["a"].description.variables["y"].type == "Integer"
+    assert scenario.record == ()
+    assert prepared(plain).record == ("a.y",)
 
 
 # -- what is refused -------------------------------------------------------------------------------

@@ -229,14 +229,14 @@ def test_fmpy_runs_the_small_system_as_its_own_schedule_has_it(small):
 
 @pytest.mark.interop
 def test_fmpy_runs_the_two_area_system(two_area):
-    """It takes its first step at zero voltage; what that kicks differs from our run by less than the event moves."""
+    """It takes its first step at zero voltage; what is left of that kick is the difference to our run."""
     result = simulate_ssp(
-        str(two_area["pod_p"]), stop_time=1.0, step_size=1e-4, parameter_set=typed_values(two_area["pod_p"])
+        str(two_area["pod_p"]), stop_time=0.5, step_size=1e-4, parameter_set=typed_values(two_area["pod_p"])
     )
-    (scenario,) = load_case(two_area["pod_p"]).prepare(stop_time=1.0)
+    (scenario,) = load_case(two_area["pod_p"]).prepare(stop_time=0.5)
     names, values = response(scenario)
     for name in ("sg1.omega", "sg2.omega"):
-        theirs, ours = result[name][:10_000:50], values[:200, 1 + names.index(name)]
+        theirs, ours = result[name][:5000:50], values[:100, 1 + names.index(name)]
         assert theirs == pytest.approx(ours, abs=2e-5)
     assert all(b > a for a, b in pairwise(result["time"]))
 
