@@ -128,6 +128,21 @@ def test_the_two_area_system_comes_back_to_the_last_bit(two_area, name):
     assert modes_again.references == modes.references
 
 
+@pytest.mark.slow
+def test_many_units_and_a_unit_s_trip_come_back_too(tmp_path):
+    target = tmp_path / "trip.ssp"
+    assert main(["export-ssp", "ieee39", "--scenario", "unit_trip", "--out", str(target)]) == 0
+    assert_valid(target)
+    (before,), (after,) = (
+        load_case("ieee39").prepare(["unit_trip"], stop_time=1.2),
+        load_case(target).prepare(stop_time=1.2),
+    )
+    (names, values), (names_again, values_again) = response(before), response(after)
+    assert names == names_again
+    assert np.ptp(values[:, 1 + names.index("sg36.i_re")]) > 1
+    assert np.array_equal(values, values_again)
+
+
 def test_all_commands_take_an_ssp(two_area, tmp_path, capsys):
     ssp = str(two_area["pod_p"])
     assert main(["modes", ssp, "--set", "gfor.pod_p.K=300", "--json"]) == 0
