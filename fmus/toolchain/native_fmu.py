@@ -5,6 +5,7 @@ directional derivatives and may be stepped from many threads, one per instance a
 """
 
 import hashlib
+from collections.abc import Mapping
 from importlib.metadata import version as version_of
 from pathlib import Path
 
@@ -27,7 +28,11 @@ _FOLDERS_3 = {
 
 
 def export_native(
-    model: Model, destination: Path, platforms: tuple[str, ...] | None = None, version: FmiVersion = "2.0"
+    model: Model,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
+    version: FmiVersion = "2.0",
+    extra: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Write ``<model name>.fmu`` into a folder.
 
@@ -42,6 +47,8 @@ def export_native(
         kinds of Mac.
     version
         Of FMI.
+    extra
+        Further members of the archive, by path.
 
     Returns
     -------
@@ -56,7 +63,7 @@ def export_native(
     digest = _digest(model, version)
     chosen = tuple(TARGETS) if platforms is None else platforms
     contents = _contents_2(model, digest, chosen) if version == "2.0" else _contents_3(model, digest, chosen)
-    return write_archive(destination / f"{model.name}.fmu", contents)
+    return write_archive(destination / f"{model.name}.fmu", contents | dict(extra or {}))
 
 
 def cached_native(model: Model) -> Path:

@@ -137,6 +137,21 @@ def modes_of(
     )
 
 
+def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:
+    """The result for a system that can be simulated but not linearised: no modes, and a warning with the reasons."""
+    return ModesResult(
+        prepared=prepared,
+        operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
+        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size),
+        modes=[],
+        named={},
+        references={},
+        warnings=(f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",),
+        swing=(),
+        areas={},
+    )
+
+
 def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
     """The modes whose shape the case describes."""
 

@@ -47,10 +47,8 @@ def in_short(rules: MasterRules) -> str:
     words += ["read after exchange"] if rules.after_exchange else []
     words += ["labels one step early"] if rules.early_label else []
     count = rules.early_label - (rules.last_label == "before stop")
-    summed = rules.last_label.startswith("sum")
-    return ", ".join(
-        [*words, "ends by a summed-up time" if summed else "N steps" if count == 0 else f"N{count:+d} steps"]
-    )
+    steps = "N steps" if count == 0 else f"N{count:+d} steps"
+    return ", ".join([*words, "ends by a summed-up time" if rules.last_label.startswith("sum") else steps])
 
 
 def verdicts(text: str) -> dict[str, list[str]]:
