@@ -9,6 +9,7 @@ has the master, also in an environment of its own::
     wires       [[component, output], [component, input]], ...
     step_size, stop_time   [s]
     record      [component, output], ...
+    ssp, parameter_set   the same as an archive, and the name of the values in it
 
 The result has ``rows``: [label in s, value, ...] as the master records them, one a step, and ``order``, where the
 master chose one. Masters may abort when their process ends; the result is complete before.
@@ -319,8 +320,9 @@ def cofmupy_gauss_seidel(job):
 def ecos_executable(job):
     """Not run in this process, but beside it: no Python of ours in it but what is preloaded."""
     with tempfile.TemporaryDirectory(prefix="ecos_") as folder:
-        command = [*job["command"], "simulate", "--path", job["ssp"], "--stepSize", repr(job["step_size"]),
-                   "--stopTime", repr(job["stop_time"]), "--parameterSet", "start", "-l", "warn"]  # fmt: skip
+        options = {"--path": job["ssp"], "--parameterSet": job["parameter_set"], "--logLevel": "warn"}
+        options |= {"--stepSize": repr(job["step_size"]), "--stopTime": repr(job["stop_time"])}
+        command = [*job["command"], "simulate", *(text for option in options.items() for text in option)]
         done = subprocess.run(command, cwd=folder, env=job["environment"], capture_output=True, text=True, check=False)
         found = list(Path(folder).rglob("*.csv"))
         if not found:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.coupling.system import System
 from orchestrator.interop.candidates import SIGNALS, probe_system
 from orchestrator.interop.emulation import emulate
 from orchestrator.interop.masters import MASTERS
@@ -88,7 +89,7 @@ def measure(master: str, kind: str, folder: Path, *, preload: bool | None = None
         system, record = coupled.build(kind), list(coupled.record)
         if master == "ecos_executable":
             system, record = with_magnifier(system, coupled.record, kind)
-        jobs[name] = job_of(system, STEP_SIZE, STOP_TIME, record)
+        jobs[name] = system, job_of(system, STEP_SIZE, STOP_TIME, record)
         systems[name] = system, record
     preload = kind == "Python-backed" if preload is None else preload
     results = run(master, jobs, folder, preload=preload)
@@ -97,16 +98,17 @@ def measure(master: str, kind: str, folder: Path, *, preload: bool | None = None
 
 def run_probes(master: str, folder: Path) -> dict:
     """What a master gives for the probe pair."""
-    job = job_of(probe_system(), PROBE_STEP_SIZE, PROBE_STOP_TIME, list(SIGNALS))
-    return run(master, {"probes": job}, folder, preload=True)["probes"]
+    system = probe_system()
+    job = job_of(system, PROBE_STEP_SIZE, PROBE_STOP_TIME, list(SIGNALS))
+    return run(master, {"probes": (system, job)}, folder, preload=True)["probes"]
 
 
-def run(master: str, jobs: dict[str, dict], folder: Path, *, preload: bool) -> dict[str, dict]:
+def run(master: str, jobs: dict[str, tuple[System, dict]], folder: Path, *, preload: bool) -> dict[str, dict]:
     """Results of a master in a process of its own, which may abort when it ends."""
     command, results = [_python(master), str(DRIVERS), _driver(master)], {}
-    for number, (name, job) in enumerate(jobs.items()):
+    for number, (name, (system, job)) in enumerate(jobs.items()):
         ssp, path, results[name] = (folder / f"{number}.{ending}" for ending in ("ssp", "json", "out"))
-        write_ssp(job, ssp)
+        write_ssp(system, job, ssp)
         host = ecos_host(preload=preload) if master == "ecos_executable" else {}
         path.write_text(json.dumps(job | {"ssp": str(ssp)} | host), encoding="utf-8")
         command += [str(path), str(results[name])]
@@ -116,7 +118,7 @@ def run(master: str, jobs: dict[str, dict], folder: Path, *, preload: bool) -> d
     return {name: json.loads(result.read_text(encoding="utf-8")) for name, result in results.items()}
 
 
-def compare(rules: MasterRules, system, record: list[str], result: dict) -> Outcome:
+def compare(rules: MasterRules, system: System, record: list[str], result: dict) -> Outcome:
     """Rows of a master against the emulation of its schedule, matched by their labels."""
     emulation = emulate(system, rules, STEP_SIZE, STOP_TIME, record, order=result["order"])
     rows = np.array(result["rows"])

@@ -196,8 +196,9 @@ def test_a_file_that_is_not_there(tmp_path):
 
 @pytest.mark.parametrize(("master", "alike"), [("fmpy_ssp", {"fmpy_ssp", "cofmupy"}), ("fmpy_container", None)])
 def test_fmpy_is_recognised(master, alike, told, tmp_path):
-    job = job_of(probe_system(), H, N * H, list(SIGNALS)) | {"ssp": str(tmp_path / "probes.ssp")}
-    write_ssp(job, tmp_path / "probes.ssp")
+    system = probe_system()
+    job = job_of(system, H, N * H, list(SIGNALS)) | {"ssp": str(tmp_path / "probes.ssp")}
+    write_ssp(system, job, tmp_path / "probes.ssp")
     rows, _ = drivers.MASTERS[master](job)
     verdict = told(table(rows))
     assert set(verdict.masters) == (alike or {master})
