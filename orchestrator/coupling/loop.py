@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.coupling.schedule import Schedule
 from orchestrator.fmi.component import Component, RealBatch
 
 _SOURCE = Path(__file__).with_name("inner_loop.c")
@@ -144,8 +145,8 @@ class PythonLoop:
 
     Parameters
     ----------
-    extrapolation
-        See `Schedule`.
+    schedule
+        For what is special about its steps.
     hand_over
         Sets all inputs before each step; by default each component takes its own as it steps.
     """
@@ -154,10 +155,11 @@ class PythonLoop:
         self,
         groups: Sequence[Sequence[Exchange]],
         y: NDArray[np.float64],
-        extrapolation: float = 0.0,
+        schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
     ) -> None:
-        self._groups, self._y, self._extrapolation, self._hand_over = groups, y, extrapolation, hand_over
+        self._groups, self._y, self._hand_over = groups, y, hand_over
+        self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
         self._before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
@@ -165,7 +167,7 @@ class PythonLoop:
     def advance(self, index: int, count: int, step_size: float) -> None:
         self.completed = 0
         for k in range(index, index + count):
-            time = k * step_size
+            time, size = self._interval(k, step_size)
             known = self._extrapolated() if self._extrapolation else self._y
             if self._hand_over is not None:
                 self._hand_over()
@@ -176,7 +178,7 @@ class PythonLoop:
                     component = exchange.component
                     if exchange.inputs.names and self._hand_over is None:
                         component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
-                    component.step(time, step_size)
+                    component.step(time, size)
                     spent[i] += perf_counter() - start
                 for i, exchange in enumerate(group):
                     start = perf_counter()
@@ -186,6 +188,14 @@ class PythonLoop:
                     known[exchange.window] = exchange.outputs.values
                     spent[i] += perf_counter() - start
             self.completed += 1
+
+    def _interval(self, index: int, step_size: float) -> tuple[float, float]:
+        """Time and size of a step [s]."""
+        if self._ticks_per_second is None:
+            return index * step_size, step_size
+        ticks = round(step_size * self._ticks_per_second)
+        time = index * ticks / self._ticks_per_second
+        return time, (index + 1) * ticks / self._ticks_per_second - time
 
     def _extrapolated(self) -> NDArray[np.float64]:
         """All outputs as they would go on rising; what has stepped since then is overwritten group by group."""
@@ -200,11 +210,9 @@ class PythonLoop:
 def make_loop(
     groups: Sequence[Sequence[Exchange]],
     y: NDArray[np.float64],
-    extrapolation: float = 0.0,
+    schedule: Schedule,
     hand_over: Callable[[], None] | None = None,
 ) -> Loop:
     """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
-    library = None if extrapolation or hand_over else _library()
-    if library is None:
-        return PythonLoop(groups, y, extrapolation, hand_over)
-    return CompiledLoop(library, groups, y)
+    library = _library() if schedule.is_plain else None
+    return PythonLoop(groups, y, schedule, hand_over) if library is None else CompiledLoop(library, groups, y)

@@ -76,7 +76,7 @@ class Master:
         groups = [[self.exchanges[name] for name in group] for group in schedule.groups]
         self._wires = self._single_wires() if schedule.wire_by_wire else []
         self._handed_over = False
-        self._loop = make_loop(groups, self.y, schedule.extrapolation, self._hand_over if self._wires else None)
+        self._loop = make_loop(groups, self.y, schedule, self._hand_over if self._wires else None)
 
     # -- life cycle ------------------------------------------------------------------------------
 

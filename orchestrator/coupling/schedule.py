@@ -36,6 +36,9 @@ class Schedule:
         Between two steps connections are served one after the other, in the order in which they were made: an output
         that depends directly on inputs is read after those that were set before it. This needs a single group, and
         inputs that are held.
+    ticks_per_second
+        Of a master that keeps time in whole ticks: its FMUs are told differences of times, which rounding makes not
+        quite equal. None tells them the communication step itself.
     """
 
     name: str
@@ -43,6 +46,12 @@ class Schedule:
     first_inputs: FirstInputs = "consistent"
     extrapolation: float = 0.0
     wire_by_wire: bool = False
+    ticks_per_second: int | None = None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether nothing but the order of the components is special about the steps."""
+        return not (self.extrapolation or self.wire_by_wire or self.ticks_per_second)
 
     def check(self, components: set[str]) -> None:
         """Raise unless every component is in exactly one group.

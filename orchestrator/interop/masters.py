@@ -7,8 +7,9 @@ LIBCOSIM = MasterRules(
     name="libcosim",
     title="libcosim (libcosimpy 0.0.6)",
     steps="side by side",
+    ticks_per_second=1_000_000_000,
     source="fixed-step algorithm: outputs are transferred during initialisation until each component was reached, then "
-    "all step and all transfer; observers are handed what was read after the step",
+    "all step and all transfer; observers are handed what was read after the step. Time is kept in nanoseconds",
 )
 
 ECOS = MasterRules(

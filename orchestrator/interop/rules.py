@@ -35,7 +35,7 @@ class MasterRules:
         outputs after it.
     after_exchange
         Outputs are recorded after the inputs for the next step were handed over; else with the inputs of the step.
-    extrapolation, wire_by_wire
+    extrapolation, wire_by_wire, ticks_per_second
         See `Schedule`.
     last_label
         See `LastLabel`.
@@ -51,6 +51,7 @@ class MasterRules:
     after_exchange: bool = False
     extrapolation: float = 0.0
     wire_by_wire: bool = False
+    ticks_per_second: int | None = None
     last_label: LastLabel = "stop"
     source: str = ""
 
@@ -75,7 +76,9 @@ class MasterRules:
             groups: tuple[tuple[str, ...], ...] = (tuple(components),)
         else:
             groups = tuple((name,) for name in (order or components))
-        chosen = Schedule(self.name, groups, self.first_inputs, self.extrapolation, self.wire_by_wire)
+        chosen = Schedule(
+            self.name, groups, self.first_inputs, self.extrapolation, self.wire_by_wire, self.ticks_per_second
+        )
         chosen.check(set(components))
         return chosen
 

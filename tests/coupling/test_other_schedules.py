@@ -1,5 +1,7 @@
 """Schedules as other masters have them, against recursions computed by hand. x' = x + H·gain·u; g: y = K·u + offset."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,20 @@ def test_wire_by_wire_an_output_is_read_after_the_inputs_before_it(observed):
     for (value,) in found[1:]:
         a += H * 10 * (0.5 * a + 2)
         assert value == pytest.approx(a, abs=1e-13)
+
+
+def test_a_master_that_counts_ticks_tells_differences_of_times():
+    """Of times k·H that are rounded, so that its steps are not quite equal: stepped here one by one, digit by digit."""
+    found = trajectory(oscillator(), Schedule("other", SIDE_BY_SIDE, ticks_per_second=10**9), ["a.y", "b.y"])
+    times = [k * 10**6 / 1e9 for k in range(STEPS + 1)]
+    with Master(oscillator(), Schedule("plain", SIDE_BY_SIDE), H) as master:
+        for k, (time, end) in enumerate(pairwise(times)):
+            master.exchange()
+            for name, component in master.components.items():
+                component.step(time, end - time)
+                component.read(master.exchanges[name].outputs)
+            assert master.y.tolist() == found[k + 1].tolist()
+    assert len({end - time for time, end in pairwise(times)}) > 2
 
 
 @pytest.mark.parametrize("others", [{"groups": IN_TURN}, {"extrapolation": 1.0}])

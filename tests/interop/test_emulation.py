@@ -19,6 +19,7 @@ from orchestrator.interop.masters import (
     COFMUPY_GAUSS_SEIDEL,
     ECOS_EXECUTABLE,
     FMPY_SSP,
+    FMUCONTAINER,
     LIBCOSIM,
     MASTERS,
     MOSAIK,
@@ -47,7 +48,7 @@ def test_consistent_side_by_side_is_our_own_jacobi():
     recorder = Recorder(["a.y", "b.y"], 2)
     with Master(probe_system(), jacobi(("a", "b")), 0.1) as master:
         master.run(2.0, observers=[recorder])
-    emulation = emulate(probe_system(), LIBCOSIM, 0.1, 2.0, ["a.y", "b.y"], every=2)
+    emulation = emulate(probe_system(), FMUCONTAINER, 0.1, 2.0, ["a.y", "b.y"], every=2)
     assert np.array_equal(emulation.times, recorder.times)
     assert np.array_equal(emulation.values, recorder.values)
 
