@@ -22,7 +22,7 @@ def probe_b() -> Model:
 def _probe(name: str, x_0: float, T: float, K: float, D: float, u_start: float) -> Model:
     m = ModelBuilder(name, f"Probe {name[-1]} of a pair that tells which schedule a master runs")
     u = m.input("u", "1", "Output of the partner", start=u_start)
-    x = m.state("x", x_0, "1", "Lag")
+    x = m.state("x", m.parameter("x_0", x_0, "1", "Start of the lag"), "1", "Lag")
     t = m.state("t", 0.0, "s", "Time that was stepped")
     m.derivative(x, (K * u - x) / T)
     m.derivative(t, 1.0)
