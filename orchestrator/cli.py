@@ -431,13 +431,13 @@ def _sweep(options: argparse.Namespace) -> int:
     return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
 
 
-def _folder(path: Path) -> Path:
+def _folder(path: Path, option: str = "--out") -> Path:
     """The folder for results, made before anything is computed."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"--out {path}: results cannot be written there: {error.strerror}; choose another folder"
+            f"{option} {path}: results cannot be written there: {error.strerror}; choose another folder"
         ) from error
     return path
 
@@ -516,7 +516,7 @@ def _which_master(options: argparse.Namespace) -> int:
         raise InputError("give either the tool's RESULT.csv, or --build DIR for the probe pair")
     if options.build is None:
         return cli_interop.run_which_master(options, _console(stderr=options.json))
-    folder, host = _folder(options.build), host_platform()
+    folder, host = _folder(options.build, "--build"), host_platform()
     platforms = tuple(options.platform or ([host] if host else []))
     for name in ("probe_a", "probe_b"):
         print(export_native(build_model(name), folder, platforms))

@@ -67,8 +67,10 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
 def _table(path: Path) -> tuple[list[str], list[list[str]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: it cannot be read as text: {error}; give the tool's output as CSV") from error
+    except OSError as error:
+        raise InputError(f"{path}: it cannot be read: {error.strerror}; give the tool's output as CSV") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: it is not text ({error}); give the tool's output as CSV") from error
     filled = [line for line in text.splitlines() if line.strip()]
     if len(filled) < 2:
         raise InputError(f"{path}: it has no heading with rows below it; give the tool's output as CSV")

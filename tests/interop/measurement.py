@@ -61,8 +61,10 @@ class Outcome:
     expected: int
 
 
-def why_not(master: str) -> str | None:
-    """Why a master cannot run here; None if it can."""
+def why_not(master: str, kind: str = "native") -> str | None:
+    """Why a master cannot run a kind of FMU here; None if it can."""
+    if master == "ecos_executable" and kind == "Python-backed" and libpython() is None:
+        return "this Python is linked statically: there is no libpython to preload"
     if master.startswith("cofmupy"):
         if COFMUPY_PYTHON.exists():
             return None

@@ -7,7 +7,7 @@ from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import read_probe_result
 from orchestrator.interop.which_master import identify
 from tests.interop import table
-from tests.interop.measurement import libpython, measure, run_probes, why_not
+from tests.interop.measurement import measure, run_probes, why_not
 from tests.interop.systems import KINDS, SYSTEMS
 
 pytestmark = [pytest.mark.interop, pytest.mark.slow]
@@ -15,12 +15,15 @@ pytestmark = [pytest.mark.interop, pytest.mark.slow]
 EVERYTHING = [(master, kind) for master in MASTERS for kind in KINDS]
 
 
+def skip_if_it_cannot_run(master, kind):
+    reason = why_not(master, kind)
+    if reason:
+        pytest.skip(reason)
+
+
 @pytest.mark.parametrize(("master", "kind"), EVERYTHING)
 def test_the_emulation_gives_what_the_master_gives(master, kind, results, tmp_path):
-    if why_not(master):
-        pytest.skip(why_not(master))
-    if master == "ecos_executable" and kind == "Python-backed" and libpython() is None:
-        pytest.skip("this Python is linked statically: there is no libpython to preload")
+    skip_if_it_cannot_run(master, kind)
     results[master, kind] = outcomes = measure(master, kind, tmp_path)
     assert set(outcomes) == set(SYSTEMS)
     for system, outcome in outcomes.items():
@@ -31,8 +34,7 @@ def test_the_emulation_gives_what_the_master_gives(master, kind, results, tmp_pa
 
 @pytest.mark.parametrize("master", MASTERS)
 def test_which_master_recognises_it(master, tmp_path):
-    if why_not(master):
-        pytest.skip(why_not(master))
+    skip_if_it_cannot_run(master, "Python-backed")
     result = run_probes(master, tmp_path)
     path = tmp_path / "result.csv"
     rows = [["time", *SIGNALS], *result["rows"]]
@@ -46,8 +48,7 @@ def test_which_master_recognises_it(master, tmp_path):
 
 
 def test_a_host_that_is_not_python_needs_a_preload_for_python_backed_fmus(tmp_path):
-    if why_not("ecos_executable"):
-        pytest.skip(why_not("ecos_executable"))
+    skip_if_it_cannot_run("ecos_executable", "native")
     with pytest.raises(AssertionError, match="ecos: return code"):  # native FMUs run in this very environment
         measure("ecos_executable", "Python-backed", tmp_path, preload=False)
 

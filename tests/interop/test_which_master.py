@@ -187,8 +187,14 @@ def test_what_cannot_be_read_gets_one_clear_error(told, text, settings, message)
 
 
 def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="cannot be read as text"):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
         read_probe_result(tmp_path / "none.csv")
+
+
+def test_a_file_that_is_not_text(tmp_path):
+    (tmp_path / "result.mat").write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="it is not text"):
+        read_probe_result(tmp_path / "result.mat")
 
 
 # -- a master that is always there, and the command ------------------------------------------------
