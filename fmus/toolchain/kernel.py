@@ -40,6 +40,10 @@ def c_source(model: Model) -> str:
         functions["iteration"] = elimination.values
         sizes |= {"NM": len(elimination.matrix_column), "NLU": len(elimination.column)}
         tables = _tables(elimination)
+    else:
+        held = [index for index, state in enumerate(model.states) if state.stepwise]
+        sizes["NS"] = len(held)
+        tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     generator = ca.CodeGenerator(model.name, {"with_header": False, "main": False, "verbose": False})
     for name, function in functions.items():

@@ -21,11 +21,10 @@ from orchestrator.fmi.description import read_description
 NAMES = [name for name in model_names() if not needs_arguments(name)]
 STEP = 1e-4
 
+_CONVERTER_OPEN = {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
+_CONVERTER_OPEN |= {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9}
 # Settings under which every declared path of a model carries a signal.
-ALL_PATHS_OPEN = {
-    "gfor": {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
-    | {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9},
-}
+ALL_PATHS_OPEN = {"gfor": _CONVERTER_OPEN, "gfor_abc": _CONVERTER_OPEN}
 # Outputs that reach some listed states only where a block is left out (time constant 0).
 BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
