@@ -29,7 +29,7 @@ class OuterControl:
 
 @dataclass(frozen=True)
 class Converter:
-    """What a converter shows: current into the grid (network frame), control signals, magnitudes inside [pu, S_n]."""
+    """What every variant shows: current into the grid (network frame), control signals, magnitudes inside [pu, S_n]."""
 
     current: Phasor
     control: OuterControl

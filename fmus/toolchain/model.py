@@ -99,9 +99,11 @@ class ModelBuilder:
         Identifier of the FMU (letters, digits, underscore).
     title
         One line that says what the model is.
+    internal_step, longest_step
+        Default and maximum of the parameter ``internal_step`` [s]. The defaults are for electromagnetic transients.
     """
 
-    def __init__(self, name: str, title: str) -> None:
+    def __init__(self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4) -> None:
         self.name = name
         self.title = title
         self._prefix: list[str] = []
@@ -113,11 +115,11 @@ class ModelBuilder:
         self._algebraic: list[tuple[ca.SX, ca.SX]] = []
         self.internal_step = self.parameter(
             "internal_step",
-            1e-4,
+            internal_step,
             "s",
             "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
             minimum=1e-6,
-            maximum=2e-4,
+            maximum=longest_step,
         )
 
     # -- names -------------------------------------------------------------------------------

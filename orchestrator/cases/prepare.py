@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from fmus.grid.network import Network, Port
-from fmus.toolchain.catalogue import build_model, model_names, network_of
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.draft import Draft, Place
@@ -53,6 +53,15 @@ class PreparedScenario:
     events: tuple[Event, ...]
     power_flow: PowerFlow | None
     values: dict[str, float | bool]
+
+
+_STEP_PARAMETER = "communication_step"
+"""A component with this parameter is told the communication step, unless the case sets it."""
+
+
+def _takes_network(table: ComponentTable) -> bool:
+    """Whether a component's model is built for the case's network table."""
+    return table.model in model_names() and needs_arguments(table.model or "")
 
 
 @cache
@@ -106,6 +115,7 @@ class Preparer:
         check_inputs(draft)
         flow = None if draft.problems else self._power_flow()
         clock = self._clock(step_size)
+        self._tell_step(clock)
         stop = stop_time if stop_time is not None else draft.case.solver.stop_time
         events = scenario_events(draft, clock, stop)
         schedule = self._schedule()
@@ -150,18 +160,18 @@ class Preparer:
         grid = draft.tables.get(draft.grid)
         if grid is None:
             draft.note(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}")
-        elif grid.model == "grid":
-            draft.network = self._network_from_table()
+        elif _takes_network(grid):
+            draft.network = self._network_from_table(grid)
         elif grid.model in model_names():
             draft.network = network_of(grid.model or "")
 
-    def _network_from_table(self) -> Network | None:
+    def _network_from_table(self, grid: ComponentTable) -> Network | None:
         draft, data = self.draft, self.draft.data
         if data is None:
             if draft.case.network is None:
                 draft.note_network(
                     draft.place("power_flow", "grid"),
-                    "the model 'grid' needs a [network] table with buses, lines and loads",
+                    f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
                 )
             return None
         held = {table.bus for table in self._everything.values()}
@@ -183,7 +193,7 @@ class Preparer:
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
         where = self.draft.place("components", name)
-        if table.model == "grid" and self.draft.network_failed:
+        if _takes_network(table) and self.draft.network_failed:
             return
         if (table.model is None) == (table.fmu is None):
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
@@ -198,10 +208,10 @@ class Preparer:
     def _description(self, table: ComponentTable) -> FmuDescription:
         if table.fmu is not None:
             return read_description(self.draft.directory / table.fmu)
-        own = table.model == "grid"
+        own = _takes_network(table)
         if own and self.draft.network is None:
             raise InputError(
-                "the model 'grid' needs a [network] table and a [power_flow] table that names this component"
+                f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
         return catalogue_fmu(table.model or "", self.draft.network if own else None)
 
@@ -248,6 +258,13 @@ class Preparer:
         except InputError as error:
             self.draft.note("--step", str(error))
             return None
+
+    def _tell_step(self, clock: Clock | None) -> None:
+        """Give the communication step to the components that want to know it."""
+        for plan in self.draft.system.components.values():
+            info = plan.description.variables.get(_STEP_PARAMETER)
+            if clock is not None and info is not None and info.causality == "parameter":
+                plan.parameters.setdefault(_STEP_PARAMETER, clock.step_size)
 
     def _schedule(self) -> Schedule:
         """The case's schedule, checked against its components."""
