@@ -9,7 +9,7 @@ import casadi as ca
 
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model, ModelBuilder
-from fmus.toolchain.phasor_port import declare_lead, declare_phasor_outputs, phasor_builder
+from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import device_port
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
 from gfor_fmu.droop import declare_droop
@@ -21,7 +21,6 @@ def grid_forming_converter_phasor() -> Model:
     """Droops and POD controllers of `grid_forming_converter` behind an algebraic electrical side."""
     m = phasor_builder("gfor_phasor", "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)")
     port = device_port(m, S_n=S_N, P_0=P_0)
-    lead = declare_lead(m)
     electrical = declare_filter_data(m, port)
     P, Q = m.algebraic("P"), m.algebraic("Q")
     droop = declare_droop(m, electrical.initial, Phasor(P, Q))
@@ -29,18 +28,15 @@ def grid_forming_converter_phasor() -> Model:
 
     u, impedance = control.u_ref, Phasor(electrical.R_t, electrical.X_t)
 
-    def current(theta: ca.SX) -> Phasor:
-        return (u - port.v.rotated(-theta)) / impedance * port.connected
-
-    s = power(u, current(droop.theta))
+    i_g = (u - port.v.rotated(-droop.theta)) / impedance * port.connected
+    s = power(u, i_g)
     m.close(P, s.re)
     m.close(Q, s.im)
 
-    advanced = droop.theta + lead * port.omega_b * (control.omega - 1)
-    declare_phasor_outputs(m, port, u.rotated(advanced), impedance)
-    i_g = current(advanced)
+    emf = source_emf(m, u, electrical.initial.u, droop.theta, port.omega_b * (control.omega - 1))
+    declare_phasor_outputs(m, port, emf, impedance)
     i_s = i_g + _capacitor_current(electrical, u)
-    declare_converter_outputs(m, Converter(i_g.rotated(advanced), control, u.magnitude(), i_s.magnitude()))
+    declare_converter_outputs(m, Converter(i_g.rotated(droop.theta), control, u.magnitude(), i_s.magnitude()))
     m.output(
         "current_limit",
         _of_limit(m, electrical, i_s),

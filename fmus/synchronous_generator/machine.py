@@ -79,12 +79,13 @@ class Axis:
 
 @dataclass(frozen=True)
 class Start:
-    """What others start from: terminal voltage, field voltage and current, torque, stator current of the q axis."""
+    """What others start from: |v_t|, field voltage and current, torque; bus voltage and current, rotor's frame."""
 
     v_t: ca.SX
     E_fd: ca.SX
     T_e: ca.SX
-    i_q: ca.SX
+    v: Phasor
+    i: Phasor
 
 
 @dataclass(frozen=True)
@@ -312,4 +313,4 @@ def _operating_point(
         flux_state(m, "psi_2q", airgap_q, "Second damper flux, q axis"),
         *reactances["q"][2:],
     )
-    return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, ca.SX(i_q)), d, q, delta_0
+    return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

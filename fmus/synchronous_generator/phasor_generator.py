@@ -29,7 +29,7 @@ from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model, ModelBuilder
-from fmus.toolchain.phasor_port import declare_lead, declare_phasor_outputs, phasor_builder
+from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
 
 
@@ -54,7 +54,6 @@ def _generator(name: str, exciter: Exciter, data: MachineData, governor: Governo
         f"Synchronous generator with {name.upper()} exciter, IEEEG1 governor and step-up transformer (phasor type)",
     )
     port = device_port(m, data.S_n, data.P_0)
-    lead = declare_lead(m)
     g = declare_machine(m, port, data, stator_flux=lambda m, name, start, text: m.algebraic(name))
     emf = Phasor(g.d.emf, g.q.emf) * g.w
     _close_stator(m, g, port, emf)
@@ -63,8 +62,10 @@ def _generator(name: str, exciter: Exciter, data: MachineData, governor: Governo
     P_m = ieeeg1(m, g.w, g.start.T_e, governor)
     rotor_equations(m, g, port, E_fd, P_m)
 
-    advanced = g.delta + lead * port.omega_b * (g.w - 1)
-    declare_phasor_outputs(m, port, (emf - _saliency(m, g)).rotated(advanced), Phasor(g.R, g.d.X_between))
+    impedance = Phasor(g.R, g.d.X_between)
+    start = g.start.v + impedance * g.start.i
+    source = source_emf(m, emf - _saliency(m, g), start, g.delta, port.omega_b * (g.w - 1))
+    declare_phasor_outputs(m, port, source, impedance)
     declare_generator_outputs(m, g, v_t, E_fd, P_m)
     return m.build()
 
@@ -93,6 +94,6 @@ def _saliency(m: ModelBuilder, g: Machine) -> Phasor:
             "T_saliency", 0.005, "s", "Lag of i_q in the emf's part for X''_q − X''_d; no effect where they are equal",
             minimum=1e-3,
         )  # fmt: skip
-        lagged = m.state("i_q_lagged", g.start.i_q, "pu", "Stator current through a lag, q axis", base="S_n")
+        lagged = m.state("i_q_lagged", g.start.i.re, "pu", "Stator current through a lag, q axis", base="S_n")
     m.derivative(lagged, (g.q.i - lagged) / T)
     return Phasor(0.0, (g.q.X_between - g.d.X_between) * lagged)

@@ -1,0 +1,93 @@
+"""The two-area study with phasor models at milliseconds, against the EMT models at 100 µs."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.study.modes import compute_modes
+from orchestrator.study.run import run_scenario
+from tests.support.exact import exact_continuous
+
+pytestmark = pytest.mark.reproduction
+
+SCENARIOS = ("base", "gfor", "pod_p", "pod_q", "pod_pq")
+HERTZ, POINTS = 0.01, 0.3
+
+
+def prepare(case, scenario, overrides=None, **arguments):
+    loaded = load_case(case)
+    (ready,) = loaded.prepare([scenario], overrides, **arguments)
+    return loaded, ready
+
+
+@cache
+def emt_mode(scenario, X_L):
+    """The electromechanical mode of the EMT FMUs at 100 µs."""
+    return compute_modes(*prepare("two_area", scenario, {"grid.X_L": X_L})).electromechanical
+
+
+def rms_mode(scenario, X_L=0.1, overrides=None, step_size=None):
+    return compute_modes(
+        *prepare("two_area_rms", scenario, {"grid.X_L": X_L} | (overrides or {}), step_size=step_size)
+    ).electromechanical
+
+
+@pytest.mark.parametrize("X_L", [0.05, 0.1])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_electromechanical_mode_is_that_of_the_emt_models(scenario, X_L):
+    found, wanted = rms_mode(scenario, X_L), emt_mode(scenario, X_L)
+    assert found.frequency_hz == pytest.approx(wanted.frequency_hz, abs=HERTZ)
+    assert found.damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
+
+
+@pytest.mark.parametrize(("step_size", "points"), [(1e-3, 0.15), (2e-3, 0.15), (5e-3, 0.16), (10e-3, 0.2)])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_communication_step_hardly_moves_it(scenario, step_size, points):
+    """What remains at 1 ms is the models': network transients that are not there."""
+    found, wanted = rms_mode(scenario, step_size=step_size), emt_mode(scenario, 0.1)
+    assert found.frequency_hz == pytest.approx(wanted.frequency_hz, abs=0.002)
+    assert found.damping_percent == pytest.approx(wanted.damping_percent, abs=points)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_at_short_steps_it_is_the_continuous_models(scenario):
+    devices = ("sg1", "sg2") if scenario == "base" else ("sg1", "sg2", "gfor")
+    _, ready = prepare("two_area_rms", scenario, {f"{d}.communication_step": 0.0 for d in devices})
+    exact = np.linalg.eigvals(exact_continuous(ready)[0])
+    for step_size, most in ((1e-3, 1e-4), (2e-3, 2e-4), (5e-3, 1e-3), (10e-3, 6e-3)):
+        assert np.abs(exact - rms_mode(scenario, step_size=step_size).eigenvalue).min() < most  # [rad/s]
+
+
+def test_without_the_emfs_lead_the_held_voltage_moves_damping_by_points():
+    """Why ``communication_step`` is there; set by hand it goes before the case's own step."""
+    late = rms_mode("gfor", overrides={f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")})
+    assert late.damping_percent - emt_mode("gfor", 0.1).damping_percent > 3.0
+
+
+def test_the_master_tells_the_devices_the_step_it_takes():
+    _, ready = prepare("two_area_rms", "gfor")
+    assert {ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")} == {5e-3}
+    _, ready = prepare("two_area_rms", "gfor", {"sg1.communication_step": 0.0}, step_size=2e-3)
+    assert [ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")] == [0.0, 2e-3, 2e-3]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_steady_state(scenario):
+    case, ready = prepare("two_area_rms", scenario)
+    assert compute_modes(case, ready).operating_point.residual < 1e-12
+
+
+def response(case, scenario):
+    data = run_scenario(*prepare(case, scenario, stop_time=5.0)).dataset
+    return (data["sg1.omega"] - data["sg2.omega"]).values
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_the_response_to_the_load_step_is_that_of_the_emt_models(scenario):
+    """ω_SG1 − ω_SG2: in four seconds the largest difference is below a hundredth of the peak."""
+    found, wanted = response("two_area_rms", scenario), response("two_area", scenario)
+    assert np.abs(wanted).max() > 9e-5
+    assert np.abs(found - wanted).max() < 0.01 * np.abs(wanted).max()
