@@ -28,10 +28,10 @@ def emt_mode(scenario, X_L):
     return compute_modes(*prepare("two_area", scenario, {"grid.X_L": X_L})).electromechanical
 
 
-def rms_mode(scenario, X_L=0.1, overrides=None, step_size=None):
-    return compute_modes(
-        *prepare("two_area_rms", scenario, {"grid.X_L": X_L} | (overrides or {}), step_size=step_size)
-    ).electromechanical
+@cache
+def rms_mode(scenario, X_L=0.1, step_size=5e-3, overrides=()):
+    values = {"grid.X_L": X_L} | dict(overrides)
+    return compute_modes(*prepare("two_area_rms", scenario, values, step_size=step_size)).electromechanical
 
 
 @pytest.mark.parametrize("X_L", [0.05, 0.1])
@@ -62,7 +62,7 @@ def test_at_short_steps_it_is_the_continuous_models(scenario):
 
 def test_without_the_emfs_lead_the_held_voltage_moves_damping_by_points():
     """Why ``communication_step`` is there; set by hand it goes before the case's own step."""
-    late = rms_mode("gfor", overrides={f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")})
+    late = rms_mode("gfor", overrides=tuple((f"{d}.communication_step", 0.0) for d in ("sg1", "sg2", "gfor")))
     assert late.damping_percent - emt_mode("gfor", 0.1).damping_percent > 3.0
 
 
