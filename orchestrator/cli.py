@@ -14,8 +14,9 @@ from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design
+from orchestrator import cli_compare, cli_design, cli_linear_model, cli_ssp
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -26,6 +27,7 @@ from orchestrator.cli_sweep import run as run_points
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.linear_model import read_embedded_model
 from orchestrator.report import tables
 from orchestrator.report.html.page import write_report
 from orchestrator.report.linear_model_files import save_linear_model
@@ -43,6 +45,7 @@ examples:
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
+  gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
@@ -109,6 +112,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PERCENT",
         help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
     )
+    modes.add_argument(
+        "--directional",
+        action="store_true",
+        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
+    )
     modes.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
@@ -130,6 +138,12 @@ def _parser() -> argparse.ArgumentParser:
     linearize.add_argument("--continuous", action="store_true", help="ẋ = A·x + B·u instead of the step map")
     linearize.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
     linearize.set_defaults(command=_linearize)
+
+    ssp = commands.add_parser("export-ssp", help="write a case's scenarios as SSP archives for other tools")
+    _case_arguments(ssp)
+    ssp.add_argument("--stop", type=_seconds, metavar="T", help="stop time [s] (default: the case's)")
+    cli_ssp.add_arguments(ssp)
+    ssp.set_defaults(command=_export_ssp)
 
     vary = commands.add_parser("sweep", help="modes over a grid of parameters, followed from point to point")
     _case_arguments(vary)
@@ -176,12 +190,15 @@ def _parser() -> argparse.ArgumentParser:
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
+    build.add_argument("--native", action="store_true", help="compiled FMUs with no Python in them")
+    build.add_argument("--fmi", choices=("2.0", "3.0"), default="2.0", help="version of FMI (3.0: native only)")
     build.add_argument(
         "--platform",
         action="append",
         choices=sorted(TARGETS),
-        help="compile the kernel for this platform (repeatable; default: this machine's)",
+        help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
+    cli_linear_model.add_arguments(build)
     build.set_defaults(command=_build)
 
     info = commands.add_parser("info", help="show what an FMU declares")
@@ -191,7 +208,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _case_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("case", metavar="CASE", help="a built-in case (two_area) or the path of a case file")
+    parser.add_argument(
+        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+    )
     parser.add_argument(
         "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
     )
@@ -212,6 +231,13 @@ def _case_arguments(parser: argparse.ArgumentParser) -> None:
         help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
     )
     parser.add_argument("--step", type=_seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    parser.add_argument(
+        "--native",
+        dest="set",
+        action="append_const",
+        const=("*.native", True),
+        help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
+    )
 
 
 # -- arguments -----------------------------------------------------------------------------------
@@ -296,7 +322,10 @@ def _modes(options: argparse.Namespace) -> int:
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = _folder(options.out) if options.out else None
-    results = [compute_modes(case, prepared, options.range, options.critical) for prepared in scenarios]
+    results = [
+        compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+        for prepared in scenarios
+    ]
     plots = save_modes(case, results, folder) if folder else []
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
@@ -324,6 +353,10 @@ def _linearize(options: argparse.Namespace) -> int:
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
     return 0
+
+
+def _export_ssp(options: argparse.Namespace) -> int:
+    return cli_ssp.run_export(*_prepare(options), options.out)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -446,6 +479,8 @@ def _progress_bar(console: Console) -> ProgressBar:
 
 
 def _build(options: argparse.Namespace) -> int:
+    if options.fmi != "2.0" and not options.native:
+        raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     models = []
     for name in names:
@@ -456,9 +491,13 @@ def _build(options: argparse.Namespace) -> int:
                 f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
             )
         models.append(build_model(name))
+    extra = cli_linear_model.extra_members(options, [model.name for model in models])
     for model in models:
         platforms = tuple(options.platform) if options.platform else None
-        print(export(model, options.dest, platforms))
+        if options.native:
+            print(export_native(model, options.dest, platforms, options.fmi, extra))
+        else:
+            print(export(model, options.dest, platforms, extra))
     return 0
 
 
@@ -477,6 +516,9 @@ def _info(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
+    embedded = read_embedded_model(options.file)
+    if embedded is not None:
+        console.print(_escape(cli_linear_model.in_words(embedded)), highlight=False)
     for table in tables.fmu_variables(description):
         console.print("", table)
     return 0

@@ -1,7 +1,6 @@
 """A C compiler without a system compiler: ziglang from PyPI, its results kept between runs."""
 
 import hashlib
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -9,15 +8,19 @@ import uuid
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.universal_binary import universal_binary
 
 TARGETS = {
-    # FMI platform -> (zig target, ending of a shared library)
-    "linux64": ("x86_64-linux-gnu.2.17", ".so"),
-    "win64": ("x86_64-windows-gnu", ".dll"),
-    "darwin64": ("x86_64-macos", ".dylib"),
+    # FMI platform -> zig targets of the machines that it stands for
+    "linux64": ("x86_64-linux-gnu.2.17",),
+    "win64": ("x86_64-windows-gnu",),
+    "darwin64": ("x86_64-macos", "aarch64-macos"),
 }
 
-FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-g0")
+ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
+"""Of a shared library."""
+
+FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-g0", "-s")
 """No fast-math and no fused operations: a compiled kernel and its Python fallback agree to rounding."""
 
 
@@ -28,6 +31,8 @@ def host_platform() -> str | None:
 
 def compile_library(source: str, platform: str) -> Path:
     """Compile C source to a shared library, or return what was compiled from it before.
+
+    Where a platform stands for several machines, the library holds code for each (a universal binary).
 
     Parameters
     ----------
@@ -45,32 +50,40 @@ def compile_library(source: str, platform: str) -> Path:
     """
     if platform not in TARGETS:
         raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
-    target, ending = TARGETS[platform]
-    key = hashlib.sha256("\0".join([source, target, *FLAGS]).encode()).hexdigest()[:32]
+    targets, ending = TARGETS[platform], ENDINGS[platform]
+    if len(targets) == 1:
+        return compile_for(source, targets[0], ending)
+    thin = [compile_for(source, target, ending) for target in targets]
+    library = thin[0].with_name(f"{thin[0].stem}_universal{ending}")
+    if not library.exists():
+        _put(universal_binary([path.read_bytes() for path in thin]), library)
+    return library
+
+
+def compile_for(source: str, target: str, ending: str) -> Path:
+    """Compile C source for one zig target; otherwise as `compile_library`."""
+    # Without a name of its own a Mac library would carry the path of the temporary folder.
+    flags = [*FLAGS, "-Wl,-install_name,@rpath/library.dylib"] if target.endswith("macos") else FLAGS
+    key = hashlib.sha256("\0".join([source, target, *flags]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if library.exists():
         return library
     with tempfile.TemporaryDirectory(prefix="gfor_compile_") as folder:
         c_file, built = Path(folder) / "source.c", Path(folder) / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
-        command = [
-            sys.executable,
-            "-m",
-            "ziglang",
-            "cc",
-            "-target",
-            target,
-            *FLAGS,
-            str(c_file),
-            "-o",
-            str(built),
-            "-lm",
-        ]
+        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
+        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
         result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         if result.returncode:
-            raise RuntimeError(f"the C compiler (ziglang) failed for {platform}:\n{result.stderr.strip()}")
-        library.parent.mkdir(parents=True, exist_ok=True)
-        partial = library.with_suffix(f".{uuid.uuid4().hex}.part")
-        shutil.copy(built, partial)
-        partial.replace(library)  # atomic: others, perhaps on other machines, may be compiling the same
+            raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}")
+        _put(built.read_bytes(), library)
     return library
+
+
+def _put(content: bytes, library: Path) -> None:
+    """Write a library at once: others, perhaps on other machines, may be compiling the same."""
+    library.parent.mkdir(parents=True, exist_ok=True)
+    partial = library.with_suffix(f".{uuid.uuid4().hex}.part")
+    partial.write_bytes(content)
+    partial.chmod(0o755)
+    partial.replace(library)

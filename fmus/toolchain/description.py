@@ -6,16 +6,14 @@ each output and derivative depends on, so that a master can order its calls and 
 
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import casadi as ca
-import numpy as np
-
+from fmus.toolchain.dependencies import structure
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
 
 VENDOR = "gfor-cosim"
 
 
-def model_description(model: Model, guid: str, identifier: str, tool: str) -> bytes:
+def model_description(model: Model, guid: str, identifier: str, tool: str, *, native: bool = False) -> bytes:
     """Return the file's text.
 
     Parameters
@@ -24,6 +22,8 @@ def model_description(model: Model, guid: str, identifier: str, tool: str) -> by
         As in the standard; the identifier also names the binaries.
     tool
         Name and version for ``generationTool``. No date is written: equal contents give equal files.
+    native
+        Whether the FMU runs without Python; a native one gives directional derivatives too.
     """
     root = Element(
         "fmiModelDescription",
@@ -39,23 +39,15 @@ def model_description(model: Model, guid: str, identifier: str, tool: str) -> by
         root,
         "CoSimulation",
         modelIdentifier=identifier,
-        needsExecutionTool="true",
+        needsExecutionTool="false" if native else "true",
         canHandleVariableCommunicationStepSize="true",
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
-        providesDirectionalDerivative="false",
+        providesDirectionalDerivative="true" if native else "false",
     )
-    _units(root, model)
-    categories = SubElement(root, "LogCategories")
-    for status in ("Warning", "Discard", "Error", "Fatal"):
-        SubElement(
-            categories,
-            "Category",
-            name=f"logStatus{status}",
-            description=f"Messages with fmi2{status} status",
-        )
-    SubElement(categories, "Category", name="logAll", description="All messages")
+    write_units(root, model)
+    write_log_categories(root, "fmi2")
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
     annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=VENDOR)
     SubElement(annotation, "ContinuousStates", settable="true")
@@ -66,12 +58,23 @@ def model_description(model: Model, guid: str, identifier: str, tool: str) -> by
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _derivative_unit(state: State) -> str:
+def derivative_unit(state: State) -> str:
+    """Unit of a state's time derivative."""
     return f"{state.unit}/s"
 
 
-def _units(root: Element, model: Model) -> None:
-    used = {v.unit for v in model.variables} | {_derivative_unit(s) for s in model.states}
+def write_log_categories(root: Element, prefix: str) -> None:
+    """Declare the categories of messages; the same in both versions of FMI."""
+    categories = SubElement(root, "LogCategories")
+    for status in ("Warning", "Discard", "Error", "Fatal"):
+        description = f"Messages with {prefix}{status} status"
+        SubElement(categories, "Category", name=f"logStatus{status}", description=description)
+    SubElement(categories, "Category", name="logAll", description="All messages")
+
+
+def write_units(root: Element, model: Model) -> None:
+    """Declare every unit in use; the same in both versions of FMI."""
+    used = {v.unit for v in model.variables} | {derivative_unit(s) for s in model.states}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(used):
         element = SubElement(definitions, "Unit", name=unit)
@@ -83,7 +86,7 @@ def _units(root: Element, model: Model) -> None:
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(model.variables):
-        attributes, kind, own = _attributes(variable)
+        attributes, kind, own = attributes_of(variable)
         element = SubElement(
             variables,
             "ScalarVariable",
@@ -108,11 +111,11 @@ def _variables(root: Element, model: Model) -> None:
             variability="continuous",
             initial="calculated",
         )
-        SubElement(element, "Real", unit=_derivative_unit(state), derivative=str(first_state + position + 1))
+        SubElement(element, "Real", unit=derivative_unit(state), derivative=str(first_state + position + 1))
 
 
-def _attributes(variable: Variable) -> tuple[dict[str, str], str, dict[str, str]]:
-    """Causality, variability and initial; the type element's name; and its own attributes."""
+def attributes_of(variable: Variable) -> tuple[dict[str, str], str, dict[str, str]]:
+    """Causality, variability and initial; the type's name in FMI 2.0; and the attributes that the type has."""
     match variable:
         case Parameter(type=kind):
             attributes = {
@@ -146,48 +149,12 @@ def _parameter_type(parameter: Parameter) -> dict[str, str]:
 
 def _structure(root: Element, model: Model) -> None:
     """Outputs and derivatives with what they depend on; initial unknowns with theirs."""
-    np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
-    nx, ny = len(model.states), len(model.outputs)
-    parameters, inputs = np.arange(np_), np_ + nc + np.arange(nu)
-    states = np_ + nc + nu + np.arange(nx)
-    first_output, first_derivative = np_ + nc + nu + nx, np_ + nc + nu + nx + ny
-
-    f, g = model.derivatives, model.outputs_function
-    f_x, f_u, f_p, f_c = (_dependence(f, 0, k) for k in range(4))
-    g_x, g_u, g_p, g_c = (_dependence(g, 0, k) for k in range(4))
-    c_p, x_p = _dependence(model.initialise, 0, 0), _dependence(model.initialise, 1, 0)
-
-    def write(parent: Element, first: int, blocks: list[tuple[np.ndarray, np.ndarray]]) -> None:
-        for row in range(len(blocks[0][0])):
-            known = [str(index + 1) for matrix, indices in blocks for index in indices[matrix[row]]]
-            SubElement(parent, "Unknown", index=str(first + row + 1), dependencies=" ".join(known))
-
-    structure = SubElement(root, "ModelStructure")
-    if ny:
-        write(SubElement(structure, "Outputs"), first_output, [(g_u, inputs), (g_x, states)])
-    if nx:
-        write(SubElement(structure, "Derivatives"), first_derivative, [(f_u, inputs), (f_x, states)])
-    unknowns = SubElement(structure, "InitialUnknowns")
-    write(unknowns, np_, [(c_p, parameters)])
-    write(unknowns, np_ + nc + nu, [(x_p, parameters)])
-    through = [(g_p | _product(g_x, x_p) | _product(g_c, c_p), parameters), (g_u, inputs)]
-    write(unknowns, first_output, through)
-    write(
-        unknowns,
-        first_derivative,
-        [(f_p | _product(f_x, x_p) | _product(f_c, c_p), parameters), (f_u, inputs)],
-    )
-
-
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    product: np.ndarray = (a.astype(int) @ b.astype(int)) > 0
-    return product
-
-
-def _dependence(function: ca.Function, output: int, input_: int) -> np.ndarray:
-    """Which element of an output depends on which element of an input, as a Boolean matrix."""
-    pattern = function.jac_sparsity(output, input_)
-    matrix = np.zeros(pattern.shape, dtype=bool)
-    rows, columns = pattern.get_triplet()
-    matrix[rows, columns] = True
-    return matrix
+    known = structure(model)
+    groups = {"Outputs": known.outputs, "Derivatives": known.derivatives, "InitialUnknowns": known.initial}
+    element = SubElement(root, "ModelStructure")
+    for name, unknowns in groups.items():
+        if unknowns or name == "InitialUnknowns":
+            parent = SubElement(element, name)
+            for unknown in unknowns:
+                dependencies = " ".join(str(reference + 1) for reference in unknown.known)
+                SubElement(parent, "Unknown", index=str(unknown.reference + 1), dependencies=dependencies)

@@ -14,6 +14,7 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 `python_kernel` writes the same functions in Python.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import casadi as ca
@@ -24,9 +25,16 @@ from fmus.toolchain.model import Model
 _C = Path(__file__).with_name("c")
 
 
-def c_source(model: Model) -> str:
-    """The whole C kernel of a model as one translation unit."""
+def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> str:
+    """The whole C kernel of a model as one translation unit.
+
+    Parameters
+    ----------
+    further
+        Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they need.
+    """
     functions = kernel_functions(model)
+    further = dict(further or {})
     sizes = {
         "NP": len(model.parameters),
         "NC": len(model.calculated),
@@ -45,8 +53,12 @@ def c_source(model: Model) -> str:
         sizes["NS"] = len(held)
         tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
-    generator = ca.CodeGenerator(model.name, {"with_header": False, "main": False, "verbose": False})
-    for name, function in functions.items():
+    if further:
+        sizes["NWD"] = max(f.sz_w() for f in further.values())
+    generator = ca.CodeGenerator(
+        model.name, {"with_header": False, "main": False, "verbose": False, "with_export": False}
+    )
+    for name, function in (functions | further).items():
         generator.add(scalar_function(function, f"{name}_code"))
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
     parts = [str(generator.dump()), enumeration, tables]

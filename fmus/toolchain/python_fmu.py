@@ -7,26 +7,29 @@ files, every bundled module needs a name of its own (all Python-backed FMUs of a
 
 import hashlib
 import json
-import uuid
-import zipfile
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import pythonfmu
 
+from fmus.toolchain.archive import guid_of, write_archive
 from fmus.toolchain.cache import cache_directory
-from fmus.toolchain.compiler import FLAGS, TARGETS, compile_library, host_platform
+from fmus.toolchain.compiler import ENDINGS, FLAGS, compile_library, host_platform
 from fmus.toolchain.description import model_description
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.python_kernel import python_source
 
-_NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
-_TIMESTAMP = (2020, 1, 1, 0, 0, 0)
 _SLAVE = Path(__file__).with_name("slave.py")
 
 
-def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = None) -> Path:
+def export(
+    model: Model,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
+    extra: Mapping[str, bytes] | None = None,
+) -> Path:
     """Write ``<model name>.fmu`` into a folder.
 
     Parameters
@@ -38,6 +41,8 @@ def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = 
     platforms
         FMI platforms to compile the kernel for; by default this machine's. Elsewhere the FMU
         evaluates the same equations in pure Python.
+    extra
+        Further members of the archive, by path.
 
     Returns
     -------
@@ -52,12 +57,7 @@ def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = 
     if platforms is None:
         host = host_platform()
         platforms = (host,) if host else ()
-    destination.mkdir(parents=True, exist_ok=True)
-    target = destination / f"{model.name}.fmu"
-    partial = target.with_suffix(f".{uuid.uuid4().hex}.part")
-    _write(model, partial, platforms)
-    partial.replace(target)
-    return target
+    return write_archive(destination / f"{model.name}.fmu", _contents(model, platforms) | dict(extra or {}))
 
 
 def cached(model: Model) -> Path:
@@ -80,7 +80,7 @@ class _Sources:
         exporter = Path(__file__).read_text(encoding="utf-8")
         data = json.dumps(_slave_data(model))
         self.digest = _digest(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
-        self.guid = "{" + str(uuid.uuid5(_NAMESPACE, self.digest)) + "}"
+        self.guid = guid_of(self.digest)
 
 
 def _digest(*texts: str) -> str:
@@ -91,7 +91,7 @@ def _digest(*texts: str) -> str:
     return hasher.hexdigest()
 
 
-def _write(model: Model, target: Path, platforms: tuple[str, ...]) -> None:
+def _contents(model: Model, platforms: tuple[str, ...]) -> dict[str, bytes]:
     sources = _Sources(model)
     tag = sources.digest[:16]
     kernel_module = f"gfor_cosim_kernel_{tag}"
@@ -107,18 +107,13 @@ def _write(model: Model, target: Path, platforms: tuple[str, ...]) -> None:
     }
     for platform in platforms:
         library = compile_library(sources.c, platform)
-        contents[f"resources/kernel/{platform}/kernel{TARGETS[platform][1]}"] = library.read_bytes()
+        contents[f"resources/kernel/{platform}/kernel{ENDINGS[platform]}"] = library.read_bytes()
     package = Path(pythonfmu.__file__).parent
     for file in sorted(package.glob("*.py")):
         contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
     for binary in sorted((package / "resources" / "binaries").rglob("*.*")):
         contents[f"binaries/{binary.parent.name}/{model.name}{binary.suffix}"] = binary.read_bytes()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in contents.items():
-            entry = zipfile.ZipInfo(name, _TIMESTAMP)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content)
+    return contents
 
 
 def _slave_data(model: Model) -> dict[str, object]:

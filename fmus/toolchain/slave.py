@@ -28,6 +28,7 @@ LIBRARIES = {
     ("linux", "x86_64"): "linux64/kernel.so",
     ("win32", "amd64"): "win64/kernel.dll",
     ("darwin", "x86_64"): "darwin64/kernel.dylib",
+    ("darwin", "arm64"): "darwin64/kernel.dylib",
 }
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
+from orchestrator.cases.native import sets_native
 from orchestrator.cases.schema import Value
 from orchestrator.cases.unit_tables import sets_alpha
 from orchestrator.cases.values import convert, flatten
@@ -45,8 +46,10 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""
     if draft.case.units is not None and sets_alpha(key):
         return  # done before the units were made
+    if sets_native(key):
+        key = f"{key.partition('.')[0]}."  # done when the components were added; the name is still checked
     pattern, _, variable = key.partition(".")
-    for name in fnmatch.filter(draft.tables, pattern):
+    for name in fnmatch.filter(draft.tables, pattern) if variable else ():
         _assign(draft, name, variable, value, where)
     if not fnmatch.filter(draft.known, pattern):
         some = ", ".join([*draft.case.components][:12])

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
+from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.draft import Draft, Place
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.layers import value_layers
+from orchestrator.cases.native import is_native
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.power_flow import PowerFlow
@@ -65,10 +67,11 @@ def _takes_network(table: ComponentTable) -> bool:
 
 
 @cache
-def catalogue_fmu(model: str, network: Network | None = None) -> FmuDescription:
+def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
     """FMU of a model of the catalogue, built once a machine."""
     arguments = {"network": network} if network is not None else {}
-    return read_description(cached(build_model(model, **arguments)))
+    build = cached_native if native else cached
+    return read_description(build(build_model(model, **arguments)))
 
 
 class Preparer:
@@ -199,13 +202,13 @@ class Preparer:
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
             return
         try:
-            self.draft.system.add(name, self._description(table))
+            self.draft.system.add(name, self._description(table, is_native(self.draft, name, table)))
         except InputError as error:
             self.draft.note(where, str(error))
         except KeyError as error:
             self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))
 
-    def _description(self, table: ComponentTable) -> FmuDescription:
+    def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
         if table.fmu is not None:
             return read_description(self.draft.directory / table.fmu)
         own = _takes_network(table)
@@ -213,7 +216,7 @@ class Preparer:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
-        return catalogue_fmu(table.model or "", self.draft.network if own else None)
+        return catalogue_fmu(table.model or "", self.draft.network if own else None, native)
 
     # -- operating point -------------------------------------------------------------------------
 
@@ -244,9 +247,9 @@ class Preparer:
             return None
 
     def _recorded(self) -> tuple[str, ...]:
-        """All outputs that fit one of the file's patterns."""
-        components = self.draft.system.components
-        outputs = [f"{n}.{v}" for n, plan in components.items() for v in plan.description.outputs]
+        """All Real outputs that fit one of the file's patterns."""
+        plans = {name: plan.description for name, plan in self.draft.system.components.items()}
+        outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
         wanted = {name for pattern in self.draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
         return tuple(name for name in outputs if name in wanted)
 

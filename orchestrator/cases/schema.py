@@ -48,6 +48,7 @@ class ComponentTable(Table):
     model: str | None = None
     fmu: str | None = None
     bus: str | None = None
+    native: bool = False
     parameters: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
 

@@ -7,6 +7,9 @@
 #else
 #define EXPORT __attribute__((visibility("default")))
 #endif
+#ifndef KERNEL /* a native FMU keeps these functions to itself */
+#define KERNEL EXPORT
+#endif
 enum { C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
 
 static void rates(const double *z, const double *x, double *rate) {
@@ -16,23 +19,23 @@ static void rates(const double *z, const double *x, double *rate) {
     derivatives_code(arg, res, 0, w, 0);
 }
 
-EXPORT void initialise(double *z) {
+KERNEL void initialise(double *z) {
     double w[NW];
     const double *arg[] = {z};
     double *res[] = {z + C, z + X};
     initialise_code(arg, res, 0, w, 0);
 }
 
-EXPORT void outputs(double *z) {
+KERNEL void outputs(double *z) {
     double w[NW];
     const double *arg[] = {z + X, z + U, z, z + C};
     double *res[] = {z + Y};
     outputs_code(arg, res, 0, w, 0);
 }
 
-EXPORT void derivatives(double *z) { rates(z, z + X, z + DX); }
+KERNEL void derivatives(double *z) { rates(z, z + X, z + DX); }
 
-EXPORT void requirements(const double *z, double *r) {
+KERNEL void requirements(const double *z, double *r) {
     double w[NW];
     const double *arg[] = {z, z + C};
     double *res[] = {r};

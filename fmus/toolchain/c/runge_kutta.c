@@ -1,12 +1,12 @@
 /* Classical Runge-Kutta of order 4; no workspace. The NS stepwise states (indices STEPWISE, generated above) are held
    until the end of the communication step and then move by their rate at its beginning. */
-EXPORT int workspace_size(void) { return 0; }
+KERNEL int workspace_size(void) { return 0; }
 
 static void hold(double *rate) {
     for (int i = 0; i < NS; ++i) rate[STEPWISE[i]] = 0;
 }
 
-EXPORT int advance(double *z, double h, int n, double *workspace) {
+KERNEL int advance(double *z, double h, int n, double *workspace) {
     (void)workspace;
     double k1[NX], k2[NX], k3[NX], k4[NX], t[NX], *x = z + X, moved[NS + 1];
     if (NS) {

@@ -6,7 +6,7 @@
 enum { KEY = 0, LU = KEY + 1 + U, INV = LU + NLU, K1 = INV + NX, K2 = K1 + NX, T = K2 + NX, V = T + NX, SIZE = V + NX };
 static const double G = 0.29289321881345254;
 
-EXPORT int workspace_size(void) { return SIZE; }
+KERNEL int workspace_size(void) { return SIZE; }
 
 static void factorise(const double *z, double gh, double *w) {
     double m[NM], cw[NW], *lu = w + LU, *inv = w + INV, *row = w + V;
@@ -43,7 +43,7 @@ static void solve(const double *b, double *k, double *w) {
     }
 }
 
-EXPORT int advance(double *z, double h, int n, double *w) {
+KERNEL int advance(double *z, double h, int n, double *w) {
     double *x = z + X, *k1 = w + K1, *k2 = w + K2, *t = w + T;
     if (w[KEY] != h || memcmp(w + KEY + 1, z, U * sizeof(double))) {
         factorise(z, G * h, w);

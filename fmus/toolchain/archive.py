@@ -1,0 +1,38 @@
+"""The zip archive of an FMU or SSP, the same bytes for the same contents."""
+
+import uuid
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
+"""Of the guids: each is the uuid5 of everything that the FMU is made from."""
+
+_TIMESTAMP = (2020, 1, 1, 0, 0, 0)
+
+
+def guid_of(digest: str) -> str:
+    """The guid of an FMU whose contents have this hash."""
+    return "{" + str(uuid.uuid5(NAMESPACE, digest)) + "}"
+
+
+def write_archive(target: Path, contents: Mapping[str, bytes]) -> Path:
+    """Write an FMU; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    target
+        The .fmu file; its folder is created where missing.
+    contents
+        By path inside the archive.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial = target.with_suffix(f".{uuid.uuid4().hex}.part")
+    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _TIMESTAMP)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)
+    partial.replace(target)
+    return target

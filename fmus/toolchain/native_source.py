@@ -1,0 +1,108 @@
+"""The C source of a native FMU: kernel, exact derivatives, what the instance knows of its model, and FMI around it.
+
+One translation unit per version of FMI, with nothing in it but the C library.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import casadi as ca
+
+from fmus.toolchain.kernel import c_source
+from fmus.toolchain.model import Model
+
+FmiVersion = Literal["2.0", "3.0"]
+
+_C = Path(__file__).with_name("c")
+_SHORTEST_TEXT = 640
+"""Room for a message [bytes] beside the longest rule or name it may quote."""
+
+
+def native_source(model: Model, version: FmiVersion, guid: str, digest: str) -> str:
+    """Source of the FMU's binary.
+
+    Parameters
+    ----------
+    guid, digest
+        The FMU's identity; the digest [hex] also marks the states that it saves.
+    """
+    parts = [
+        "#define KERNEL static",
+        c_source(model, derivative_functions(model)),
+        _data(model, guid, digest),
+        (_C / "instance.c").read_text(encoding="utf-8"),
+        (_C / f"fmi{version[0]}.c").read_text(encoding="utf-8"),
+    ]
+    return "\n".join(parts)
+
+
+def derivative_functions(model: Model) -> dict[str, ca.Function]:
+    """Products of the exact Jacobians with a direction, and of their transposes with a seed.
+
+    ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
+    initialisation (c, x) by p.
+    """
+    x, u, p, c = (
+        ca.SX.sym(name, len(group))
+        for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
+    )
+    known = [x, u, p, c]
+    follows = [model.derivatives(*known), model.outputs_function(*known)]
+    start = list(model.initialise.call([p]))
+    return {
+        "direction": _direction("direction", known, follows),
+        "adjoint": _adjoint("adjoint", known, follows),
+        "start_direction": _direction("start_direction", [p], start),
+        "start_adjoint": _adjoint("start_adjoint", [p], start),
+    }
+
+
+def _direction(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function:
+    directions = [ca.SX.sym("d", symbol.shape) for symbol in known]
+    point, along = ca.vertcat(*known), ca.vertcat(*directions)
+    return ca.Function(name, [*known, *directions], [ca.jtimes(value, point, along) for value in follows])
+
+
+def _adjoint(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function:
+    seeds = [ca.SX.sym("a", value.shape) for value in follows]
+    point = ca.vertcat(*known)
+    total = ca.jtimes(ca.vertcat(*follows), point, ca.vertcat(*seeds), True)
+    edges = [0]
+    for symbol in known:
+        edges.append(edges[-1] + symbol.numel())
+    return ca.Function(name, [*known, *seeds], ca.vertsplit(total, edges))
+
+
+def _data(model: Model, guid: str, digest: str) -> str:
+    """What the instance knows of its model, as C declarations."""
+    parameters, rules = model.parameters, model.requirement_texts
+    texts = [*rules, *model.value_references]
+    start = [p.start for p in parameters] + [u.start for u in model.inputs]
+    rows = [
+        f"{{{p.type.upper()}, {_number(p.minimum, '-INFINITY')}, {_number(p.maximum, 'INFINITY')}, {int(p.tunable)}}}"
+        for p in parameters
+    ]
+    lines = [
+        f"enum {{ NR = {len(rules)}, TEXT = {_SHORTEST_TEXT + max(len(t.encode()) for t in texts)}, "
+        f"INTERNAL_STEP = {model.value_references['internal_step']} }};",
+        "enum kind { REAL, INTEGER, BOOLEAN };",
+        'static const char *const KIND[] = {"Real", "Integer", "Boolean"};',
+        "struct parameter { int kind; double minimum, maximum; int tunable; };",
+        f"static const char GUID[] = {_string(guid)};",
+        f"static const unsigned char IDENTITY[16] = {{{', '.join(str(b) for b in bytes.fromhex(digest)[:16])}}};",
+        f"static const char *const NAME[] = {{{', '.join(map(_string, model.value_references))}}};",
+        f"static const double START[] = {{{', '.join(map(_number, start))}}};",
+        f"static const struct parameter PARAMETER[] = {{{', '.join(rows)}}};",
+        f"static const char *const RULE[] = {{{', '.join(map(_string, rules)) or '0'}}};",
+    ]
+    return "\n".join(lines)
+
+
+def _number(value: float | None, missing: str = "0") -> str:
+    return missing if value is None else repr(float(value))
+
+
+def _string(text: str) -> str:
+    """A C string literal; octal escapes, because a hexadecimal one would swallow digits after it."""
+    plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
+    return f'"{plain}"'
