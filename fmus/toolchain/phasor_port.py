@@ -35,7 +35,7 @@ class SourceEmf:
 
 
 def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
-    """Declare the communication step and return the emf in the middle of the steps before and after.
+    """Declare what is to be known of the master; return the emf in the middle of the step done and of that to come.
 
     A master holds the bus voltage during a step, so that it is half a step old on average. With the emfs of the middle
     of the coming step the network's voltages are those of the middle. The emf turns with its frame, and its components
@@ -55,6 +55,17 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
         "Communication step of the master: emf and admittance are given for the middle of the step to come; 0: for now",
         minimum=0.0,
         maximum=0.1,
+        tunable=True,
+    )
+    late = m.parameter(
+        "steps_late",
+        0,
+        "1",
+        "Steps by which the bus voltage comes late: 0 where the master steps devices and then the grid; Jacobi: 1",
+        minimum=0,
+        maximum=2,
+        tunable=True,
+        type="Integer",
     )
     moving = []
     with m.scope("source"):
@@ -62,9 +73,12 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
             slow = m.state(name, initial, "pu", f"Emf through a lag, {name[-1]} component", base="S_n")
             moving.append((now - slow) / DERIVATIVE_LAG)
             m.derivative(slow, moving[-1])
-    change = Phasor(moving[0], -moving[1]) * (step / 2)
-    turn = rate * (step / 2)
-    return SourceEmf((emf - change).rotated(angle - turn), (emf + change).rotated(angle + turn))
+    change = Phasor(moving[0], -moving[1])
+
+    def moved(time: ca.SX) -> Phasor:
+        return (emf + change * time).rotated(angle + rate * time)
+
+    return SourceEmf(behind=moved(-step / 2), ahead=moved((late + 0.5) * step))
 
 
 def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor) -> None:

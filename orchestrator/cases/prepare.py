@@ -26,6 +26,7 @@ from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.system import System
+from orchestrator.coupling.told_step import tell_step
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
 
@@ -55,10 +56,6 @@ class PreparedScenario:
     events: tuple[Event, ...]
     power_flow: PowerFlow | None
     values: dict[str, float | bool]
-
-
-_STEP_PARAMETER = "communication_step"
-"""A component with this parameter is told the communication step, unless the case sets it."""
 
 
 def _takes_network(table: ComponentTable) -> bool:
@@ -118,7 +115,8 @@ class Preparer:
         check_inputs(draft)
         flow = None if draft.problems else self._power_flow()
         clock = self._clock(step_size)
-        self._tell_step(clock)
+        if clock is not None:
+            tell_step(draft.system, clock.step_size)
         stop = stop_time if stop_time is not None else draft.case.solver.stop_time
         events = scenario_events(draft, clock, stop)
         schedule = self._schedule()
@@ -261,13 +259,6 @@ class Preparer:
         except InputError as error:
             self.draft.note("--step", str(error))
             return None
-
-    def _tell_step(self, clock: Clock | None) -> None:
-        """Give the communication step to the components that want to know it."""
-        for plan in self.draft.system.components.values():
-            info = plan.description.variables.get(_STEP_PARAMETER)
-            if clock is not None and info is not None and info.causality == "parameter":
-                plan.parameters.setdefault(_STEP_PARAMETER, clock.step_size)
 
     def _schedule(self) -> Schedule:
         """The case's schedule, checked against its components."""

@@ -1,12 +1,15 @@
 """The two-area study with phasor models at milliseconds, against the EMT models at 100 µs."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.coupling.schedule import jacobi
+from orchestrator.coupling.told_step import as_if_told
+from orchestrator.study.modes import compute_modes, running
 from orchestrator.study.run import run_scenario
 from tests.support.exact import exact_continuous
 
@@ -64,6 +67,37 @@ def test_without_the_emfs_lead_the_held_voltage_moves_damping_by_points():
     """Why ``communication_step`` is there; set by hand it goes before the case's own step."""
     late = rms_mode("gfor", overrides=tuple((f"{d}.communication_step", 0.0) for d in ("sg1", "sg2", "gfor")))
     assert late.damping_percent - emt_mode("gfor", 0.1).damping_percent > 3.0
+
+
+@pytest.mark.parametrize("scenario", ["base", "pod_pq"])
+def test_a_jacobi_master_needs_the_emf_a_step_further_ahead(scenario):
+    """What many other masters do; without ``steps_late`` they would find another system."""
+    devices = ("sg1", "sg2") if scenario == "base" else ("sg1", "sg2", "gfor")
+    wanted = emt_mode(scenario, 0.1)
+    found = []
+    for late in (1, 0):
+        case, ready = prepare("two_area_rms", scenario, {f"{d}.steps_late": late for d in devices})
+        side_by_side = replace(ready, schedule=jacobi(tuple(ready.system.components)))
+        found.append(compute_modes(case, side_by_side).electromechanical)
+    assert found[0].frequency_hz == pytest.approx(wanted.frequency_hz, abs=HERTZ)
+    assert found[0].damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
+    assert abs(found[1].damping_percent - wanted.damping_percent) > 5 * POINTS
+
+
+def test_a_shift_is_that_of_devices_which_know_the_step():
+    """The table of a run takes other steps than the run's own; the devices are told those, and the run's again."""
+    case, ready = prepare("two_area_rms", "gfor", stop_time=0.01)
+    shifts = {s.step_size: s.shift for s in run_scenario(case, ready).shifts if s.schedule == "gauss-seidel"}
+    assert list(shifts) == [2.5e-3, 5e-3, 10e-3, 25e-3]
+    assert shifts[2.5e-3] < shifts[5e-3] < 1e-3
+    at_ten = rms_mode("gfor", step_size=10e-3).eigenvalue
+    continuous = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}
+    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", continuous)[1])[0])
+    assert shifts[10e-3] == pytest.approx(np.abs(exact - at_ten).min(), rel=1e-3)
+    with running(ready) as master:
+        with as_if_told(master, 1e-3):
+            assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 1e-3}
+        assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 5e-3}
 
 
 def test_the_master_tells_the_devices_the_step_it_takes():
