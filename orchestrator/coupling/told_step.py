@@ -24,17 +24,19 @@ def as_if_told(master: Master, step_size: float) -> Iterator[None]:
 
     Those whose parameter was set to something else, or cannot be changed any more, keep it.
     """
-    own = master.clock.step_size
-    told = [
-        master.components[name]
-        for name, plan in master.system.components.items()
-        if plan.parameters.get(STEP_PARAMETER) == own
-        and plan.description.variables[STEP_PARAMETER].variability == "tunable"
-    ]
+    told = [(component, told_parameters(master, name)) for name, component in master.components.items()]
     try:
-        for component in told:
-            component.set({STEP_PARAMETER: step_size})
+        for component, parameters in told:
+            component.set(dict.fromkeys(parameters, step_size))
         yield
     finally:
-        for component in told:
-            component.set({STEP_PARAMETER: own})
+        for component, parameters in told:
+            component.set(dict.fromkeys(parameters, master.clock.step_size))
+
+
+def told_parameters(master: Master, name: str) -> tuple[str, ...]:
+    """Parameters by which a component was told the master's step, and may be told another."""
+    plan = master.system.components[name]
+    if plan.parameters.get(STEP_PARAMETER) != master.clock.step_size:
+        return ()
+    return (STEP_PARAMETER,) if plan.description.variables[STEP_PARAMETER].variability == "tunable" else ()

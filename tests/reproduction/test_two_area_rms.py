@@ -9,6 +9,8 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.told_step import as_if_told
+from orchestrator.study.component_model import component_model
+from orchestrator.study.linear import linear_model
 from orchestrator.study.modes import compute_modes, running
 from orchestrator.study.run import run_scenario
 from tests.support.exact import exact_continuous
@@ -98,6 +100,20 @@ def test_a_shift_is_that_of_devices_which_know_the_step():
         with as_if_told(master, 1e-3):
             assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 1e-3}
         assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 5e-3}
+
+
+def test_a_continuous_model_is_that_of_emfs_without_a_lead():
+    model, _ = linear_model(
+        prepare("two_area_rms", "gfor")[1], ["grid.load_2.scale"], ["sg1.omega"], as_continuous=True
+    )
+    devices = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}
+    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", devices)[1])[0])
+    mode = rms_mode("gfor").eigenvalue
+    found, wanted = (values[np.argmin(np.abs(values - mode))] for values in (np.linalg.eigvals(model.A), exact))
+    assert abs(found - wanted) < 1e-6
+    embedded = component_model("two_area_rms", prepare("two_area_rms", "gfor")[1], "gfor")
+    assert "communication_step" not in embedded.parameters
+    assert embedded.D[list(embedded.outputs).index("e_re")] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_the_master_tells_the_devices_the_step_it_takes():
