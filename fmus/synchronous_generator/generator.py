@@ -1,5 +1,7 @@
 """Machine, exciter and governor put together; one model for each excitation system."""
 
+import casadi as ca
+
 from fmus.synchronous_generator.data import (
     IEEE118,
     IEEEG1_NTS631,
@@ -11,7 +13,7 @@ from fmus.synchronous_generator.data import (
 )
 from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
 from fmus.synchronous_generator.governors import ieeeg1
-from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_voltage
+from fmus.synchronous_generator.machine import Machine, declare_machine, machine_equations, terminal_voltage
 from fmus.toolchain.model import Model, ModelBuilder
 from fmus.toolchain.port import declare_port_outputs, device_port
 
@@ -43,10 +45,15 @@ def _generator(name: str, exciter: Exciter, data: MachineData, governor: Governo
     machine_equations(m, machine, port, E_fd, P_m)
 
     declare_port_outputs(m, port, machine.current.rotated(machine.delta))
+    declare_generator_outputs(m, machine, v_t, E_fd, P_m)
+    return m.build()
+
+
+def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_fd: ca.SX, P_m: ca.SX) -> None:
+    """Declare what a generator shows beside its port."""
     m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
     m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
     m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")
     m.output("E_fd", E_fd, "pu", "Field voltage; 1 gives 1 pu on open circuit", base="E_fd")
     m.output("P_m", P_m, "pu", "Mechanical power", base="S_n")
     m.output("T_e", machine.torque, "pu", "Electrical torque", base="S_n")
-    return m.build()
