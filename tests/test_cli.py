@@ -69,13 +69,29 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
         "report",
         "build",
         "info",
+        "bind",
+        "check",
     }
     assert {line.split()[1] for line in lines} <= known
 
 
 @pytest.mark.parametrize(
     "command",
-    ["export-ssp", "run", "modes", "linearize", "sweep", "design", "compare", "identify", "report", "build", "info"],
+    [
+        "export-ssp",
+        "run",
+        "modes",
+        "linearize",
+        "sweep",
+        "design",
+        "compare",
+        "identify",
+        "report",
+        "build",
+        "info",
+        "bind",
+        "check",
+    ],
 )
 def test_every_command_has_help(gfor, command):
     code, out, _ = gfor(command, "--help")
