@@ -16,12 +16,11 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design, cli_interop, cli_linear_model, cli_ssp
+from orchestrator import cli_compare, cli_design, cli_interop, cli_linear_model, cli_ssp, cli_vendor
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cases.units import to_unit
 from orchestrator.cli_sweep import INTERRUPTED, choose_executor, present
 from orchestrator.cli_sweep import run as run_points
 from orchestrator.coupling.progress import Progress
@@ -37,6 +36,7 @@ from orchestrator.study.modes import ModesResult, compute_modes, modes_json
 from orchestrator.study.run import RunResult, run_scenario
 from orchestrator.study.sweep import plan_sweep
 from orchestrator.study.sweep_axes import Vary, parse_vary
+from orchestrator.units import to_unit
 
 EXAMPLES = """\
 examples:
@@ -54,6 +54,8 @@ examples:
   gfor which-master --build probes               two FMUs that tell which schedule a tool runs
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
+  gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
+  gfor check vendor.fmu --binding vendor.toml    whether it can be trusted in a co-simulation
 """
 
 
@@ -207,6 +209,7 @@ def _parser() -> argparse.ArgumentParser:
     which = commands.add_parser("which-master", help="which schedule another tool runs, told by a pair of probe FMUs")
     cli_interop.add_which_master(which, sorted(TARGETS))
     which.set_defaults(command=_which_master)
+    cli_vendor.add_commands(commands)
 
     info = commands.add_parser("info", help="show what an FMU declares")
     info.add_argument("file", type=Path, metavar="FILE.fmu")

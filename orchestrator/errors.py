@@ -20,6 +20,14 @@ class FmuFileError(InputError):
     """A file is not an FMU that can be loaded here."""
 
 
+class HostileFmuError(FmuFileError):
+    """A file is made so that unpacking or reading it would do harm; ``kind`` says how."""
+
+    def __init__(self, message: str, kind: str = "hostile archive") -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """One mistake in a case: its place, and what is wrong with the remedy."""
@@ -38,6 +46,10 @@ class CaseError(InputError):
         self.problems = tuple(problems)
         count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
         super().__init__(f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems))
+
+
+class BindingError(CaseError):
+    """A binding cannot be used; all its mistakes are listed together."""
 
 
 class ComponentError(CosimError):

@@ -70,6 +70,8 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
         "report",
         "build",
         "info",
+        "bind",
+        "check",
     }
     assert {line.split()[1] for line in lines} <= known
 
@@ -89,6 +91,8 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
         "build",
         "info",
         "which-master",
+        "bind",
+        "check",
     ],
 )
 def test_every_command_has_help(gfor, command):

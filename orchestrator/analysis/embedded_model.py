@@ -7,6 +7,7 @@ the running FMU before it is used.
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
+from orchestrator.fmi.port import BoundDescription
 
 _TOLERANCE = 1e-6
 """Largest difference of a variable from the model's operating point, relative to max(1, |value|)."""
@@ -14,7 +15,10 @@ _TOLERANCE = 1e-6
 
 def embedded_model(component: Component) -> EmbeddedModel | None:
     """The model to use for a component; None where it is better perturbed, or has none."""
-    return None if component.description.states_are_settable else read_embedded_model(component.description.path)
+    description = component.description
+    if description.states_are_settable or isinstance(description, BoundDescription):  # it speaks of other variables
+        return None
+    return read_embedded_model(description.path)
 
 
 def check_operating_point(component: Component, model: EmbeddedModel) -> None:

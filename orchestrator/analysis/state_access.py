@@ -14,7 +14,8 @@ def obstacle(component: Component) -> str | None:
             f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
             "so it cannot be perturbed and put back; ask for an export that can"
         )
-    if description.states and not description.states_are_settable and embedded_model(component) is None:
+    # An FMU may also hide its states: taken for one without any, it would give wrong modes.
+    if not description.states_are_settable and embedded_model(component) is None:
         return (
             f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
             "linearisation by perturbation needs, and has no linear model inside; our FMUs declare the one under "

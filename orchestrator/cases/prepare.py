@@ -29,6 +29,7 @@ from orchestrator.coupling.system import System
 from orchestrator.coupling.told_step import tell_step
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.vendor.binding import bound_fmu
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,12 @@ class Preparer:
         if (table.model is None) == (table.fmu is None):
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
             return
+        if table.binding is not None and table.fmu is None:
+            self.draft.note(where, "'binding' is for an FMU of others; give its path as 'fmu', or remove 'binding'")
+            return
         try:
-            self.draft.system.add(name, self._description(table, is_native(self.draft, name, table)))
+            description = self._description(table, is_native(self.draft, name, table))
+            self.draft.system.add(name, description, isolated=table.isolated)
         except InputError as error:
             self.draft.note(where, str(error))
         except KeyError as error:
@@ -208,7 +213,8 @@ class Preparer:
 
     def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
         if table.fmu is not None:
-            return read_description(self.draft.directory / table.fmu)
+            directory = self.draft.directory
+            return bound_fmu(directory / table.fmu, directory / table.binding if table.binding else None)
         own = _takes_network(table)
         if own and self.draft.network is None:
             raise InputError(

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from orchestrator.cases.units import to_unit
+from orchestrator.units import to_unit
 
 Value = bool | float | str
 
@@ -43,10 +43,12 @@ class SolverTable(Table):
 
 
 class ComponentTable(Table):
-    """An FMU file, or a model of the catalogue, with its values."""
+    """An FMU file, behind a binding or not, or a model of the catalogue, with its values."""
 
     model: str | None = None
     fmu: str | None = None
+    binding: str | None = None
+    isolated: bool | None = None
     bus: str | None = None
     native: bool = False
     parameters: dict[str, Any] = {}

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.cases.schema import Value
-from orchestrator.cases.units import to_unit
 from orchestrator.fmi.description import VariableInfo
+from orchestrator.units import to_unit
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:

@@ -8,7 +8,6 @@ from time import perf_counter
 from types import TracebackType
 from typing import Self
 
-import fmpy
 import numpy as np
 
 from orchestrator.coupling.clock import Clock
@@ -19,7 +18,9 @@ from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
 from orchestrator.coupling.system import Endpoint, System
 from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.instance import open_component
 
 _INITIAL_PASSES = 20
 _LONGEST_STRETCH = 1000
@@ -85,9 +86,10 @@ class Master:
         for name, plan in self.system.components.items():
             path = plan.description.path
             if path not in folders:
-                folders[path] = Path(fmpy.extract(str(path)))
+                folders[path] = extract(path)
                 self._release.callback(rmtree, folders[path], ignore_errors=True)
-            component = self._release.enter_context(Component(name, plan.description, folders[path]))
+            component = open_component(name, plan.description, folders[path], isolated=plan.isolated)
+            self._release.enter_context(component)
             self.components[name] = component
             component.set(plan.parameters)
             component.setup(0.0, stop_time)

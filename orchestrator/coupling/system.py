@@ -28,11 +28,12 @@ class Connection:
 
 @dataclass
 class ComponentPlan:
-    """An FMU and the values it is given before initialisation."""
+    """An FMU and the values it is given before initialisation; ``isolated`` as in `open_component`."""
 
     description: FmuDescription
     parameters: dict[str, float | bool] = field(default_factory=dict)
     inputs: dict[str, float] = field(default_factory=dict)
+    isolated: bool | None = None
 
 
 class System:
@@ -48,8 +49,15 @@ class System:
         description: FmuDescription,
         parameters: Mapping[str, float | bool] | None = None,
         inputs: Mapping[str, float] | None = None,
+        *,
+        isolated: bool | None = None,
     ) -> None:
         """Add a component; ``inputs`` are constants for inputs that nothing feeds.
+
+        Parameters
+        ----------
+        isolated
+            Whether it runs in a process of its own; by default all but our own FMUs do.
 
         Raises
         ------
@@ -58,7 +66,7 @@ class System:
         """
         if name in self.components:
             raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
-        self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}))
+        self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}), isolated)
 
     def connect(self, source: str, target: str) -> None:
         """Connect an output to an input, both written ``component.variable``.

@@ -2,14 +2,15 @@
 
 import ctypes
 import itertools
+import os
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 from weakref import WeakValueDictionary
+from xml.etree import ElementTree
 
-import fmpy
 import numpy as np
 from fmpy import calloc, free
 from fmpy.fmi1 import FMICallException
@@ -23,6 +24,7 @@ from fmpy.fmi2 import (
 from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.description import FmuDescription
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
@@ -34,12 +36,50 @@ try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing o
 except (ImportError, OSError):
     fmpy_logging = None
 
-_message_lists: WeakValueDictionary[int, "_Messages"] = WeakValueDictionary()
-_next_environment = itertools.count(1)
-
 
 class _Messages(list[tuple[int, str]]):
     """The newest messages of one component, as (status, text)."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.streak, self.step = 0, 0
+
+
+FLOODED = 97
+"""Exit code of a process whose FMU logs without end."""
+
+_guard: Callable[[_Messages], None] | None = None
+
+
+def on_message(
+    most: int, steps: Callable[[], int], keep: Callable[[list[tuple[int, str]]], None] | None = None
+) -> None:
+    """Watch what FMUs log in this process, and end it if one logs without end; for processes of foreign FMUs.
+
+    Parameters
+    ----------
+    most
+        Messages in one step.
+    steps
+        Tells how many steps were begun.
+    keep
+        Given the newest messages of an FMU whenever there is another one.
+    """
+
+    def guard(messages: _Messages) -> None:
+        if messages.step != (now := steps()):
+            messages.step, messages.streak = now, 0
+        messages.streak += 1
+        if keep is not None and messages.streak < _LOG_LENGTH:
+            keep(messages)
+        if messages.streak > most:
+            os._exit(FLOODED)
+
+    globals()["_guard"] = guard
+
+
+_message_lists: WeakValueDictionary[int, "_Messages"] = WeakValueDictionary()
+_next_environment = itertools.count(1)
 
 
 def _receive(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
@@ -47,6 +87,8 @@ def _receive(environment: int | None, _instance: bytes, status: int, _category: 
     if messages is not None:
         messages.append((status, (message or b"").decode("utf-8", "replace")))
         del messages[:-_LOG_LENGTH]
+        if _guard is not None:
+            _guard(messages)
 
 
 _receive_pointer = fmi2CallbackLoggerTYPE(_receive)
@@ -126,7 +168,7 @@ class Component:
         self.name = name
         self.description = description
         self._messages = _Messages()
-        self._own_directory = None if directory else Path(fmpy.extract(str(description.path)))
+        self._own_directory = None if directory else extract(description.path)
         self._callbacks = _callbacks(self._messages)
         self._fmu: Any = None
         self._initialised = False
@@ -149,7 +191,7 @@ class Component:
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
-        if self.description.guid not in (directory / "modelDescription.xml").read_text(encoding="utf-8"):
+        if self.description.guid not in (ElementTree.parse(directory / MODEL_DESCRIPTION).getroot().get("guid") or ""):
             raise InputError(f"the guid {self.description.guid} is not that of the FMU; read its description again")
 
     def _bind_functions(self) -> None:
@@ -201,6 +243,11 @@ class Component:
     def step(self, time: float, step_size: float) -> None:
         """One communication step [s]."""
         self.check(self.do_step(self.pointer, time, step_size, 1), "fmi2DoStep", time)
+
+    def reset(self) -> None:
+        """Back to where it was after instantiation."""
+        self._call("fmi2Reset", self._fmu.reset)
+        self._initialised = False
 
     def close(self) -> None:
         """Terminate and free the instance, and remove what was extracted for it."""
@@ -307,3 +354,11 @@ class Component:
 
     def free_state(self, state: Any) -> None:
         self._call("fmi2FreeFMUstate", self._fmu.freeFMUState, state)
+
+    def serialize_state(self, state: Any) -> bytes:
+        """A saved state as bytes."""
+        return bytes(self._call("fmi2SerializeFMUstate", self._fmu.serializeFMUState, state))
+
+    def deserialize_state(self, content: bytes) -> Any:
+        """A handle to a state made from bytes; give it to `restore_state`, then to `free_state`."""
+        return self._call("fmi2DeSerializeFMUstate", self._fmu.deSerializeFMUstate, content)

@@ -1,9 +1,11 @@
 """What an FMU's file declares, read and checked before anything is loaded."""
 
+import re
 import zipfile
-import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -12,6 +14,7 @@ import fmpy
 from fmpy.model_description import ModelDescription
 
 from orchestrator.errors import FmuFileError
+from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
 
 VENDOR = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
@@ -49,8 +52,12 @@ class FmuDescription:
     states_are_settable
         Whether the FMU declares that a master may set its states at communication points. That is
         an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
-    can_save_state
-        ``canGetAndSetFMUstate``.
+    can_save_state, can_serialize_state
+        ``canGetAndSetFMUstate``, ``canSerializeFMUstate``.
+    one_instance, needs_tool
+        ``canBeInstantiatedOnlyOncePerProcess``, ``needsExecutionTool``.
+    stop_time
+        Of ``DefaultExperiment`` [s]; None where it does not say.
     gives_directional_derivatives
         ``providesDirectionalDerivative``.
     units
@@ -74,6 +81,10 @@ class FmuDescription:
     platforms: tuple[str, ...]
     units: dict[str, dict[str, str]]
     default_step_size: float | None
+    can_serialize_state: bool = False
+    one_instance: bool = False
+    needs_tool: bool = False
+    stop_time: float | None = None
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -106,49 +117,46 @@ def read_description(path: Path | str) -> FmuDescription:
         of another FMI version, for Model Exchange only, or without a binary for this platform.
     """
     path = Path(path)
-    text = _model_description_text(path)
+    text = read_model_description_text(path)
     version = _fmi_version(path, text)
     if version != "2.0":
         raise FmuFileError(
-            f"{path}: it is an FMU of FMI {version}; this master runs FMI 2.0 co-simulation, ask for that export"
+            f"{path}: it is an FMU of FMI {version[:20]}; this master runs FMI 2.0 co-simulation, ask for that export"
         )
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
+        description = fmpy.read_model_description(_only(text), validate=False)
+        exchange_only = description.coSimulation is None
+        platforms = tuple(fmpy.supported_platforms(_only(text, names_in(path))))
+        described = None if exchange_only else _describe(path, description, text, platforms)
+    except FmuFileError:
+        raise
     except Exception as error:  # fmpy raises whatever its parsers raise
         raise FmuFileError(
-            f"{path}: modelDescription.xml cannot be read: {error}; run `fmpy validate` on the file"
+            f"{path}: modelDescription.xml cannot be read: {told(error)}; run `fmpy validate` on the file"
         ) from error
-    if description.coSimulation is None:
+    if described is None:
         raise FmuFileError(
             f"{path}: it is an FMU for Model Exchange only; this master needs FMI 2.0 co-simulation, "
             "ask for that export"
         )
-    platforms = tuple(fmpy.supported_platforms(str(path)))
     if fmpy.platform not in platforms:
         has = ", ".join(platforms) or "none"
         raise FmuFileError(
             f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
             f"ask its author for a {fmpy.platform} build"
         )
-    return _describe(path, description, text, platforms)
+    return described
 
 
-def _model_description_text(path: Path) -> bytes:
-    if not path.is_file():
-        raise FmuFileError(f"{path}: there is no such file; give the path of an .fmu")
-    if not zipfile.is_zipfile(path):
-        raise FmuFileError(f"{path}: it is not an FMU: an .fmu is a zip archive and this file is not; export it again")
-    with zipfile.ZipFile(path) as archive:
-        try:
-            return archive.read("modelDescription.xml")
-        except KeyError:
-            raise FmuFileError(
-                f"{path}: the archive has no modelDescription.xml at its top; an FMU must, so export it again"
-            ) from None
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-            raise FmuFileError(
-                f"{path}: the archive is damaged ({error}); export it again, or get the file anew"
-            ) from error
+def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:
+    """An archive for fmpy that holds the checked model description, and empty files of the other names."""
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        archive.writestr(MODEL_DESCRIPTION, text)
+        for name in names:
+            if name != MODEL_DESCRIPTION:
+                archive.writestr(name, b"")
+    return content
 
 
 def _fmi_version(path: Path, text: bytes) -> str:
@@ -160,9 +168,9 @@ def _fmi_version(path: Path, text: bytes) -> str:
 
 def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...]) -> FmuDescription:
     variables = {v.name: _variable(v) for v in md.modelVariables}
+    _check_names(path, md)
     root = ElementTree.fromstring(text)
     tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
-    step_size = None if md.defaultExperiment is None else md.defaultExperiment.stepSize
     dependencies = {
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
@@ -181,9 +189,32 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         gives_directional_derivatives=bool(md.coSimulation.providesDirectionalDerivative),
         output_dependencies=dependencies,
         platforms=platforms,
+        can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
+        needs_tool=bool(md.coSimulation.needsExecutionTool),
+        one_instance=bool(md.coSimulation.canBeInstantiatedOnlyOncePerProcess),
+        default_step_size=_positive(md.defaultExperiment.stepSize) if md.defaultExperiment else None,
         units=_units(root),
-        default_step_size=None if step_size is None else float(step_size),
+        stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
     )
+
+
+def _check_names(path: Path, md: ModelDescription) -> None:
+    """The identifier becomes part of a path, and value references go into 32 bits: neither is taken on trust."""
+    identifier = md.coSimulation.modelIdentifier or ""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,199}", identifier):
+        raise FmuFileError(
+            f"{path}: modelIdentifier is {identifier[:80]!r}; it must be a C identifier, since it names the binary"
+        )
+    for v in md.modelVariables:
+        if not 0 <= int(v.valueReference) < 2**32:
+            raise FmuFileError(
+                f"{path}: {v.name[:80]!r} has valueReference {str(v.valueReference)[:20]}; 0 to 2³²−1 is allowed"
+            )
+
+
+def _positive(text: str | None) -> float | None:
+    value = float(text) if text is not None else 0.0
+    return value if 0 < value < float("inf") else None
 
 
 def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:

@@ -6,7 +6,6 @@ The README of this folder has its form.
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import scipy.io
 from numpy.typing import NDArray
 
 from orchestrator.errors import FmuFileError
+from orchestrator.fmi.archive import read_member
 from orchestrator.fmi.description import REVERSE_DOMAIN
 
 NAME = f"{REVERSE_DOMAIN}.fmi-ls-linear-model"
@@ -80,13 +80,8 @@ def read_embedded_model(path: Path) -> EmbeddedModel | None:
     """
     member = f"{FOLDER}/linear_model.json"
     try:
-        with zipfile.ZipFile(path) as archive:
-            if member not in archive.namelist():
-                return None
-            content = json.loads(archive.read(member))
-        return _read(content)
-    except (OSError, zipfile.BadZipFile) as error:
-        raise FmuFileError(f"{path}: it cannot be read as an FMU: {error}; export it again") from error
+        text = read_member(path, member)
+        return None if text is None else _read(json.loads(text))
     except (KeyError, TypeError, ValueError) as error:
         raise FmuFileError(
             f"{path}: the linear model inside ({member}) cannot be read: {error}; build the FMU again with "

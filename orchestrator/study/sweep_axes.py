@@ -11,10 +11,10 @@ import numpy as np
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cases.units import to_unit
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import VariableInfo
+from orchestrator.units import to_unit
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 _MOST = 100_000

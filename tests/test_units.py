@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from orchestrator.cases.units import to_unit
+from orchestrator.units import to_unit
 
 
 @pytest.mark.parametrize(

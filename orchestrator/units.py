@@ -60,3 +60,22 @@ def to_unit(value: float | int | str, unit: str) -> float:
 def _kind(unit: str) -> str:
     """``MW`` → ``W``: a unit of power without its prefix."""
     return next((power for power in sorted(_POWERS, key=len, reverse=True) if unit.endswith(power)), unit)
+
+
+def base_exponents(unit: str) -> tuple[float, dict[str, int]] | None:
+    """Factor to SI and exponents of the SI base units, by FMI's names; None for a unit that is not known.
+
+    Examples
+    --------
+    ``kV`` is (1000.0, {"kg": 1, "m": 2, "s": -3, "A": -1}).
+    """
+    names = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K", "mole": "mol",
+             "candela": "cd", "radian": "rad"}  # fmt: skip
+    try:
+        quantity = _registry().Quantity(1, unit).to_base_units()
+    except Exception:  # pint lets its parser's errors through; an unknown unit is nothing to check
+        return None
+    powers = {names.get(str(name)): power for name, power in quantity.unit_items()}
+    if None in powers or any(power != int(power) for power in powers.values()):
+        return None
+    return float(quantity.magnitude), {str(name): int(power) for name, power in powers.items()}

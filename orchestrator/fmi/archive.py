@@ -1,0 +1,279 @@
+"""The zip archive around an FMU, opened as if a stranger had packed it.
+
+An archive may name files outside its folder, unpack to more than a disk holds, or hide a document whose entities grow
+without end. Nothing here trusts what it declares: names are checked before the first byte is written, bytes are counted
+while they are written, and a model description may not define a document type.
+"""
+
+import lzma
+import shutil
+import stat
+import struct
+import tempfile
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from xml.parsers import expat
+
+from orchestrator.errors import FmuFileError, HostileFmuError
+
+MODEL_DESCRIPTION = "modelDescription.xml"
+
+MOST_FILES = 20_000
+MOST_BYTES = 2 * 1024**3
+"""Size of everything in an archive, unpacked."""
+
+MOST_XML_BYTES = 64 * 1024**2
+MOST_XML_DEPTH = 64
+
+FREE_BYTES = 64 * 1024**2
+MOST_RATIO = 100
+"""Unpacked size over packed size that is accepted beyond the first `FREE_BYTES`; binaries reach 10, zip bombs 1000."""
+
+_OUTSIDE = (
+    "an absolute path, or one with a drive or a backslash",
+    "a path out of the archive's own folder",
+    "a link or a device and not a file",
+)
+"""Entries that lead out of the folder into which they are unpacked."""
+
+_CHUNK = 1 << 20
+_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
+           ValueError, OverflowError)  # fmt: skip
+_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(1, 10))}
+"""Names that are no files on Windows."""
+
+
+def read_model_description_text(path: Path) -> bytes:
+    """The bytes of an FMU's modelDescription.xml, well-formed and without a document type.
+
+    Raises
+    ------
+    FmuFileError
+        If the file is missing, no zip archive, damaged, hostile, or has no such document.
+    """
+    with _opened(path) as archive:
+        try:
+            entry = archive.getinfo(MODEL_DESCRIPTION)
+        except KeyError:
+            raise FmuFileError(
+                f"{path}: the archive has no {MODEL_DESCRIPTION} at its top; an FMU must, so export it again"
+            ) from None
+        if entry.file_size > MOST_XML_BYTES:
+            raise HostileFmuError(
+                f"{path}: {MODEL_DESCRIPTION} has {entry.file_size} bytes; at most {MOST_XML_BYTES} are read, "
+                "ask for an export with fewer variables"
+            )
+        with archive.open(entry) as document:
+            text = document.read(MOST_XML_BYTES + 1)
+    check_xml(path, MODEL_DESCRIPTION, text)
+    return text
+
+
+def read_member(path: Path, name: str) -> bytes | None:
+    """The bytes of another file in an FMU's archive; None where there is no such file.
+
+    Raises
+    ------
+    FmuFileError
+        As `extract`.
+    """
+    with _opened(path) as archive:
+        if name not in archive.namelist():
+            return None
+        with archive.open(name) as content:
+            return content.read(MOST_BYTES)
+
+
+def names_in(path: Path) -> tuple[str, ...]:
+    """Names of all files in an FMU's archive, once they were found harmless.
+
+    Raises
+    ------
+    FmuFileError
+        As `extract`.
+    """
+    with _opened(path) as archive:
+        return tuple(entry.filename for entry in archive.infolist())
+
+
+def extract(path: Path, folder: Path | None = None) -> Path:
+    """Unpack an FMU into a folder of its own.
+
+    Parameters
+    ----------
+    folder
+        Where to; by default a new temporary folder.
+
+    Returns
+    -------
+    pathlib.Path
+        The folder; the caller removes it.
+
+    Raises
+    ------
+    FmuFileError
+        If the archive is damaged, would write outside of the folder, or is larger than `MOST_BYTES`. Nothing is left
+        behind then.
+    """
+    with _opened(path) as archive:
+        target = Path(tempfile.mkdtemp(prefix="gfor_fmu_")) if folder is None else folder
+        target.mkdir(parents=True, exist_ok=True)
+        try:
+            left = MOST_BYTES
+            for entry in archive.infolist():
+                left = _write(archive, entry, target, left, path)
+        except BaseException:
+            shutil.rmtree(target, ignore_errors=True)
+            raise
+    return target
+
+
+def check_xml(path: Path, name: str, text: bytes) -> None:
+    """Raise unless a document is well-formed, not too deep, and defines no document type, which FMI has no use for."""
+    parser = expat.ParserCreate()
+    depth = 0
+
+    def refuse_doctype(*_: object) -> None:
+        raise HostileFmuError(
+            f"{path}: {name} defines a document type, with which a small file can grow without end; FMI has no use for "
+            "one, so do not trust this file, or ask for an export without <!DOCTYPE>",
+            "entity expansion",
+        )
+
+    def enter(*_: object) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > MOST_XML_DEPTH:
+            raise HostileFmuError(f"{path}: {name} nests more than {MOST_XML_DEPTH} elements; FMI's nest 6")
+
+    def leave(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler = refuse_doctype
+    parser.StartElementHandler, parser.EndElementHandler = enter, leave
+    try:
+        parser.Parse(text, True)
+    except (expat.ExpatError, ValueError, LookupError) as error:  # the latter two: encodings
+        raise FmuFileError(f"{path}: {name} is not XML: {told(error)}; export it again") from error
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """The archive, with harmless names and sizes; whatever zipfile raises becomes one error."""
+    if not path.is_file():
+        raise FmuFileError(f"{path}: there is no such file; give the path of an .fmu")
+    try:
+        if not zipfile.is_zipfile(path):
+            raise FmuFileError(
+                f"{path}: it is not an FMU: an .fmu is a zip archive and this file is not; export it again"
+            )
+        with zipfile.ZipFile(path) as archive:
+            _check_entries(path, archive.infolist())
+            yield archive
+    except _DAMAGE as error:
+        raise FmuFileError(
+            f"{path}: the archive is damaged ({told(error)}); export it again, or get the file anew"
+        ) from error
+    except OSError as error:
+        raise FmuFileError(f"{path}: the file cannot be unpacked: {error.strerror or error}") from error
+
+
+def _check_entries(path: Path, entries: list[zipfile.ZipInfo]) -> None:
+    if len(entries) > MOST_FILES:
+        raise HostileFmuError(f"{path}: the archive has {len(entries)} files; at most {MOST_FILES} are unpacked")
+    seen: dict[str, str] = {}
+    for entry in entries:
+        fault = _fault_of(entry)
+        key = unicodedata.normalize("NFC", entry.filename.rstrip("/")).casefold()
+        if fault is None and key in seen and not (entry.is_dir() and seen[key].endswith("/")):
+            fault = f"the same file as {seen[key]!r} on some systems"
+        if fault is not None:
+            raise HostileFmuError(
+                f"{path}: the archive has an entry {_shown(entry.orig_filename)}, which is {fault}; do not trust this "
+                "file, or ask for it to be packed again",
+                "path traversal" if fault in _OUTSIDE else "hostile archive",
+            )
+        seen[key] = entry.filename
+    for entry in entries:
+        for parent in PurePosixPath(entry.filename).parents:
+            above = seen.get(unicodedata.normalize("NFC", str(parent)).casefold())
+            if above is not None and not above.endswith("/"):
+                raise HostileFmuError(
+                    f"{path}: the archive has {_shown(above)} as a file and as a folder; pack it again"
+                )
+    _check_sizes(path, sum(e.file_size for e in entries), sum(e.compress_size for e in entries))
+
+
+def _check_sizes(path: Path, unpacked: int, packed: int) -> None:
+    if unpacked > MOST_BYTES:
+        raise HostileFmuError(
+            f"{path}: the archive unpacks to {unpacked} bytes; at most {MOST_BYTES} are unpacked", "zip bomb"
+        )
+    if unpacked > FREE_BYTES + MOST_RATIO * packed:
+        raise HostileFmuError(
+            f"{path}: the archive unpacks from {packed} to {unpacked} bytes, more than {MOST_RATIO} times as much, "
+            "as zip bombs do; do not trust this file",
+            "zip bomb",
+        )
+
+
+def _fault_of(entry: zipfile.ZipInfo) -> str | None:
+    """What makes an entry one that is not unpacked."""
+    name, kind = entry.orig_filename, stat.S_IFMT(entry.external_attr >> 16)
+    parts = name.removesuffix("/").split("/")
+    if not name or "\0" in name or any(unicodedata.category(c) == "Cc" for c in name):
+        return "a name with control characters"
+    if name.startswith("/") or "\\" in name or ":" in name:
+        return _OUTSIDE[0]
+    if ".." in parts:
+        return _OUTSIDE[1]
+    if any(part in ("", ".") for part in parts):
+        return "a path with an empty part"
+    if any(part.endswith((" ", ".")) or part.split(".")[0].upper() in _DEVICES for part in parts):
+        return "a name that Windows gives to something else"
+    try:
+        if any(len(part.encode()) > 255 for part in parts) or len(name.encode()) > 2000:
+            return "a name too long for a file"
+    except UnicodeEncodeError:
+        return "a name that is not text"
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return _OUTSIDE[2]
+    if entry.flag_bits & 0x1:
+        return "encrypted"
+    if entry.compress_type not in _METHODS:
+        return f"packed with method {entry.compress_type}, where FMI allows only 'deflate' and 'stored'"
+    return None
+
+
+def told(error: Exception) -> str:
+    """An error's own text, cut where a file's contents made it long."""
+    text = str(error) or type(error).__name__
+    return text if len(text) <= 200 else text[:200] + "…"
+
+
+def _shown(name: str) -> str:
+    return repr(name if len(name) <= 80 else name[:77] + "...")
+
+
+def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left: int, path: Path) -> int:
+    """Unpack one entry; returns how many bytes may still be written."""
+    target = folder.joinpath(*entry.filename.removesuffix("/").split("/"))
+    if entry.is_dir():
+        target.mkdir(parents=True, exist_ok=True)
+        return left
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with archive.open(entry) as source, target.open("xb") as sink:
+        while chunk := source.read(_CHUNK):
+            left -= len(chunk)
+            if left < 0:
+                raise HostileFmuError(
+                    f"{path}: the archive unpacks to more than {MOST_BYTES} bytes; do not trust it", "zip bomb"
+                )
+            sink.write(chunk)
+    return left

@@ -1,0 +1,227 @@
+"""An FMU in a process of its own, called as if it were in this one.
+
+A crash, a hang, an exit or a flood in it becomes one `ComponentError`; what was computed until then stays. Values pass
+through shared memory (`mailbox.c`), one exchange for a communication step.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+from ctypes import c_double, c_int, c_size_t, c_void_p  # isort: skip
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.archive import extract
+from orchestrator.fmi.component import FLOODED, STATUS, Component, RealBatch
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.mailbox import DIED, HUNG, NOT_A_NUMBER, Mailbox
+
+_ERROR = 3
+
+
+class IsolatedComponent(Component):
+    """An instance of an FMU in a process of its own.
+
+    Parameters
+    ----------
+    name, description, directory
+        As `Component`.
+    limits
+        What it may take.
+    """
+
+    def __init__(
+        self, name: str, description: FmuDescription, directory: Path | None = None, limits: Limits | None = None
+    ) -> None:
+        self.name, self.description, self.limits = name, description, limits or Limits()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._end: str | None = None
+        self._own_directory = extract(description.path) if directory is None else None
+        self._folder = Path(tempfile.mkdtemp(prefix="gfor_isolated_"))
+        try:
+            self._box = Mailbox(self._folder / "mailbox", create=True)
+            self._start(directory or self._own_directory or Path())
+            self._remote("fmi2Instantiate", "instantiate")
+        except BaseException:
+            self.close()
+            raise
+        self.pointer = self._box.address
+        self.set_real = self._box.function("client_set_real", c_void_p, c_size_t, c_void_p)
+        self.get_real = self._box.function("client_get_real", c_void_p, c_size_t, c_void_p)
+        self.do_step = self._box.function("client_do_step", c_double, c_double, c_int)
+
+    def _start(self, directory: Path) -> None:
+        request = {
+            "fmu": str(self.description.path.resolve()),
+            "name": self.name,
+            "guid": self.description.guid,
+            "directory": str(directory),
+            "folder": str(self._folder),
+            "limits": asdict(self.limits),
+            "parent": os.getpid(),
+        }
+        work = self._folder / "work"
+        work.mkdir()
+        with (work / "output").open("wb") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "orchestrator.fmi.isolation_worker", json.dumps(request)],
+                stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+            )  # fmt: skip
+        handle = getattr(self._process, "_handle", None)  # Windows
+        self._box.head.peer = self._process.pid if handle is None else int(handle)
+        self._box.head.patience = self.limits.seconds
+
+    # -- errors ----------------------------------------------------------------------------------
+
+    def check(self, status: int, call: str, time: float | None = None) -> None:
+        if status <= 1:
+            return
+        if status == NOT_A_NUMBER:
+            bad = self._box.head.bad_reference
+            names = [n for n, v in self.description.variables.items() if v.reference == bad and v.type == "Real"]
+            said = f"{names[0] if names else 'a variable'} is no finite number"
+            raise ComponentError(self.name, call, "not a number", said, time)
+        if status in (DIED, HUNG):
+            raise ComponentError(self.name, call, self._how_it_ended(status), self._last_words(), time)
+        name = STATUS[status] if status < len(STATUS) else f"status {status}"
+        raise ComponentError(self.name, call, name, "; ".join(self._texts(1) or self._texts()), time)
+
+    def _texts(self, least: int = 0) -> list[str]:
+        return list(dict.fromkeys(text for status, text in self._box.read_log() if status >= least))
+
+    def _how_it_ended(self, status: int) -> str:
+        """Crash, hang, exit or flood, in words; the process is ended if it is still there."""
+        if self._end is not None:
+            return self._end
+        process = self._process
+        assert process is not None
+        if status == HUNG:
+            self._kill()
+            self._end = f"hang: no answer within {self.limits.seconds:g} s; its process was ended"
+            return self._end
+        code = process.wait()
+        if code == FLOODED:
+            self._end = f"output flood: more than {self.limits.messages} log messages in one step"
+        elif code < 0 and -code == getattr(signal, "SIGXFSZ", None):
+            self._end = f"output flood: more than {self.limits.output} bytes written"
+        elif code < 0:
+            self._end = f"crash: its process died with {signal.Signals(-code).name}"
+        elif code >= 0xC0000000:
+            self._end = f"crash: its process died with code {code:#x}"
+        else:
+            self._end = f"exit: it ended its process with exit code {code}"
+        return self._end
+
+    def _last_words(self) -> str:
+        """Its newest log messages, or the end of what it wrote."""
+        if texts := self._texts():
+            return "; ".join(texts)
+        try:
+            with (self._folder / "work" / "output").open("rb") as output:
+                output.seek(max(0, output.seek(0, 2) - 2000))
+                return " ".join(output.read().decode("utf-8", "replace").strip().splitlines()[-1:])[:300]
+        except OSError:
+            return ""
+
+    # -- conversation ----------------------------------------------------------------------------
+
+    def _remote(self, call: str, command: str, *arguments: Any) -> Any:
+        """Have something done in the other process that needs more than numbers."""
+        if self._end is not None:
+            raise ComponentError(self.name, call, self._end, "")
+        self._box.clear_log()
+        self._box.write_text([command, *arguments])
+        status = self._box.library.mailbox_talk(self._box.address)
+        self.check(status, call)
+        answer = self._box.read_text()
+        if "input_error" in answer:
+            raise InputError(answer["input_error"])
+        if "component_error" in answer:
+            at, how, log = answer["component_error"]
+            raise ComponentError(self.name, at, how, log)
+        return answer.get("result")
+
+    def _call(self, call: str, function: Any, *arguments: Any) -> Any:
+        """Call what goes through the mailbox by itself, and take the FMU at its log's word."""
+        self._box.clear_log()
+        result = function(*arguments)
+        if errors := self._texts(_ERROR):
+            raise ComponentError(self.name, call, "an error in the log", "; ".join(errors))
+        return result
+
+    def setup(self, start_time: float, stop_time: float | None) -> None:
+        self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
+
+    def enter_initialization_mode(self) -> None:
+        self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
+
+    def exit_initialization_mode(self) -> None:
+        self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
+
+    def reset(self) -> None:
+        self._remote("fmi2Reset", "reset")
+
+    def set(self, values: Mapping[str, float | bool]) -> None:
+        if values:
+            self._remote(f"setting {', '.join(values)}", "set", dict(values))
+
+    def read(self, batch: RealBatch) -> None:
+        self._call("fmi2GetReal", batch.read)
+
+    def values(self, names: Iterable[str]) -> dict[str, float | bool]:
+        return dict(self._remote("reading", "values", list(names)))
+
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
+        found = self._remote("fmi2GetDirectionalDerivative", "jacobian", list(unknowns), list(knowns))
+        return np.array(found).reshape(len(unknowns), len(knowns))
+
+    def save_state(self) -> Any:
+        return self._remote("fmi2GetFMUstate", "save_state")
+
+    def restore_state(self, state: Any) -> None:
+        self._remote("fmi2SetFMUstate", "restore_state", state)
+
+    def free_state(self, state: Any) -> None:
+        self._remote("fmi2FreeFMUstate", "free_state", state)
+
+    def serialize_state(self, state: Any) -> bytes:
+        return bytes.fromhex(self._remote("fmi2SerializeFMUstate", "serialize_state", state))
+
+    def deserialize_state(self, content: bytes) -> Any:
+        return self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex())
+
+    # -- the end ---------------------------------------------------------------------------------
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            if self._process.poll() is None:
+                self._process.kill()
+            self._process.wait()
+
+    def close(self) -> None:
+        """End the process and remove what was written for it."""
+        if self._process is not None and self._end is None and self._process.poll() is None:
+            self._box.head.patience = min(self._box.head.patience, 5.0)
+            try:
+                self._remote("fmi2Terminate", "close")
+                self._process.wait(5.0)
+            except (ComponentError, InputError, ValueError, subprocess.TimeoutExpired):
+                pass  # an FMU that failed may not end by itself
+        self._kill()
+        self._end = self._end or "closed"
+        rmtree(self._folder, ignore_errors=True)
+        if self._own_directory is not None:
+            rmtree(self._own_directory, ignore_errors=True)
+            self._own_directory = None

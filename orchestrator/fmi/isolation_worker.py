@@ -1,0 +1,121 @@
+"""The process of an isolated FMU: loads it within limits, then does what the mailbox asks; started by `isolation`."""
+
+import ctypes
+import itertools
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import ComponentError, CosimError
+from orchestrator.fmi.component import Component, on_message
+from orchestrator.fmi.description import read_description
+from orchestrator.fmi.limits import Limits, apply_limits
+from orchestrator.fmi.mailbox import DIED, OK, Mailbox
+
+
+class Worker:
+    """Answers until it is told to close, or its parent is gone."""
+
+    def __init__(self, request: dict[str, Any]) -> None:
+        folder = Path(request["folder"])
+        self._request, self._parent = request, request["parent"]
+        self._box = Mailbox(folder / "mailbox")
+        limits = Limits(**request["limits"])
+        self._description = read_description(request["fmu"])
+        apply_limits(limits, folder / "work")
+        on_message(limits.messages, lambda: self._box.head.steps + self._box.head.request, self._box.write_log)
+        self._component: Component | None = None
+        self._states: dict[int, Any] = {}
+        self._next = itertools.count(1)
+
+    def serve(self) -> None:
+        """Answer the mailbox."""
+        box = self._box
+        pointers: tuple[Any, ...] = (None, None, None, None)
+        while box.library.mailbox_serve(box.address, self._parent, *pointers):
+            command, *arguments = box.read_text()
+            if command == "close":
+                if self._component is not None:
+                    self._component.close()
+                box.write_text({})
+                box.library.mailbox_answer(box.address, OK)
+                os._exit(0)  # what an FMU registered for the end of the process is of no use to anyone
+            self._answer(getattr(self, f"do_{command}"), arguments)
+            component = self._component
+            if component is not None:
+                functions = (component.set_real, component.get_real, component.do_step)
+                pointers = (component.pointer, *(ctypes.cast(f, ctypes.c_void_p) for f in functions))
+        os._exit(DIED)
+
+    def _answer(self, function: Callable[..., Any], arguments: list[Any]) -> None:
+        try:
+            answer = {"result": function(*arguments)}
+        except ComponentError as error:
+            answer = {"component_error": [error.call, error.status, error.log]}
+        except CosimError as error:
+            answer = {"input_error": str(error)}
+        except MemoryError:
+            answer = {"component_error": ["memory", "memory limit", "the FMU's process has no memory left"]}
+        try:
+            self._box.write_text(answer)
+        except ValueError as error:
+            self._box.write_text({"component_error": ["answer", "too long", str(error)]})
+        self._box.library.mailbox_answer(self._box.address, OK)
+
+    def _instance(self) -> Component:
+        assert self._component is not None
+        return self._component
+
+    def do_instantiate(self) -> None:
+        if self._description.guid != self._request["guid"]:
+            said = f"the guid {self._request['guid']} is not that of the FMU; read its description again"
+            raise ComponentError(self._request["name"], "fmi2Instantiate", "no instance", said)
+        directory = Path(self._request["directory"])
+        self._component = Component(self._request["name"], self._description, directory)
+
+    def do_setup(self, start_time: float, stop_time: float | None) -> None:
+        self._instance().setup(start_time, stop_time)
+
+    def do_enter_initialization_mode(self) -> None:
+        self._instance().enter_initialization_mode()
+
+    def do_exit_initialization_mode(self) -> None:
+        self._instance().exit_initialization_mode()
+
+    def do_reset(self) -> None:
+        self._instance().reset()
+
+    def do_set(self, values: dict[str, float | bool]) -> None:
+        self._instance().set(values)
+
+    def do_values(self, names: list[str]) -> dict[str, float | bool]:
+        return self._instance().values(names)
+
+    def do_jacobian(self, unknowns: list[str], knowns: list[str]) -> Any:
+        return self._instance().jacobian(unknowns, knowns).tolist()
+
+    def do_save_state(self) -> int:
+        number = next(self._next)
+        self._states[number] = self._instance().save_state()
+        return number
+
+    def do_restore_state(self, number: int) -> None:
+        self._instance().restore_state(self._states[number])
+
+    def do_free_state(self, number: int) -> None:
+        self._instance().free_state(self._states.pop(number))
+
+    def do_serialize_state(self, number: int) -> str:
+        return self._instance().serialize_state(self._states[number]).hex()
+
+    def do_deserialize_state(self, content: str) -> int:
+        number = next(self._next)
+        self._states[number] = self._instance().deserialize_state(bytes.fromhex(content))
+        return number
+
+
+if __name__ == "__main__":
+    Worker(json.loads(sys.argv[1])).serve()

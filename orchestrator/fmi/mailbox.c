@@ -1,0 +1,220 @@
+/* A mailbox in memory that two processes share: one runs an FMU, the other calls it as if it were its own.
+   `mailbox.py` describes the same structure to Python.
+
+   What is set waits until a step or a reading needs it, and a step brings the values along that were read after the
+   last one: a communication step costs one exchange between the processes and not three. */
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifdef _WIN32
+#include <windows.h>
+#define EXPORT __declspec(dllexport)
+static double seconds(void) {
+    LARGE_INTEGER ticks, frequency;
+    QueryPerformanceCounter(&ticks);
+    QueryPerformanceFrequency(&frequency);
+    return (double)ticks.QuadPart / (double)frequency.QuadPart;
+}
+static void rest(volatile int32_t *word, int32_t value) { Sleep(*word == value ? 1 : 0); }
+static void wake(volatile int32_t *word) {}
+static int is_gone(int64_t process) {
+    DWORD code;
+    return !GetExitCodeProcess((HANDLE)(intptr_t)process, &code) || code != STILL_ACTIVE;
+}
+static int is_orphan(int64_t parent) { return 0; } /* the parent ends what it started */
+#else
+#define EXPORT __attribute__((visibility("default")))
+#include <signal.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+static double seconds(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+#ifdef __linux__
+#include <linux/futex.h>
+#include <sys/syscall.h>
+static void rest(volatile int32_t *word, int32_t value) {
+    const struct timespec most = {0, 20000000};
+    syscall(SYS_futex, word, FUTEX_WAIT, value, &most, NULL, 0);
+}
+static void wake(volatile int32_t *word) { syscall(SYS_futex, word, FUTEX_WAKE, 1, NULL, NULL, 0); }
+#else
+static void rest(volatile int32_t *word, int32_t value) {
+    const struct timespec most = {0, 50000};
+    nanosleep(&most, NULL);
+}
+static void wake(volatile int32_t *word) {}
+#endif
+/* Without reaping it: whoever started it asks for its exit code. */
+static int is_gone(int64_t process) {
+    siginfo_t info = {0};
+    return waitid(P_PID, (id_t)process, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid != 0;
+}
+static int is_orphan(int64_t parent) { return (int64_t)getppid() != parent; }
+#endif
+
+enum { MOST = 16384, TEXT = 1 << 20, LOG = 8192 };
+enum { OK = 0, ERROR = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66 };
+enum { EXCHANGE = 1, TALK = 2 };
+enum { SET = 1, STEP = 2, GET = 4 };
+
+struct mailbox {
+    volatile int32_t request, reply; /* numbers of the newest question and of the newest answer */
+    volatile int32_t sleeping[2];    /* whether the server, or the client, waits in the kernel */
+    int32_t kind, what, status;
+    int32_t steps;
+    int64_t peer; /* the server's process, or on the server's side its parent */
+    double time, step, patience;
+    int64_t n_set, n_get;
+    int64_t text_length;
+    uint32_t bad_reference, fresh; /* fresh: `got` holds what was read after the last step, and nothing was set since */
+    uint32_t set_references[MOST], get_references[MOST];
+    double set_values[MOST], got[MOST];
+    char text[TEXT];
+    char log[LOG];
+};
+
+/* How often a word is looked at before a process sleeps: worth it where the other one has a processor of its own, and a
+   waste of time where both share one. So it is given up after some vain attempts, and tried again later. */
+enum { SPINS = 1000, VAIN = 4, LATER = 1000 };
+static int spins = SPINS, vain, sleeps;
+
+EXPORT size_t mailbox_size(void) { return sizeof(struct mailbox); }
+EXPORT size_t mailbox_offset(int which) {
+    return which == 0 ? offsetof(struct mailbox, text) : offsetof(struct mailbox, log);
+}
+
+static void relax(void) {
+#if defined __x86_64__ || defined _M_X64
+    __asm__ __volatile__("pause");
+#elif defined __aarch64__
+    __asm__ __volatile__("yield");
+#endif
+}
+
+/* Wait until *word is no longer `old`: awake for a while, then in the kernel. Returns 0 after every sleep. */
+static int changed(volatile int32_t *word, int32_t old, volatile int32_t *sleeping) {
+    for (int k = 0; k < spins; ++k) {
+        if (__atomic_load_n(word, __ATOMIC_ACQUIRE) != old) {
+            vain = 0;
+            return 1;
+        }
+        relax();
+    }
+    if (spins && ++vain >= VAIN)
+        spins = vain = 0;
+    else if (!spins && ++sleeps >= LATER)
+        spins = SPINS, sleeps = 0;
+    __atomic_store_n(sleeping, 1, __ATOMIC_SEQ_CST);
+    if (__atomic_load_n(word, __ATOMIC_SEQ_CST) == old) rest(word, old);
+    __atomic_store_n(sleeping, 0, __ATOMIC_SEQ_CST);
+    return __atomic_load_n(word, __ATOMIC_ACQUIRE) != old;
+}
+
+static void publish(volatile int32_t *word, int32_t value, volatile int32_t *sleeping) {
+    __atomic_store_n(word, value, __ATOMIC_SEQ_CST);
+    if (__atomic_load_n(sleeping, __ATOMIC_SEQ_CST)) wake(word);
+}
+
+/* Ask, and wait for the answer: the call's status, or DIED or HUNG. */
+static int ask(struct mailbox *box, int32_t kind) {
+    const int32_t before = box->reply, number = before + 1;
+    box->kind = kind;
+    publish(&box->request, number, &box->sleeping[0]);
+    const double end = seconds() + box->patience;
+    while (!changed(&box->reply, before, &box->sleeping[1])) {
+        if (is_gone(box->peer)) return box->reply == number ? box->status : DIED;
+        if (seconds() > end) return HUNG;
+    }
+    return box->status;
+}
+
+static int exchange(struct mailbox *box, int what) {
+    box->what = what | (box->n_set ? SET : 0);
+    const int status = ask(box, EXCHANGE);
+    box->n_set = 0;
+    box->fresh = status <= 1 && (what & GET);
+    return status;
+}
+
+EXPORT int mailbox_talk(struct mailbox *box) {
+    int status = OK;
+    if (box->n_set && (status = exchange(box, 0)) > 1) return status;
+    box->fresh = 0;
+    return ask(box, TALK);
+}
+
+EXPORT int client_set_real(struct mailbox *box, const unsigned *references, size_t n, const double *values) {
+    int status = OK;
+    if (n > MOST) return ERROR;
+    if (box->n_set + (int64_t)n > MOST && (status = exchange(box, 0)) > 1) return status;
+    memcpy(box->set_references + box->n_set, references, n * sizeof *references);
+    memcpy(box->set_values + box->n_set, values, n * sizeof *values);
+    box->n_set += (int64_t)n;
+    box->fresh = 0;
+    return status;
+}
+
+EXPORT int client_get_real(struct mailbox *box, const unsigned *references, size_t n, double *values) {
+    int status = OK;
+    if (n > MOST) return ERROR;
+    if (!box->fresh || (int64_t)n != box->n_get || memcmp(references, box->get_references, n * sizeof *references)) {
+        memcpy(box->get_references, references, n * sizeof *references);
+        box->n_get = (int64_t)n;
+        if ((status = exchange(box, GET)) > 1) return status;
+    }
+    memcpy(values, box->got, n * sizeof *values);
+    for (size_t k = 0; k < n; ++k)
+        if (!isfinite(values[k])) {
+            box->bad_reference = references[k];
+            return NOT_A_NUMBER;
+        }
+    return status;
+}
+
+EXPORT int client_do_step(struct mailbox *box, double time, double step, int no_set_state) {
+    box->time = time, box->step = step;
+    return exchange(box, STEP | GET);
+}
+
+typedef int (*get_set)(void *, const unsigned *, size_t, double *);
+typedef int (*do_step)(void *, double, double, int);
+
+static int serve(struct mailbox *box, void *component, get_set set_real, get_set get_real, do_step step) {
+    int worst = OK, status;
+    if ((box->what & SET) && (status = set_real(component, box->set_references, (size_t)box->n_set, box->set_values)) > worst)
+        worst = status;
+    if (worst > 1) return worst;
+    if (box->what & STEP) {
+        ++box->steps;
+        if ((status = step(component, box->time, box->step, 1)) > worst) worst = status;
+        if (worst > 1) return worst;
+    }
+    if ((box->what & GET) && box->n_get &&
+        (status = get_real(component, box->get_references, (size_t)box->n_get, box->got)) > worst)
+        worst = status;
+    return worst;
+}
+
+/* Answer exchanges until something comes that C cannot answer: 1 for talk, 0 if the client is gone. */
+EXPORT int mailbox_serve(struct mailbox *box, int64_t parent, void *component, get_set set_real, get_set get_real,
+                         do_step step) {
+    for (;;) {
+        while (!changed(&box->request, box->reply, &box->sleeping[0]))
+            if (is_orphan(parent)) return 0;
+        if (box->kind != EXCHANGE) return 1;
+        box->status = serve(box, component, set_real, get_real, step);
+        publish(&box->reply, box->request, &box->sleeping[1]);
+    }
+}
+
+/* The answer to a talk. */
+EXPORT void mailbox_answer(struct mailbox *box, int status) {
+    box->status = status;
+    publish(&box->reply, box->request, &box->sleeping[1]);
+}

@@ -1,0 +1,142 @@
+"""Shared memory between a process that runs an FMU and the one that calls it."""
+
+import ctypes
+import json
+import mmap
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.errors import InputError
+
+_SOURCE = Path(__file__).with_name("mailbox.c")
+_MOST = 16384
+_TEXT, _LOG = 1 << 20, 8192
+
+OK, ERROR = 0, 3
+DIED, HUNG, NOT_A_NUMBER = 64, 65, 66
+"""Answers of a mailbox that no FMU gives; those of mailbox.c."""
+
+
+class Head(ctypes.Structure):
+    """The first fields of ``struct mailbox``."""
+
+    _fields_ = (
+        ("request", ctypes.c_int32),
+        ("reply", ctypes.c_int32),
+        ("sleeping", ctypes.c_int32 * 2),
+        ("kind", ctypes.c_int32),
+        ("what", ctypes.c_int32),
+        ("status", ctypes.c_int32),
+        ("steps", ctypes.c_int32),
+        ("peer", ctypes.c_int64),
+        ("time", ctypes.c_double),
+        ("step", ctypes.c_double),
+        ("patience", ctypes.c_double),
+        ("n_set", ctypes.c_int64),
+        ("n_get", ctypes.c_int64),
+        ("text_length", ctypes.c_int64),
+        ("bad_reference", ctypes.c_uint32),
+        ("fresh", ctypes.c_uint32),
+    )
+
+
+@cache
+def mailbox_library() -> Any:
+    """The compiled mailbox; its calls hold Python's lock, as those of an FMU in this process do.
+
+    Raises
+    ------
+    InputError
+        If it cannot be compiled here.
+    """
+    platform = host_platform()
+    if platform is None:
+        raise InputError("the mailbox to an FMU's own process is compiled, and there is no compiler for this platform; "
+                         "set isolated = false if you trust the FMU")  # fmt: skip
+    try:
+        library = ctypes.PyDLL(str(compile_library(_SOURCE.read_text(encoding="utf-8"), platform)))
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"the mailbox to an FMU's own process cannot be compiled: {error}") from error
+    address, size = ctypes.c_void_p, ctypes.c_size_t
+    library.mailbox_size.restype = library.mailbox_offset.restype = size
+    library.mailbox_talk.argtypes = [address]
+    library.mailbox_serve.argtypes = [address, ctypes.c_int64, *[address] * 4]
+    library.mailbox_answer.argtypes = [address, ctypes.c_int]
+    library.mailbox_answer.restype = None
+    return library
+
+
+class Mailbox:
+    """A file in memory that both processes map.
+
+    Attributes
+    ----------
+    address
+        Of the structure; it takes an instance's place in FMI calls.
+    head
+        Its first fields.
+    """
+
+    def __init__(self, path: Path, *, create: bool = False) -> None:
+        self.library = mailbox_library()
+        size = self.library.mailbox_size()
+        if create:
+            with path.open("wb") as file:
+                file.truncate(size)
+        with path.open("r+b") as file:
+            self._memory = mmap.mmap(file.fileno(), size)
+        self.head = Head.from_buffer(self._memory)
+        self.address = ctypes.addressof(self.head)
+        self._text, self._log = (self.library.mailbox_offset(which) for which in (0, 1))
+
+    def write_text(self, value: Any) -> None:
+        """Leave a JSON value for the other side.
+
+        Raises
+        ------
+        ValueError
+            If it is longer than the mailbox.
+        """
+        content = json.dumps(value).encode()
+        if len(content) > _TEXT:
+            raise ValueError(f"{len(content)} bytes do not fit into the mailbox of {_TEXT} bytes")
+        self._memory[self._text : self._text + len(content)] = content
+        self.head.text_length = len(content)
+
+    def read_text(self) -> Any:
+        """What the other side left.
+
+        Raises
+        ------
+        ValueError
+            If it is not JSON.
+        """
+        length = self.head.text_length
+        if not 0 <= length <= _TEXT:
+            raise ValueError("the length of the text is out of bounds")
+        return json.loads(bytes(self._memory[self._text : self._text + length]))
+
+    def write_log(self, messages: list[tuple[int, str]]) -> None:
+        """Leave the newest messages where they outlive the process that wrote them."""
+        kept = [(status, text[:500]) for status, text in messages[-8:]]
+        while kept and len(content := json.dumps(kept).encode()) > _LOG - 1:
+            kept.pop(0)
+        content = json.dumps(kept).encode()
+        self._memory[self._log : self._log + len(content) + 1] = content + b"\0"
+
+    def read_log(self) -> list[tuple[int, str]]:
+        """The newest messages of the other side; none where they cannot be read."""
+        content = bytes(self._memory[self._log : self._log + _LOG]).split(b"\0")[0]
+        try:
+            return [(int(status), str(text)) for status, text in json.loads(content)]
+        except (ValueError, TypeError):
+            return []
+
+    def clear_log(self) -> None:
+        self._memory[self._log] = 0
+
+    def function(self, name: str, *arguments: Any) -> Any:
+        """A pointer to one of its functions, of FMI's form."""
+        return ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *arguments)((name, self.library))

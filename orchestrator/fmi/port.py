@@ -1,0 +1,212 @@
+"""What a foreign FMU looks like once its variables are mapped to our port, in plain numbers.
+
+The port of a device: inputs ``v_re``, ``v_im`` [pu of the bus] and outputs ``i_re``, ``i_im`` [pu, 100 MVA] in the
+network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] and the power flow's ``P_0``, ``Q_0``
+[pu, S_n], ``v_0`` [pu], ``theta_0`` [rad].
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from math import pi
+from typing import Self
+
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+
+PORT = ("v_re", "v_im", "i_re", "i_im", "p", "q")
+"""Variables of the port; their places are their value references."""
+
+START = ("S_n", "P_0", "Q_0", "v_0", "theta_0")
+SYSTEM_BASE_MVA = 100.0
+
+Matrix2 = tuple[float, float, float, float]
+"""A real 2×2 matrix, by rows."""
+
+
+class Form(IntEnum):
+    """What the variables of a port are; the numbers are those of port_adapter.c."""
+
+    RECTANGULAR = 0
+    POLAR = 1
+    ABC = 2
+    POWER = 3
+
+
+@dataclass(frozen=True)
+class PhasorMap:
+    """Voltage or current as the FMU has it.
+
+    Attributes
+    ----------
+    form, variables
+        Two variables, or three phases.
+    matrix
+        Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
+        its own rating. Magnitude and angle, phases and powers are taken behind or before it.
+    angle_factor
+        The FMU's unit of angle per radian.
+    per_rating
+        Current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating).
+    """
+
+    form: Form
+    variables: tuple[str, ...]
+    matrix: Matrix2
+    angle_factor: float = 1.0
+    per_rating: bool = True
+
+
+@dataclass(frozen=True)
+class StartMap:
+    """Where a start value goes: ``factor·value + offset``, times S_n over the rating where ``per_rating``."""
+
+    variable: str
+    factor: float
+    offset: float = 0.0
+    per_rating: bool = False
+
+
+@dataclass(frozen=True)
+class SignalMap:
+    """Another variable under a name and in a unit of ours: ``factor·x + offset``."""
+
+    variable: str
+    factor: float
+    offset: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class PortMap:
+    """All of a binding, in numbers.
+
+    Attributes
+    ----------
+    rating
+        S_n of the FMU as delivered [MVA].
+    start
+        For each of `START` the variables that take it; none for those that the FMU does not know.
+    settings
+        Values of the FMU's own parameters and inputs.
+    """
+
+    rating: float
+    f_n: float
+    voltage: PhasorMap
+    current: PhasorMap
+    start: Mapping[str, tuple[StartMap, ...]]
+    signals: Mapping[str, SignalMap]
+    settings: Mapping[str, float | bool]
+
+    @property
+    def omega(self) -> float:
+        return 2 * pi * self.f_n
+
+    @property
+    def taken(self) -> frozenset[str]:
+        """The FMU's variables that the port stands for."""
+        starts = {m.variable for maps in self.start.values() for m in maps}
+        signals = {m.variable for m in self.signals.values()}
+        return frozenset({*self.voltage.variables, *self.current.variables, *starts, *signals, *self.settings})
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundDescription(FmuDescription):
+    """A foreign FMU, described with the variables of our port and whatever else it has.
+
+    Attributes
+    ----------
+    native
+        What its file says.
+    natives
+        For every variable here that is not the port's: the FMU's own name of it.
+    """
+
+    native: FmuDescription
+    port: PortMap
+    natives: Mapping[str, str]
+
+    @classmethod
+    def of(cls, native: FmuDescription, port: PortMap) -> Self:
+        """Describe an FMU through a port map whose variables were checked."""
+        natives = {name: m.variable for name, m in port.signals.items()}
+        for name in native.variables:
+            if name not in port.taken:
+                natives[f"native.{name}" if name in (*PORT, *START, *natives) else name] = name
+        variables = _port_variables(port)
+        for number, (name, own) in enumerate(natives.items()):
+            variables[name] = _passed(native, port, name, own, len(PORT) + number)
+        shared = {f.name: getattr(native, f.name) for f in fields(FmuDescription)}
+        renamed = {own: name for name, own in natives.items()}
+        shared |= {
+            "variables": variables,
+            "states": tuple(renamed.get(s, s) for s in native.states) if set(native.states) <= set(renamed) else (),
+            "output_dependencies": _dependencies(native, port, renamed),
+            "gives_directional_derivatives": False,  # they are the FMU's own variables', not the port's
+        }
+        return cls(**shared, native=native, port=port, natives=natives)
+
+
+def _passed(native: FmuDescription, port: PortMap, name: str, own: str, reference: int) -> VariableInfo:
+    info = native.variables[own]
+    signal = port.signals.get(name)
+    if signal is None:
+        return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
+    return replace(info, name=name, reference=reference, causality="output", unit=signal.unit, start=None,
+                   minimum=None, maximum=None)  # fmt: skip
+
+
+def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
+    texts = {
+        "v_re": ("input", "pu", "1.0", "Bus voltage, real part, network frame [pu, bus]"),
+        "v_im": ("input", "pu", "0.0", "Bus voltage, imaginary part, network frame [pu, bus]"),
+        "i_re": ("output", "pu", None, "Injected current, real part, network frame [pu, 100 MVA]"),
+        "i_im": ("output", "pu", None, "Injected current, imaginary part, network frame [pu, 100 MVA]"),
+        "p": ("output", "pu", None, "Active power into the bus [pu, S_n]"),
+        "q": ("output", "pu", None, "Reactive power into the bus [pu, S_n]"),
+        "S_n": ("parameter", "MVA", repr(port.rating), "Rated apparent power, the device's base"),
+        "P_0": ("parameter", "pu", "0.0", "Power flow: active power into the bus [pu, S_n]"),
+        "Q_0": ("parameter", "pu", "0.0", "Power flow: reactive power into the bus [pu, S_n]"),
+        "v_0": ("parameter", "pu", "1.0", "Power flow: voltage magnitude at the bus [pu, bus]"),
+        "theta_0": ("parameter", "rad", "0.0", "Power flow: voltage angle at the bus"),
+    }
+    limits = {"S_n": (1e-3, None), "P_0": (-2.0, 2.0), "Q_0": (-2.0, 2.0), "v_0": (0.1, 2.0)}
+    return {
+        name: VariableInfo(
+            name=name,
+            reference=PORT.index(name) if name in PORT else 2**32 - 1,  # start values are not read through it
+            type="Real",
+            causality=causality,
+            variability="fixed" if causality == "parameter" else "continuous",
+            unit=unit,
+            start=start,
+            minimum=limits.get(name, (None, None))[0],
+            maximum=limits.get(name, (None, None))[1],
+            description=text,
+        )
+        for name, (causality, unit, start, text) in texts.items()
+    }
+
+
+def _dependencies(
+    native: FmuDescription, port: PortMap, renamed: Mapping[str, str]
+) -> dict[str, tuple[str, ...] | None]:
+    """What the outputs depend on directly, in the new names; None where the FMU does not say."""
+
+    def translated(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if names is None:
+            return None
+        seen = dict.fromkeys(renamed[n] for n in names if n in renamed)
+        through = ("v_re", "v_im") if set(names) & set(port.voltage.variables) else ()
+        return (*through, *seen)
+
+    known = {own: translated(native.output_dependencies.get(own)) for own in native.outputs}
+    currents = [known.get(own) for own in port.current.variables]
+    through: tuple[str, ...] | None = None
+    if all(c is not None for c in currents):
+        through = tuple(dict.fromkeys(n for c in currents for n in c or ()))
+    if port.current.form is Form.POWER and through is not None:
+        through = tuple(dict.fromkeys(("v_re", "v_im", *through)))
+    power = None if through is None else tuple(dict.fromkeys(("v_re", "v_im", *through)))
+    found = {"i_re": through, "i_im": through, "p": power, "q": power}
+    return found | {renamed[own]: needs for own, needs in known.items() if own in renamed}

@@ -1,0 +1,127 @@
+"""Whether an FMU gives back the memory that it takes."""
+
+import ctypes
+import gc
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+from orchestrator.vendor.checks.base import Result, check, failed, not_applicable, passed
+from orchestrator.vendor.checks.running import affordable
+from orchestrator.vendor.checks.subject import Subject, saved
+
+_BLOCKS = 6
+_LEAST = 4.0
+"""Bytes kept by each step that count as a leak."""
+
+_INSTANCE = 120.0
+"""Bytes kept by each instance, or each saved state."""
+
+
+_MALLINFO2 = ["arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"]
+
+
+_TOOL = 65536.0
+"""What an instance may keep if it runs in a tool, such as an interpreter that remembers every module it ran."""
+
+
+class _MallocInfo(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_size_t) for name in _MALLINFO2)
+
+
+def memory_in_use() -> int | None:
+    """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does."""
+    try:
+        info = ctypes.CDLL(None).mallinfo2
+        info.restype = _MallocInfo
+        now = info()
+        # An interpreter keeps small objects in blocks of its own, which malloc does not see.
+        return int(now.uordblks + now.hblkhd) + 32 * sys.getallocatedblocks()
+    except (AttributeError, OSError, TypeError):
+        pass
+    if sys.platform == "linux":
+        import resource  # noqa: PLC0415 - only where it exists
+
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    return None
+
+
+@check("memory", "Does it give back the memory that it takes?")
+def memory(subject: Subject) -> Result:
+    if memory_in_use() is None:
+        return not_applicable("memory", "because this platform does not tell how much memory is in use")
+    steps, instance = affordable(subject, 1500), _TOOL if subject.description.needs_tool else _INSTANCE
+    texts, figures = [], {}
+    for what, growth, least in (
+        ("step", _of_steps(subject, steps), _LEAST),
+        ("instance", _of_instances(subject, instance), instance),
+        ("saved state", _of_states(subject), _INSTANCE),
+    ):
+        if growth is None:
+            continue
+        figures[what] = growth
+        if growth > least:
+            texts.append(f"{growth:.0f} bytes with every {what}")
+    if texts:
+        return failed("memory", "memory leak", f"it keeps {' and '.join(texts)}", **figures)
+    return passed("memory", ", ".join(f"{growth:.1f} bytes a {what}" for what, growth in figures.items()), **figures)
+
+
+def _growth(block: Callable[[], None], count: int) -> float:
+    """Bytes kept by every repetition: the least growth of the later blocks, so that what fills once does not count."""
+    sizes = []
+    for _ in range(_BLOCKS):
+        block()
+        gc.collect()
+        sizes.append(memory_in_use() or 0)
+    return max(0.0, min(b - a for a, b in pairwise(sizes[1:])) / count)
+
+
+def _of_steps(subject: Subject, steps: int) -> float | None:
+    ends = subject.description.stop_time
+    if ends is not None and _BLOCKS * steps * subject.step_size > ends:
+        steps = int(ends / subject.step_size / _BLOCKS)
+        if steps < 20:
+            return None
+    stimulus = subject.steps(hold=10 * subject.step_size)
+    with subject.running() as running:
+
+        def block() -> None:
+            for _ in range(steps):
+                running.feed(stimulus(running.time))
+                running.step(subject.step_size)
+                running.read()
+
+        return _growth(block, steps)
+
+
+def _of_instances(subject: Subject, least: float) -> float:
+    """A quick look, and a longer one where that sees something: an interpreter's own memory moves as well."""
+    quick = _of_so_many(subject, max(3, affordable(subject, 4000) // 130))
+    return quick if quick <= least else _of_so_many(subject, max(5, affordable(subject, 4000) // 30))
+
+
+def _of_so_many(subject: Subject, count: int) -> float:
+    def block() -> None:
+        for _ in range(count):
+            with subject.running() as running:
+                running.step(subject.step_size)
+
+    return _growth(block, count)
+
+
+def _of_states(subject: Subject) -> float | None:
+    if not subject.description.can_save_state:
+        return None
+    with subject.running() as running:
+
+        def block() -> None:
+            for _ in range(50):
+                with saved(running) as kept:
+                    at = running.time
+                    running.step(subject.step_size)
+                    running.restore(kept)
+                    running.time = at
+
+        return _growth(block, 50)

@@ -1,0 +1,197 @@
+"""Whether an FMU runs at all, and gives the same answer twice."""
+
+from math import isnan
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.errors import ComponentError
+from orchestrator.fmi.component import RealBatch
+from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.vendor.checks.subject import Running, Subject, difference
+
+RUN_FOR = 2.0
+"""Time [s] for which an FMU is made to run."""
+
+_PATIENCE = 10.0
+"""How many times as long it may take to come to its experiment's end."""
+
+_LONGEST = 60.0
+"""Simulated time [s] after which enough was seen."""
+
+EQUAL = 1e-10
+"""Relative difference up to which two runs are equal."""
+
+
+@check("runs", "Does it run, without crash, hang, exit or numbers that are none?")
+def runs(subject: Subject) -> Result:
+    """Run to where the file says an experiment ends, at least for a while, and in reason."""
+    h, ends = subject.step_size, subject.description.stop_time or 10.0
+    stimulus, least = subject.steps(hold=50 * h), subject.memory.get("run_for", RUN_FOR)
+    with subject.running() as running:
+        begin, k = perf_counter(), 0
+        while k * h < _LONGEST and perf_counter() - begin < (least if k * h >= ends else _PATIENCE * least):
+            try:
+                running.time = k * h
+                running.feed(stimulus(running.time))
+                for _ in range(10):
+                    running.time = k * h
+                    running.step(h)
+                    k += 1
+            except ComponentError as error:
+                if running.time < ends - 0.5 * h or subject.description.stop_time is None:
+                    return failed("runs", "error in a step", str(error), time=running.time)
+                return remarked("runs", f"it stops after its experiment's end: {error}", "do not run it for longer")
+            values = running.read()
+            if not np.isfinite(values).all():
+                return _not_finite(subject, values, running.time)
+        seconds = (perf_counter() - begin) / k
+    subject.memory["seconds_per_step"] = seconds
+    return passed(
+        "runs",
+        f"{k} steps of {h:g} s, {k * h:.3g} s in all, at {1e6 * seconds:.1f} µs a step",
+        steps=k,
+        step_size=h,
+        microseconds_per_step=1e6 * seconds,
+    )
+
+
+def _not_finite(subject: Subject, values: np.ndarray, time: float) -> Result:
+    bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
+    return failed(
+        "runs",
+        "not a number",
+        f"{', '.join(bad[:3])} is {values[~np.isfinite(values)][0]} at t = {time:.6g} s, and fmi2DoStep returned OK",
+        time=time,
+    )
+
+
+def affordable(subject: Subject, steps: int) -> int:
+    """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
+    fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
+    ends = subject.description.stop_time
+    return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / subject.step_size)))
+
+
+@check("repeatability", "Does it give the same answer twice?", needs=("independence",))
+def repeatability(subject: Subject) -> Result:
+    steps = affordable(subject, 1000)
+    stimulus = subject.steps(hold=20 * subject.step_size)
+    first, second = (subject.trajectory(steps, subject.step_size, stimulus) for _ in range(2))
+    apart, place = difference(first, second)
+    if apart > EQUAL:
+        return failed(
+            "repeatability",
+            "not repeatable",
+            f"{subject.watched[place]} differs by {apart:.3g} of its range between two equal runs of {steps} steps",
+            difference=apart,
+        )
+    return passed("repeatability", f"two runs of {steps} steps differ by {apart:.1g}", difference=apart)
+
+
+@check("reading", "Does reading leave it as it was?", needs=SAME)
+def reading(subject: Subject) -> Result:
+    """Read everything, several times and backwards, in one of two equal runs."""
+    steps = affordable(subject, 300)
+    stimulus = subject.steps(hold=10 * subject.step_size)
+    plain = subject.trajectory(steps, subject.step_size, stimulus)
+    rows = [plain[0]]
+    with subject.running() as running:
+        everything = [
+            n for n, v in subject.description.variables.items() if v.type == "Real" and v.reference < 2**32 - 1
+        ]
+        backwards = RealBatch(running.component, everything[::-1])
+        for k in range(steps):
+            running.time = k * subject.step_size
+            running.feed(stimulus(running.time))
+            backwards.read()
+            running.step(subject.step_size)
+            once, twice = running.read(), (backwards.read(), running.read())[1]
+            if not np.array_equal(once, twice, equal_nan=True):
+                return failed(
+                    "reading",
+                    "reading changes it",
+                    f"at t = {running.time:.6g} s, reading twice gives {once.tolist()[:3]} and {twice.tolist()[:3]}",
+                )
+            rows.append(twice)
+    apart, place = difference(plain, np.array(rows))
+    if apart > EQUAL:
+        return failed(
+            "reading",
+            "reading changes it",
+            f"{subject.watched[place]} differs by {apart:.3g} of its range where everything was read in between",
+            difference=apart,
+        )
+    return passed("reading", f"{len(everything)} variables read backwards at every step change nothing")
+
+
+@check("start_values", "Do its variables start where the file says?")
+def start_values(subject: Subject) -> Result:
+    variables = subject.description.variables
+    names = [
+        n
+        for n, v in variables.items()
+        if v.type == "Real"
+        and v.start
+        and v.causality in ("parameter", "input")
+        and v.reference < 2**32 - 1
+        and not (subject.port and n in ("v_re", "v_im"))
+    ]
+    if not names:
+        return not_applicable("start_values", "because no Real parameter or input of its own has a start value")
+    component = subject.open()
+    try:
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        values = component.get(names)
+    except ComponentError as error:
+        return not_applicable("start_values", f"because it cannot be read while it is initialised: {error}")
+    finally:
+        component.close()
+    wrong = [
+        f"{n} is {v:g} and {variables[n].start} is declared"
+        for n, v in values.items()
+        if isnan(v) or abs(v - float(variables[n].start or 0)) > 1e-9 * max(1.0, abs(v))
+    ]
+    if wrong:
+        return failed("start_values", "start values differ", "; ".join(wrong[:3]))
+    return passed("start_values", f"{len(names)} parameters and inputs start as declared")
+
+
+@check("call_order", "Does it refuse calls out of order, and survive them?")
+def call_order(subject: Subject) -> Result:
+    accepted = []
+    component = subject.open()
+    try:
+        try:
+            component.step(0.0, subject.step_size)
+            accepted.append("fmi2DoStep before initialisation")
+        except ComponentError:
+            pass
+    finally:
+        component.close()
+    with subject.running() as running:
+        running.step(subject.step_size)
+        try:
+            running.component.step(running.time, 0.0)
+            accepted.append("a step of size 0")
+        except ComponentError:
+            pass
+    with subject.running() as running:
+        backwards = _accepts(running, -subject.step_size)
+    accepted += ["a step backwards"] if backwards else []
+    if accepted:
+        return remarked(
+            "call_order",
+            f"it accepts {' and '.join(accepted)}",
+            "FMI 2.0 forbids these calls; a master that makes them by mistake will not be told",
+        )
+    return passed("call_order", "steps before initialisation, of size 0 and backwards are refused")
+
+
+def _accepts(running: Running, step_size: float) -> bool:
+    try:
+        running.component.step(0.0, step_size)
+    except ComponentError:
+        return False
+    return True

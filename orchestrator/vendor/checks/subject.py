@@ -1,0 +1,267 @@
+"""The FMU under test: instances of it at an operating point, and runs with reproducible inputs."""
+
+import ctypes
+from cmath import rect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.port import START, BoundDescription
+
+Vector = NDArray[np.float64]
+Stimulus = Callable[[float], Vector]
+"""Time [s] → the inputs' deviations from where they start."""
+
+PORT_STEP = 1e-4
+"""Communication step [s] at which converters are coupled."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point: S = P + jQ [pu, S_n] at the bus voltage v∠θ [pu, rad]."""
+
+    v: float = 1.0
+    theta: float = 0.0
+    P: float = 0.5
+    Q: float = 0.1
+
+    @property
+    def voltage(self) -> complex:
+        return rect(self.v, self.theta)
+
+
+@dataclass
+class Progress:
+    """Where an FMU is, in memory that outlives its process: a crash leaves the time and the call behind."""
+
+    time: Any = field(default_factory=ctypes.c_double)
+    call: Any = field(default_factory=ctypes.c_int64)
+
+
+CALLS = ("fmi2Instantiate", "initialisation", "fmi2DoStep", "fmi2SetReal", "fmi2GetReal", "fmi2GetFMUstate",
+         "fmi2SetFMUstate", "fmi2Reset", "fmi2FreeInstance")  # fmt: skip
+
+
+class Subject:
+    """One FMU, opened as often as a check wants.
+
+    Attributes
+    ----------
+    port
+        Whether it speaks our port, by a binding or by itself.
+    starts
+        Whether it takes the power flow's start values.
+    step_size
+        Communication step of the tests [s].
+    inputs, outputs
+        Names of the Real inputs and outputs.
+    memory
+        Results that several checks share.
+    """
+
+    def __init__(self, description: FmuDescription, directory: Path, progress: Progress | None = None) -> None:
+        self.description, self.directory = description, directory
+        self.progress = progress or Progress()
+        self.memory: dict[str, Any] = {}
+        variables = description.variables
+        self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
+        self.outputs = tuple(n for n in description.outputs if variables[n].type == "Real")
+        self.port = {"v_re", "v_im"} <= set(self.inputs) and {"i_re", "i_im"} <= set(self.outputs)
+        self.port &= (
+            all(variables[n].unit in ("pu", "p.u.") for n in ("v_re", "v_im", "i_re", "i_im")) if self.port else False
+        )
+        bound = description.port.start if isinstance(description, BoundDescription) else dict.fromkeys(START)
+        wanted = ("P_0", "Q_0", "v_0", "theta_0")
+        self.starts = self.port and all(n in bound and n in variables for n in wanted)
+        self.step_size = self._step_size()
+
+    def _step_size(self) -> float:
+        described = self.description
+        if described.default_step_size is not None:
+            return described.default_step_size
+        if self.port:
+            return PORT_STEP
+        return min(1e-3, described.stop_time / 1000) if described.stop_time else 1e-3
+
+    # -- instances -------------------------------------------------------------------------------
+
+    def open(self, name: str = "fmu") -> Component:
+        """A new instance, before initialisation."""
+        self.progress.call.value, self.progress.time.value = 0, 0.0
+        return open_component(name, self.description, self.directory, isolated=False)
+
+    def running(
+        self, name: str = "fmu", point: Point | None = None, parameters: Mapping[str, float | bool] | None = None
+    ) -> "Running":
+        """A new instance, initialised; use it as a context manager."""
+        component = self.open(name)
+        try:
+            return Running(self, component, point, parameters)
+        except BaseException:
+            component.close()
+            raise
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """What tells runs apart: the outputs, or any Real variable that moves where there is none."""
+        if self.outputs:
+            return self.outputs
+        variables = self.description.variables.values()
+        return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
+
+    def start_inputs(self, point: Point | None) -> Vector:
+        """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
+        voltage = (point or Point()).voltage
+        known = {"v_re": voltage.real, "v_im": voltage.imag} if self.port else {}
+        return np.array([known.get(n, _number(self.description.variables[n].start)) for n in self.inputs])
+
+    # -- stimuli ---------------------------------------------------------------------------------
+
+    @property
+    def amplitudes(self) -> Vector:
+        """A small deviation for each input, within what it declares."""
+        sizes = []
+        for name in self.inputs:
+            info = self.description.variables[name]
+            start = _number(info.start)
+            size = 0.02 if self.port and name in ("v_re", "v_im") else max(0.05 * abs(start), 0.05)
+            room = [abs(limit - start) for limit in (info.minimum, info.maximum) if limit is not None]
+            sizes.append(min([size, *[0.5 * r for r in room if r > 0]]))
+        return np.array(sizes)
+
+    def steps(self, hold: float, seed: int = 1) -> Stimulus:
+        """Steps of random height that are held for ``hold`` seconds; equal seeds give equal steps."""
+        heights = np.random.default_rng(seed).uniform(-1, 1, (4096, len(self.inputs))) * self.amplitudes
+        return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
+
+    def one_step(self) -> Stimulus:
+        """All inputs step at the beginning and stay."""
+        return lambda time: self.amplitudes
+
+    def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Vector:
+        """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs)."""
+        with self.running(**options) as running:
+            return running.record(steps, step_size, stimulus)
+
+
+class Running:
+    """An initialised instance that knows its time."""
+
+    def __init__(self, subject: Subject, component: Component, point: Point | None = None,
+                 parameters: Mapping[str, float | bool] | None = None) -> None:  # fmt: skip
+        self.subject, self.component, self.point = subject, component, point
+        self.parameters = dict(parameters or {})
+        self.begin()
+
+    def begin(self) -> None:
+        """Initialise the instance, new or reset."""
+        subject, component = self.subject, self.component
+        subject.progress.call.value = 1
+        self.time = 0.0
+        if subject.starts:
+            point = self.point or Point()
+            start = {"P_0": point.P, "Q_0": point.Q, "v_0": point.v, "theta_0": point.theta}
+            component.set({n: v for n, v in start.items() if n in subject.description.variables})
+        component.set(self.parameters)
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        self.rest = subject.start_inputs(self.point)
+        self._in = RealBatch(component, subject.inputs)
+        self._out = RealBatch(component, subject.watched)
+        self.feed(np.zeros(len(self.rest)))
+        component.exit_initialization_mode()
+
+    def feed(self, deviation: Vector) -> None:
+        """Set the inputs to their start values plus a deviation."""
+        self.subject.progress.call.value = 3
+        self._in.values[:] = self.rest + deviation
+        self._in.write()
+
+    def read(self) -> Vector:
+        self.subject.progress.call.value = 4
+        return self._out.read().copy()
+
+    def step(self, step_size: float) -> None:
+        progress = self.subject.progress
+        progress.call.value, progress.time.value = 2, self.time
+        self.component.step(self.time, step_size)
+        self.time += step_size
+
+    def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Vector:
+        """Step and read, shape (steps + 1, n); the first row is before the stimulus."""
+        rows = np.empty((steps + 1, len(self._out.names)))
+        rows[0] = self.read()
+        begin = self.time
+        for k in range(steps):
+            self.time = begin + k * step_size  # not accumulated, so that equal runs have equal times
+            self.feed(stimulus(self.time))
+            self.step(step_size)
+            rows[k + 1] = self.read()
+        return rows
+
+    def save(self) -> Any:
+        self.subject.progress.call.value = 5
+        return self.component.save_state()
+
+    def restore(self, state: Any) -> None:
+        self.subject.progress.call.value = 6
+        self.component.restore_state(state)
+
+    def reset(self) -> None:
+        self.subject.progress.call.value = 7
+        self.component.reset()
+        self.begin()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.subject.progress.call.value = 8
+        self.component.close()
+
+
+@contextmanager
+def saved(running: Running) -> Iterator[Any]:
+    """A saved state that is freed at the end."""
+    state = running.save()
+    try:
+        yield state
+    finally:
+        running.component.free_state(state)
+
+
+def scales(*trajectories: Vector) -> Vector:
+    """For each output how far it moves in all runs together; its size where it hardly moves."""
+    values = np.concatenate(trajectories)
+    finite = np.where(np.isfinite(values), values, 0.0)
+    size = np.abs(finite).max(axis=0)
+    moved: Vector = np.maximum(np.ptp(finite, axis=0), np.maximum(1e-6 * size, 1e-9))
+    return moved
+
+
+def difference(a: Vector, b: Vector) -> tuple[float, int]:
+    """Largest difference of two runs relative to how far the outputs move, and the output's place."""
+    if not a.size:
+        return 0.0, 0
+    apart = np.abs(a - b) / scales(a, b)
+    apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isfinite(apart), apart, np.inf))
+    place = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    return float(apart[place]), int(place[1])
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text) if text is not None else 0.0
+    except ValueError:
+        return 0.0

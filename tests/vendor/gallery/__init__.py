@@ -1,0 +1,1 @@
+"""Small FMUs in C, good ones and faulty ones, built by the test suite."""

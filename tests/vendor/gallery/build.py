@@ -1,0 +1,137 @@
+"""From C and a few words on its variables to an FMU file."""
+
+import uuid
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import fmpy
+
+from fmus.toolchain.compiler import ENDINGS, compile_library, host_platform
+
+HERE = Path(__file__).parent
+BASE_UNITS = {
+    "pu": {},
+    "1": {},
+    "rad": {"rad": "1"},
+    "s": {"s": "1"},
+    "kV": {"kg": "1", "m": "2", "s": "-3", "A": "-1", "factor": "1000"},
+    "V": {"kg": "1", "m": "2", "s": "-3", "A": "-1"},
+    "kA": {"A": "1", "factor": "1000"},
+    "A": {"A": "1"},
+    "MVA": {"kg": "1", "m": "2", "s": "-3", "factor": "1000000"},
+    "MW": {"kg": "1", "m": "2", "s": "-3", "factor": "1000000"},
+    "Mvar": {"kg": "1", "m": "2", "s": "-3", "factor": "1000000"},
+}
+
+
+@dataclass(frozen=True)
+class Variable:
+    name: str
+    reference: int
+    causality: str
+    start: float | None = None
+    unit: str = "pu"
+    depends: Sequence[str] | None = ()
+    variability: str = "continuous"
+
+
+@dataclass(frozen=True)
+class Source:
+    """What an FMU is made from: a C file, macros, variables, and what its description says."""
+
+    name: str
+    file: str
+    defines: Mapping[str, object]
+    variables: Sequence[Variable]
+    step_size: str | None = "1e-4"
+    stop_time: str = "1"
+    state: bool = True
+    units: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def identity(source: Source) -> str:
+    text = repr((source.name, source.file, sorted(source.defines.items()), source.variables))
+    return "{" + str(uuid.uuid5(uuid.NAMESPACE_URL, text)) + "}"
+
+
+def description(source: Source) -> bytes:
+    root = Element("fmiModelDescription", fmiVersion="2.0", modelName=source.name, guid=identity(source),
+                   generationTool="gallery of gfor-cosim", variableNamingConvention="structured",
+                   numberOfEventIndicators="0")  # fmt: skip
+    state = "true" if source.state else "false"
+    SubElement(root, "CoSimulation", modelIdentifier=source.name, canHandleVariableCommunicationStepSize="true",
+               canGetAndSetFMUstate=state, canSerializeFMUstate=state)  # fmt: skip
+    units = SubElement(root, "UnitDefinitions")
+    for unit in sorted({v.unit for v in source.variables if v.unit}):
+        element = SubElement(units, "Unit", name=unit)
+        base = source.units.get(unit, BASE_UNITS.get(unit, {}))
+        if base:
+            SubElement(element, "BaseUnit", dict(base))
+    categories = SubElement(root, "LogCategories")
+    SubElement(categories, "Category", name="logAll")
+    experiment = SubElement(root, "DefaultExperiment", startTime="0", stopTime=source.stop_time)
+    if source.step_size:
+        experiment.set("stepSize", source.step_size)
+    _variables(root, source)
+    _structure(root, source)
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8")
+
+
+def _variables(root, source):
+    variables = SubElement(root, "ModelVariables")
+    for v in source.variables:
+        attributes = {"name": v.name, "valueReference": str(v.reference), "causality": v.causality}
+        attributes["variability"] = v.variability
+        if v.causality == "output":
+            attributes["initial"] = "calculated"
+        elif v.causality == "parameter":
+            attributes["initial"] = "exact"
+        element = SubElement(variables, "ScalarVariable", attributes)
+        real = SubElement(element, "Real")
+        if v.unit:
+            real.set("unit", v.unit)
+        if v.start is not None and v.causality != "output":
+            real.set("start", repr(float(v.start)))
+
+
+def _structure(root, source):
+    structure = SubElement(root, "ModelStructure")
+    index = {v.name: str(number) for number, v in enumerate(source.variables, start=1)}
+    outputs = [v for v in source.variables if v.causality == "output"]
+    if outputs:
+        for parent in (SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")):
+            for v in outputs:
+                unknown = SubElement(parent, "Unknown", index=index[v.name])
+                if v.depends is not None and parent.tag == "Outputs":
+                    unknown.set("dependencies", " ".join(index[n] for n in v.depends))
+
+
+@cache
+def _code(file: str) -> str:
+    return (HERE / file).read_text(encoding="utf-8")
+
+
+def library(source: Source) -> Path:
+    macros = {**source.defines, "GUID": f'"{identity(source)}"'}
+    text = "".join(f"#define {name} {value}\n" for name, value in macros.items())
+    # The model comes first for its SIZE, the interface after it.
+    headers = "#include <math.h>\n#include <stdlib.h>\n#include <string.h>\n"
+    return compile_library(text + headers + _code(source.file) + _code("fmi2.c"), host_platform())
+
+
+def build(source: Source, folder: Path) -> Path:
+    """Write the FMU."""
+    path = folder / f"{source.name}.fmu"
+    binary = f"binaries/{fmpy.platform}/{source.name}{ENDINGS[host_platform()]}"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("modelDescription.xml", description(source))
+        archive.write(library(source), binary)
+        for name, content in source.files.items():
+            archive.writestr(name, content)
+    return path

@@ -1,0 +1,180 @@
+/* A grid-forming converter of few equations: a voltage E∠δ behind R + jX, a droop from active power to frequency, and
+   one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
+   z: parameters, inputs, outputs; memory: the states. */
+enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
+enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, MEMORY };
+#define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
+#define DIVERGED 1e12
+
+#ifndef RATING
+#define RATING 1500.0
+#endif
+#ifndef DROOP
+#define DROOP 0.02
+#endif
+#ifndef X_PU
+#define X_PU 0.25
+#endif
+#ifndef R_PU
+#define R_PU 0.03
+#endif
+#ifndef SHUNT
+#define SHUNT 0.0 /* conductance at the port: direct feed-through */
+#endif
+#ifndef INTERNAL
+#define INTERNAL 1e-4
+#endif
+#ifndef V_UNIT
+#define V_UNIT 1.0 /* FMU's units in 1 pu of voltage, of current on the rating, of power */
+#endif
+#ifndef I_UNIT
+#define I_UNIT (RATING / 100.0)
+#endif
+#ifndef P_UNIT
+#define P_UNIT 1.0
+#endif
+#ifndef I_FACTOR
+#define I_FACTOR 1.0 /* a wrong base or sign */
+#endif
+#ifndef Q_FACTOR
+#define Q_FACTOR 1.0
+#endif
+#define OMEGA_B 314.15926535897932
+
+static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.1,
+#ifdef PORT_ABC
+                                   V_UNIT, -V_UNIT / 2, -V_UNIT / 2
+#else
+                                   V_UNIT, 0, 0
+#endif
+};
+
+typedef struct { double re, im; } phasor;
+
+static double clock_angle(double time) { return OMEGA_B * time; }
+
+static phasor voltage(const double *z, double time) {
+#if defined PORT_POLAR
+    return (phasor){z[IN_1] / V_UNIT * cos(z[IN_2]), z[IN_1] / V_UNIT * sin(z[IN_2])};
+#elif defined PORT_ABC
+    const double a = (2 * z[IN_1] - z[IN_2] - z[IN_3]) / 3, b = (z[IN_2] - z[IN_3]) / sqrt(3.0);
+    const double c = cos(clock_angle(time)), s = sin(clock_angle(time));
+    return (phasor){(a * c + b * s) / V_UNIT, (b * c - a * s) / V_UNIT};
+#elif defined PORT_QD
+    return (phasor){z[IN_1] / V_UNIT, -z[IN_2] / V_UNIT};
+#else
+    return (phasor){z[IN_1] / V_UNIT, z[IN_2] / V_UNIT};
+#endif
+}
+
+static void initialise(double *z, double *m) {
+    const double v = z[V_0] / V_UNIT, p = z[P_0] / P_UNIT, q = z[Q_0] / P_UNIT, t = z[THETA_0];
+    const phasor bus = {v * cos(t), v * sin(t)};
+    double drift = 0;
+    /* Current from S = v·conj(i); what the shunt takes is fed as well. */
+    m[I_RE] = (p * bus.re + q * bus.im) / (v * v) + SHUNT * bus.re;
+    m[I_IM] = (p * bus.im - q * bus.re) / (v * v) + SHUNT * bus.im;
+#ifdef FAULT_DRIFT
+    drift = FAULT_DRIFT;
+#endif
+    const phasor e = {bus.re + R_PU * m[I_RE] - X_PU * m[I_IM], bus.im + R_PU * m[I_IM] + X_PU * m[I_RE]};
+    m[DELTA] = atan2(e.im, e.re) + drift;
+    m[E_0] = hypot(e.re, e.im);
+    m[P_F] = m[P_REF] = e.re * m[I_RE] + e.im * m[I_IM];
+    m[Q_F] = m[Q_REF] = e.im * m[I_RE] - e.re * m[I_IM];
+    m[REST] = 0;
+}
+
+/* The present time is kept as REST + …: phase quantities need it, and it is part of the state. */
+static void rates(const double *z, const double *m, const double *hidden, phasor v, double *d) {
+#ifdef FAULT_HIDDEN
+    const double p_f = hidden[0] + m[P_REF];
+#else
+    const double p_f = m[P_F];
+#endif
+    const double e = m[E_0] + 0.05 * (m[Q_REF] - m[Q_F]);
+    const phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
+    const double p = u.re * m[I_RE] + u.im * m[I_IM], q = u.im * m[I_RE] - u.re * m[I_IM];
+    d[I_RE] = OMEGA_B / X_PU * (u.re - v.re - R_PU * m[I_RE] + X_PU * m[I_IM]);
+    d[I_IM] = OMEGA_B / X_PU * (u.im - v.im - R_PU * m[I_IM] - X_PU * m[I_RE]);
+    d[DELTA] = OMEGA_B * z[GAIN] * (m[P_REF] - p_f);
+    d[P_F] = (p - p_f) / z[TAU];
+    d[Q_F] = (q - m[Q_F]) / z[TAU];
+}
+
+static void substep(const double *z, double *m, double *hidden, phasor v, double h) {
+    enum { N = 5 };
+    double k[4][N], x[MEMORY];
+    memcpy(x, m, sizeof x);
+    for (int s = 0; s < 4; ++s) {
+        if (s)
+            for (int j = 0; j < N; ++j) x[j] = m[j] + (s == 3 ? h : h / 2) * k[s - 1][j];
+        rates(z, x, hidden, v, k[s]);
+    }
+    for (int j = 0; j < N; ++j) m[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
+#ifdef FAULT_HIDDEN
+    hidden[0] += h / 6 * (k[0][P_F] + 2 * k[1][P_F] + 2 * k[2][P_F] + k[3][P_F]);
+#endif
+}
+
+static double present; /* of the call that is running, not of an instance */
+
+static void advance(double *z, double *m, double *hidden, double time, double step) {
+    const phasor v = voltage(z, time + step / 2);
+#if defined FAULT_STEP
+    /* As many internal steps as somebody thought there would be. */
+    for (int k = 0; k < FAULT_STEP; ++k) substep(z, m, hidden, v, INTERNAL / FAULT_STEP);
+#elif defined FAULT_ROUNDING
+    /* What is left of the communication step is lost. */
+    for (int k = (int)(step / FAULT_ROUNDING + 1e-9); k > 0; --k) substep(z, m, hidden, v, FAULT_ROUNDING);
+#elif defined FIXED_STEP
+    /* An internal step of its own; what is left is carried over. */
+    m[REST] += step;
+    for (; m[REST] > FIXED_STEP * (1 - 1e-6); m[REST] -= FIXED_STEP) substep(z, m, hidden, v, FIXED_STEP);
+#elif defined ONE_SUBSTEP
+    substep(z, m, hidden, v, step);
+#else
+    const int parts = (int)ceil(step / INTERNAL - 1e-9);
+    for (int k = 0; k < parts; ++k) substep(z, m, hidden, v, step / parts);
+#endif
+#ifdef FAULT_RANDOM
+    m[P_F] += FAULT_RANDOM * ((double)rand() / RAND_MAX - 0.5);
+#endif
+    present = time + step;
+#ifdef PORT_ABC
+    m[REST] = time + step;
+#endif
+}
+
+static void outputs(double *z, double *m, const double *hidden) {
+#ifdef PORT_ABC
+    const double now = m[REST];
+#else
+    const double now = 0;
+#endif
+    const phasor v = voltage(z, now);
+    phasor i = {m[I_RE] - SHUNT * v.re, m[I_IM] - SHUNT * v.im};
+#ifdef FAULT_NAN_LIMIT
+    if (hypot(i.re, i.im) > FAULT_NAN_LIMIT) i.re = NAN;
+#endif
+#ifdef FAULT_NAN_AT
+    if (present > FAULT_NAN_AT) i.re = NAN;
+#endif
+    i.re *= I_FACTOR, i.im *= I_FACTOR * Q_FACTOR;
+#if defined PORT_POWER
+    z[OUT_1] = (v.re * i.re + v.im * i.im) * P_UNIT;
+    z[OUT_2] = (v.im * i.re - v.re * i.im) * P_UNIT;
+#elif defined PORT_POLAR
+    z[OUT_1] = hypot(i.re, i.im) * I_UNIT, z[OUT_2] = atan2(i.im, i.re);
+#elif defined PORT_ABC
+    for (int k = 0; k < 3; ++k) {
+        const double phase = clock_angle(now) - 2.0943951023931953 * k;
+        z[OUT_1 + k] = (i.re * cos(phase) - i.im * sin(phase)) * I_UNIT;
+    }
+#elif defined PORT_QD
+    z[OUT_1] = i.re * I_UNIT, z[OUT_2] = -i.im * I_UNIT;
+#else
+    z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
+#endif
+    z[OMEGA] = 1 + z[GAIN] * (m[P_REF] - m[P_F]);
+}

@@ -1,0 +1,327 @@
+/* FMI 2.0 for co-simulation around one vector z of Real variables, indexed by value reference.
+   A model defines SIZE, START, initialise, advance and outputs; a FAULT_… switches one fault on. */
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef void (*logger_t)(void *, const char *, int, const char *, const char *, ...);
+typedef struct {
+    logger_t logger;
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*finished)(void *, int);
+    void *environment;
+} callbacks_t;
+
+#ifdef LATE
+#define IS_LATE(r) ((r) == LATE)
+#else
+#define IS_LATE(r) IS_OUTPUT(r)
+#endif
+
+enum { OK, WARNING, DISCARD, ERROR, FATAL };
+enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED };
+
+typedef struct {
+    double z[SIZE];
+    double memory[MEMORY]; /* of the model, beyond its variables */
+    double time;
+    int phase, dirty;
+} state_t;
+
+typedef struct {
+    state_t s;
+    double hidden[8]; /* what FAULT_HIDDEN forgets */
+    double late[SIZE]; /* what FAULT_DELAY returns */
+    const callbacks_t *callbacks;
+    char *name;
+    int calls;
+} instance_t;
+
+#ifdef FAULT_SHARED
+static state_t shared; /* one for all instances */
+#define S (&shared)
+#else
+#define S (&instance->s)
+#endif
+
+static int instances_made;
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+
+static void log_text(instance_t *instance, int status, const char *text) {
+    if (instance->callbacks && instance->callbacks->logger)
+        instance->callbacks->logger(instance->callbacks->environment, instance->name, status, "logAll", "%s", text);
+}
+
+static void defaults(state_t *s) {
+    memset(s, 0, sizeof *s);
+    memcpy(s->z, START, sizeof START);
+    s->dirty = 1;
+}
+
+EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
+                             const callbacks_t *callbacks, int visible, int logging) {
+    if (strcmp(guid, GUID)) return NULL;
+    instance_t *instance = calloc(1, sizeof *instance);
+    instance->callbacks = callbacks;
+    instance->name = strdup(name);
+    defaults(S);
+    ++instances_made;
+#ifdef FAULT_SECOND_INSTANCE
+    if (instances_made > 1) S->z[GAIN] *= 1.02;
+#endif
+#ifdef FAULT_START
+    S->z[GAIN] *= 1.1;
+#endif
+    return instance;
+}
+
+EXPORT void fmi2FreeInstance(void *c) {
+    instance_t *instance = c;
+    if (!instance) return;
+#ifndef FAULT_LEAK_INSTANCE
+    free(instance->name);
+    free(instance);
+#endif
+}
+
+EXPORT int fmi2SetupExperiment(void *c, int defined, double tolerance, double start, int stop_defined, double stop) {
+    instance_t *instance = c;
+    S->time = start;
+    return OK;
+}
+EXPORT int fmi2EnterInitializationMode(void *c) {
+    instance_t *instance = c;
+    S->phase = INITIALISING, S->dirty = 1;
+    return OK;
+}
+
+static void refresh(instance_t *instance) {
+    if (!S->dirty) return;
+    if (S->phase < STEPPING) initialise(S->z, S->memory);
+    outputs(S->z, S->memory, instance->hidden);
+    S->dirty = 0;
+}
+
+EXPORT int fmi2ExitInitializationMode(void *c) {
+    instance_t *instance = c;
+    S->dirty = 1;
+    refresh(instance);
+    S->phase = STEPPING;
+    memcpy(instance->late, S->z, sizeof S->z);
+    return OK;
+}
+EXPORT int fmi2Terminate(void *c) { return OK; }
+EXPORT int fmi2Reset(void *c) {
+    instance_t *instance = c;
+#ifdef FAULT_RESET
+    const double kept = S->z[GAIN]; /* a tunable parameter that stays where it was */
+    defaults(S);
+    S->z[GAIN] = kept * 1.01;
+#elif defined FAULT_RESET_STATE
+    double kept[MEMORY];
+    memcpy(kept, S->memory, sizeof kept);
+    defaults(S);
+    memcpy(S->memory, kept, sizeof kept);
+#else
+    defaults(S);
+    memset(instance->hidden, 0, sizeof instance->hidden);
+#endif
+    return OK;
+}
+
+EXPORT int fmi2GetReal(void *c, const unsigned *references, size_t n, double *values) {
+    instance_t *instance = c;
+    refresh(instance);
+    for (size_t k = 0; k < n; ++k) {
+        if (references[k] >= SIZE) return ERROR;
+        values[k] = S->z[references[k]];
+#ifdef FAULT_DELAY
+        if (S->phase == STEPPING && IS_LATE(references[k])) values[k] = instance->late[references[k]];
+#endif
+#ifdef FAULT_READING
+        if (S->phase == STEPPING && IS_OUTPUT(references[k])) S->memory[0] += FAULT_READING;
+#endif
+    }
+    return OK;
+}
+EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const double *values) {
+    instance_t *instance = c;
+    for (size_t k = 0; k < n; ++k) {
+        if (references[k] >= SIZE) return ERROR;
+        S->z[references[k]] = values[k];
+    }
+#if defined FAULT_STALE
+    if (S->phase < STEPPING) S->dirty = 1; /* outputs follow in the next step only */
+#else
+    S->dirty = 1;
+#endif
+#ifdef FAULT_CRASH_ON_NAN
+    for (size_t k = 0; k < n; ++k)
+        if (isnan(values[k])) *(volatile int *)8 = 1;
+#endif
+    return OK;
+}
+
+EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
+    instance_t *instance = c;
+#ifndef FAULT_NO_ORDER
+    if (S->phase != STEPPING || !(step > 0)) {
+        log_text(instance, ERROR, "fmi2DoStep needs an initialised instance and a step size above 0");
+        return ERROR;
+    }
+#else
+    if (S->phase != STEPPING) *(volatile int *)8 = 1;
+#endif
+#ifdef STRICT_TIME
+    if (fabs(time - S->time) > 1e-9 * (1 + fabs(time))) return ERROR;
+#endif
+#ifdef ONLY_STEP
+    if (fabs(step - ONLY_STEP) > 1e-12) {
+        log_text(instance, ERROR, "there is one communication step size only");
+        return ERROR;
+    }
+#endif
+    ++instance->calls;
+    memcpy(instance->late, S->z, sizeof S->z);
+    if (S->dirty) outputs(S->z, S->memory, instance->hidden), memcpy(instance->late, S->z, sizeof S->z);
+    advance(S->z, S->memory, instance->hidden, time, step);
+    S->time = time + step;
+    S->dirty = 1;
+    refresh(instance);
+    for (int k = 0; k < SIZE; ++k)
+        if (fabs(S->z[k]) > DIVERGED) {
+            log_text(instance, ERROR, "the solution diverges");
+            return ERROR;
+        }
+#ifndef FAULT_NAN_LIMIT
+#ifndef FAULT_NAN_AT
+    for (int k = 0; k < SIZE; ++k)
+        if (isnan(S->z[k])) {
+            log_text(instance, ERROR, "a variable is not a number");
+            return ERROR;
+        }
+#endif
+#endif
+#ifdef FAULT_CRASH_AT
+    if (S->time > FAULT_CRASH_AT) *(volatile int *)8 = 1;
+#endif
+#ifdef FAULT_ABORT_AT
+    if (S->time > FAULT_ABORT_AT) abort();
+#endif
+#ifdef FAULT_HANG_AT
+    while (S->time > FAULT_HANG_AT) {
+        static volatile int spin;
+        ++spin;
+    }
+#endif
+#ifdef FAULT_EXIT_AT
+    if (S->time > FAULT_EXIT_AT) exit(3);
+#endif
+#ifdef FAULT_ERROR_AT
+    if (S->time > FAULT_ERROR_AT) {
+        log_text(instance, ERROR, "licence expired");
+        return ERROR;
+    }
+#endif
+#ifdef FAULT_FLOOD
+    for (int k = 0; k < FAULT_FLOOD; ++k) log_text(instance, OK, "nothing of note");
+#endif
+#ifdef FAULT_PRINT
+    for (int k = 0; k < FAULT_PRINT; ++k) fprintf(stderr, "step from %g s: nothing of note\n", time);
+#endif
+#ifdef FAULT_WRITE
+    const char *names[] = {FAULT_WRITE, "inside.txt"};
+    for (int k = 0; k < 2; ++k) {
+        FILE *file = fopen(names[k], "w");
+        if (file) fputs("inside", file), fclose(file);
+    }
+#endif
+#ifdef FAULT_LEAK
+    static void *volatile lost;
+    lost = malloc(FAULT_LEAK);
+#endif
+#ifdef FAULT_EAT
+    static void *volatile eaten;
+    for (int k = 0; k < 100; ++k) memset((eaten = malloc(FAULT_EAT)), 1, FAULT_EAT); /* dies of it where memory ends */
+#endif
+    return OK;
+}
+EXPORT int fmi2CancelStep(void *c) { return ERROR; }
+
+EXPORT int fmi2GetFMUstate(void *c, void **state) {
+    instance_t *instance = c;
+    refresh(instance);
+    if (!*state) *state = malloc(sizeof(instance_t));
+    memcpy(*state, instance, sizeof(instance_t));
+    ((instance_t *)*state)->s = *S;
+    return OK;
+}
+EXPORT int fmi2SetFMUstate(void *c, void *state) {
+    instance_t *instance = c;
+    const instance_t *saved = state;
+    *S = saved->s;
+#ifndef FAULT_HIDDEN
+    memcpy(instance->hidden, saved->hidden, sizeof saved->hidden);
+#endif
+    memcpy(instance->late, saved->late, sizeof saved->late);
+    return OK;
+}
+EXPORT int fmi2FreeFMUstate(void *c, void **state) {
+#ifndef FAULT_LEAK_STATE
+    free(*state);
+#endif
+    *state = NULL;
+    return OK;
+}
+EXPORT int fmi2SerializedFMUstateSize(void *c, void *state, size_t *size) {
+    *size = sizeof(instance_t);
+#ifdef FAULT_GROWING_STATE
+    *size += 16 * (size_t)((instance_t *)state)->calls;
+#endif
+    return OK;
+}
+EXPORT int fmi2SerializeFMUstate(void *c, void *state, char *bytes, size_t size) {
+    memset(bytes, 0, size);
+    memcpy(bytes, state, sizeof(instance_t));
+    return OK;
+}
+EXPORT int fmi2DeSerializeFMUstate(void *c, const char *bytes, size_t size, void **state) {
+    if (!*state) *state = malloc(sizeof(instance_t));
+    memcpy(*state, bytes, sizeof(instance_t));
+#ifdef FAULT_SERIALISED
+    ((instance_t *)*state)->s.memory[0] = 0;
+#endif
+    return OK;
+}
+
+EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const *categories) { return OK; }
+#define NONE(name) \
+    EXPORT int name(void *c, const unsigned *r, size_t n, void *v) { return n ? ERROR : OK; }
+NONE(fmi2GetInteger)
+NONE(fmi2SetInteger)
+NONE(fmi2GetBoolean)
+NONE(fmi2SetBoolean)
+NONE(fmi2GetString)
+NONE(fmi2SetString)
+EXPORT int fmi2GetDirectionalDerivative(void *c, const unsigned *u, size_t nu, const unsigned *k, size_t nk,
+                                        const double *dk, double *du) { return ERROR; }
+EXPORT int fmi2SetRealInputDerivatives(void *c, const unsigned *r, size_t n, const int *o, const double *v) { return ERROR; }
+EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *r, size_t n, const int *o, double *v) { return ERROR; }
+EXPORT int fmi2GetStatus(void *c, int kind, int *value) { return DISCARD; }
+EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) { return DISCARD; }
+EXPORT int fmi2GetIntegerStatus(void *c, int kind, int *value) { return DISCARD; }
+EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) { return DISCARD; }
+EXPORT int fmi2GetStringStatus(void *c, int kind, const char **value) { return DISCARD; }
+EXPORT const char *gallery_marker(void) { return "gallery"; }

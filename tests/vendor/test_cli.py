@@ -1,0 +1,168 @@
+"""`gfor bind`, `gfor check`, and a vendor's FMU in a case, as a user meets them."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import xarray as xr
+
+from orchestrator.cases import two_area
+from orchestrator.cli import main
+from orchestrator.vendor.checks.all import CHECKS, MODULES, ORDER
+from orchestrator.vendor.checks.base import CHECKS as ENTERED
+from tests.vendor.gallery.hostile import entities
+
+FAST = ("--only", "power_balance", "--time-limit", "10")
+
+
+@pytest.fixture
+def gfor(capsys):
+    def run(*arguments):
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            code = stop.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture
+def case(tmp_path):
+    """The two-area case with a vendor's FMU in place of our converter."""
+
+    def write(fmu, binding=None, extra=""):
+        text = (Path(two_area.__file__).parent / "case.toml").read_text(encoding="utf-8")
+        ours = 'model = "gfor"\n'
+        assert text.count(ours) == 1
+        bound = f'binding = "{binding}"\n' if binding else ""
+        text = text.replace(ours, f'fmu = "{fmu}"\n{bound}{extra}')
+        head, tail = text.partition("[scenarios.base]")[0], text.partition("[analysis]")[2].partition("[reference]")[0]
+        path = tmp_path / "case.toml"
+        path.write_text(f"{head}[scenarios.vendor]\n[analysis]{tail}", encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_every_check_has_its_place_in_the_order():
+    assert MODULES
+    assert set(ORDER) == set(ENTERED) == set(CHECKS)
+    for name, check in CHECKS.items():
+        assert all(ORDER.index(needed) < ORDER.index(name) for needed in check.needs)
+
+
+def test_a_draft_tells_what_is_left_to_fill_in(gfor, gallery, tmp_path):
+    fmu, _ = gallery("converter_qd_si")
+    out = tmp_path / "vendor.toml"
+    code, text, _ = gfor("bind", fmu, "--out", out)
+    assert code == 0
+    assert "to be filled in: S_n" not in text  # its S_n has a start value
+    assert text.count("to be filled in: value") == 3
+    code, _, error = gfor("bind", fmu, "--out", out)
+    assert code == 2
+    assert "there already" in error
+    assert gfor("bind", fmu, "--out", out, "--force")[0] == 0
+    code, _, error = gfor("check", fmu, "--binding", out, *FAST)
+    assert code == 2
+    assert "still to be filled in" in error
+
+
+def test_a_sound_fmu_ends_with_0(gfor, gallery):
+    code, text, _ = gfor("check", *_bound(gallery("converter_qd_si")), *FAST)
+    assert code == 0
+    assert "no check failed" in text
+    assert "S is what is asked" in text
+
+
+def test_a_faulty_one_ends_with_1_and_says_what_to_do(gfor, gallery, tmp_path):
+    junit = tmp_path / "out.xml"
+    code, text, _ = gfor("check", gallery("sign")[0], *FAST, "--json", "--junit", junit)
+    assert code == 1
+    report = json.loads(text)
+    assert report["faults"] == ["wrong sign"]
+    assert not report["trusted"]
+    failure = report["checks"][-1]
+    assert failure["check"] == "power_balance"
+    assert failure["figures"]["a"] == pytest.approx([-1, 0], abs=1e-9)
+    assert "direction" in failure["remedy"]
+    suite = ElementTree.parse(junit).getroot()
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    assert suite.find("testcase/failure").get("message") == "wrong sign"
+
+
+def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path):
+    code, text, _ = gfor("check", entities(tmp_path, gallery("gain")[0]))
+    assert code == 1
+    assert "entity expansion" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("none.fmu",), "there is no such file"),
+        (("FMU", "--only", "nothing"), "there is no check 'nothing'; there are: fmi_validity"),
+        (("FMU", "--binding", "none.toml"), "`gfor bind FILE.fmu` drafts one"),
+        (("FMU", "--time-limit", "-1"), "must be a number above 0"),
+    ],
+)
+def test_what_cannot_be_used(arguments, words, gfor, gallery):
+    code, out, error = gfor("check", *[gallery("gain")[0] if a == "FMU" else a for a in arguments])
+    assert code == 2
+    assert out == ""
+    assert words in error
+
+
+def _bound(paths):
+    fmu, binding = paths
+    return (fmu, "--binding", binding)
+
+
+def test_a_vendors_fmu_stands_in_a_case(gfor, gallery, case, tmp_path):
+    """In kiloampere and qd, in a process of its own, from the power flow: it stays in steady state until the event."""
+    path = case(*gallery("converter_qd_si"))
+    code, _, error = gfor("run", path, "--stop", "1.2", "--out", tmp_path / "out")
+    assert code == 0, error
+    assert "there are no modes: component 'gfor'" in error
+    run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
+    before = run["gfor.p"].sel(time=slice(0, 1.0))
+    assert float(abs(before - 0.9).max()) < 1e-9
+    assert float(run["gfor.p"].isel(time=-1)) > 0.9  # the load step is seen
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["scenarios"][0]["residual"] is None
+
+
+def test_a_vendors_fmu_that_crashes_leaves_what_was_computed(gfor, gallery, case, tmp_path):
+    code, _, error = gfor("run", case(gallery("crash")[0]), "--stop", "0.2", "--out", tmp_path / "out")
+    assert code == 1
+    assert "component 'gfor' at t = 0.05 s: fmi2DoStep returned crash: its process died with" in error
+    run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
+    assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
+
+
+def test_modes_say_why_a_black_box_has_none(gfor, gallery, case):
+    code, _, error = gfor("modes", case(gallery("converter")[0]))
+    assert code == 1
+    assert "does not let a master set its continuous states" in error
+
+
+def test_our_converter_as_a_foreign_file_has_the_same_modes(gfor, fmu_path, case, tmp_path):
+    """In a process of its own, and in this one."""
+    foreign = tmp_path / "foreign.fmu"
+    foreign.write_bytes(fmu_path("gfor").read_bytes())
+    found = [
+        json.loads(gfor("modes", case(foreign, extra=extra), "--json")[1])["scenarios"][0]["modes"][0]
+        for extra in ("isolated = true\n", "isolated = false\n")
+    ]
+    assert found[0]["real"] == pytest.approx(-0.389, abs=0.002)
+    assert found[0]["imag"] == found[1]["imag"]
+
+
+def test_a_binding_without_an_fmu(gfor, case, tmp_path):
+    path = case("x.fmu")
+    path.write_text(path.read_text().replace('fmu = "x.fmu"', 'model = "gfor"\nbinding = "x.toml"'), encoding="utf-8")
+    code, _, error = gfor("modes", path)
+    assert code == 2
+    assert "'binding' is for an FMU of others" in error
