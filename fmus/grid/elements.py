@@ -50,6 +50,15 @@ class Branch:
     connected: ca.SX | None = None
 
 
+@dataclass(frozen=True)
+class DeclaredLoad:
+    """A load's conductance at scale 1 [pu, 100 MVA], its ``scale``, and its inductor where it has one."""
+
+    G: ca.SX
+    scale: ca.SX
+    branches: list[Branch]
+
+
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
     """Declare the power flow's voltage of a bus."""
     with m.scope(name):
@@ -104,7 +113,7 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     return Branch(current, drawn, R, X, line.from_bus, line.to_bus, ratio, connected)
 
 
-def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool) -> list[Branch]:
+def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool) -> DeclaredLoad:
     """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus.
 
     The inductor's state is its current at scale 1, of which ``scale`` times is drawn: a load that is switched off
@@ -118,9 +127,10 @@ def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: b
     with m.scope(load.name):
         scale = m.parameter("scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True)
         P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage", minimum=0)
-        bus.G += scale * P / SYSTEM_BASE_MVA / v_squared
+        G = P / SYSTEM_BASE_MVA / v_squared
+        bus.G += scale * G
         if load.q_mvar == 0:
-            return []
+            return DeclaredLoad(G, scale, [])
         inductive = load.q_mvar > 0
         Q = m.parameter(
             "Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage",
@@ -128,9 +138,9 @@ def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: b
         )  # fmt: skip
         if not inductive:
             bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
-            return []
+            return DeclaredLoad(G, scale, [])
         X = v_squared / (Q / SYSTEM_BASE_MVA)
-        return [_inductor(m, bus, load.bus, X, scale)]
+        return DeclaredLoad(G, scale, [_inductor(m, bus, load.bus, X, scale)])
 
 
 def declare_shunt(m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus]) -> list[Branch]:

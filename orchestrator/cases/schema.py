@@ -74,6 +74,7 @@ class LoadTable(Table):
     bus: str
     p: Megawatt
     q: Megavar = 0.0
+    active: Literal["impedance", "current"] = "impedance"
 
 
 class ShuntTable(Table):
