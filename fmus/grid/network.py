@@ -36,7 +36,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage; both go with |v|², unless ``active`` says else."""
+    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage; by |v|², unless ``active`` says else."""
 
     name: str
     bus: str
