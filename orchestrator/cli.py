@@ -16,7 +16,7 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design
+from orchestrator import cli_certify, cli_compare, cli_design
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -48,6 +48,7 @@ examples:
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
 """
@@ -173,6 +174,10 @@ def _parser() -> argparse.ArgumentParser:
     _case_arguments(design)
     cli_design.add_arguments(design)
     design.set_defaults(command=_design)
+
+    certificate = commands.add_parser("certify", help="the grid code's damping test on a converter FMU")
+    cli_certify.add_arguments(certificate, _count)
+    certificate.set_defaults(command=_certify)
 
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
@@ -396,6 +401,15 @@ def _sweep(options: argparse.Namespace) -> int:
 
         result = run_points(plan, executor, folder, report)
     return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
+
+
+def _certify(options: argparse.Namespace) -> int:
+    console = _console(stderr=options.json)
+    with _progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+        return cli_certify.run_certify(
+            options, console, lambda done, total: bar.update(task, completed=done, total=total)
+        )
 
 
 def _folder(path: Path) -> Path:
