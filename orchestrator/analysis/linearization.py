@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from orchestrator.analysis.component_linearization import linearize_component
+from orchestrator.analysis.component_linearization import ComponentLinearization, linearize_component
 from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
@@ -34,6 +34,8 @@ class Blocks:
         parameters or open inputs, and any outputs.
     derivatives
         Whether `continuous` will be asked for as well.
+    known
+        Components whose linear model is known already, such as an identified one; they are not perturbed.
 
     Raises
     ------
@@ -49,13 +51,16 @@ class Blocks:
         outputs: Sequence[str] = (),
         *,
         derivatives: bool = False,
+        known: Mapping[str, ComponentLinearization] | None = None,
     ) -> None:
+        known = known or {}
         self.step_size = step_size or master.clock.step_size
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         driven, observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
         _check_driven(master, driven)
         self.components = {
-            name: linearize_component(
+            name: known.get(name)
+            or linearize_component(
                 exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
             )
             for name, exchange in master.exchanges.items()

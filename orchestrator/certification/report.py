@@ -13,7 +13,7 @@ from orchestrator.certification.point import FREQUENCY
 from orchestrator.certification.study import WITH, WITHOUT, Certification, PointVerdict, TimeVerdict
 from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
+from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
 
 _SHOWN = 30.0
 """Part of the response that is drawn, from the event on [s]; all of it is judged."""
