@@ -16,7 +16,7 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_certify, cli_compare, cli_design
+from orchestrator import cli_certify, cli_compare, cli_design, cli_linear_model, cli_ssp
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -27,6 +27,7 @@ from orchestrator.cli_sweep import run as run_points
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import CosimError, InputError
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.linear_model import read_embedded_model
 from orchestrator.report import tables
 from orchestrator.report.html.page import write_report
 from orchestrator.report.linear_model_files import save_linear_model
@@ -44,6 +45,7 @@ examples:
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
   gfor modes my_case.toml --json                 a case file of your own, for a program to read
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
+  gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
@@ -111,6 +113,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PERCENT",
         help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
     )
+    modes.add_argument(
+        "--directional",
+        action="store_true",
+        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
+    )
     modes.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     modes.add_argument("--json", action="store_true", help="print JSON")
     modes.set_defaults(command=_modes)
@@ -132,6 +139,12 @@ def _parser() -> argparse.ArgumentParser:
     linearize.add_argument("--continuous", action="store_true", help="ẋ = A·x + B·u instead of the step map")
     linearize.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
     linearize.set_defaults(command=_linearize)
+
+    ssp = commands.add_parser("export-ssp", help="write a case's scenarios as SSP archives for other tools")
+    _case_arguments(ssp)
+    ssp.add_argument("--stop", type=_seconds, metavar="T", help="stop time [s] (default: the case's)")
+    cli_ssp.add_arguments(ssp)
+    ssp.set_defaults(command=_export_ssp)
 
     vary = commands.add_parser("sweep", help="modes over a grid of parameters, followed from point to point")
     _case_arguments(vary)
@@ -190,6 +203,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=sorted(TARGETS),
         help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
+    cli_linear_model.add_arguments(build)
     build.set_defaults(command=_build)
 
     info = commands.add_parser("info", help="show what an FMU declares")
@@ -199,7 +213,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _case_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("case", metavar="CASE", help="a built-in case (two_area) or the path of a case file")
+    parser.add_argument(
+        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+    )
     parser.add_argument(
         "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
     )
@@ -311,7 +327,10 @@ def _modes(options: argparse.Namespace) -> int:
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = _folder(options.out) if options.out else None
-    results = [compute_modes(case, prepared, options.range, options.critical) for prepared in scenarios]
+    results = [
+        compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+        for prepared in scenarios
+    ]
     plots = save_modes(case, results, folder) if folder else []
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
@@ -339,6 +358,10 @@ def _linearize(options: argparse.Namespace) -> int:
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
     return 0
+
+
+def _export_ssp(options: argparse.Namespace) -> int:
+    return cli_ssp.run_export(*_prepare(options), options.out)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -482,12 +505,13 @@ def _build(options: argparse.Namespace) -> int:
                 f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
             )
         models.append(build_model(name))
+    extra = cli_linear_model.extra_members(options, [model.name for model in models])
     for model in models:
         platforms = tuple(options.platform) if options.platform else None
         if options.native:
-            print(export_native(model, options.dest, platforms, options.fmi))
+            print(export_native(model, options.dest, platforms, options.fmi, extra))
         else:
-            print(export(model, options.dest, platforms))
+            print(export(model, options.dest, platforms, extra))
     return 0
 
 
@@ -506,6 +530,9 @@ def _info(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
+    embedded = read_embedded_model(options.file)
+    if embedded is not None:
+        console.print(_escape(cli_linear_model.in_words(embedded)), highlight=False)
     for table in tables.fmu_variables(description):
         console.print("", table)
     return 0

@@ -5,10 +5,11 @@ from functools import cache
 import pytest
 
 from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 
 
 @pytest.fixture(scope="session")
 def fmu_path():
-    """Name of a catalogue model → its built .fmu."""
-    return cache(lambda name: cached(build_model(name)))
+    """Name of a catalogue model → its built .fmu, Python-backed or native."""
+    return cache(lambda name, native=False: (cached_native if native else cached)(build_model(name)))

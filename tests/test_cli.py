@@ -57,12 +57,25 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
     assert first == "examples:"
     assert len(lines) >= 5
     assert all(line.startswith("  gfor ") for line in lines)
-    known = {"run", "modes", "linearize", "sweep", "design", "compare", "identify", "report", "build", "info"}
+    known = {
+        "export-ssp",
+        "run",
+        "modes",
+        "linearize",
+        "sweep",
+        "design",
+        "compare",
+        "identify",
+        "report",
+        "build",
+        "info",
+    }
     assert {line.split()[1] for line in lines} <= known
 
 
 @pytest.mark.parametrize(
-    "command", ["run", "modes", "linearize", "sweep", "design", "compare", "identify", "report", "build", "info"]
+    "command",
+    ["export-ssp", "run", "modes", "linearize", "sweep", "design", "compare", "identify", "report", "build", "info"],
 )
 def test_every_command_has_help(gfor, command):
     code, out, _ = gfor(command, "--help")

@@ -1,4 +1,4 @@
-"""The zip archive of an FMU, the same bytes for the same contents."""
+"""The zip archive of an FMU or SSP, the same bytes for the same contents."""
 
 import uuid
 import zipfile

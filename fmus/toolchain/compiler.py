@@ -20,7 +20,7 @@ TARGETS = {
 ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 """Of a shared library."""
 
-FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-g0")
+FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-g0", "-s")
 """No fast-math and no fused operations: a compiled kernel and its Python fallback agree to rounding."""
 
 
@@ -62,7 +62,9 @@ def compile_library(source: str, platform: str) -> Path:
 
 def compile_for(source: str, target: str, ending: str) -> Path:
     """Compile C source for one zig target; otherwise as `compile_library`."""
-    key = hashlib.sha256("\0".join([source, target, *FLAGS]).encode()).hexdigest()[:32]
+    # Without a name of its own a Mac library would carry the path of the temporary folder.
+    flags = [*FLAGS, "-Wl,-install_name,@rpath/library.dylib"] if target.endswith("macos") else FLAGS
+    key = hashlib.sha256("\0".join([source, target, *flags]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if library.exists():
         return library
@@ -70,7 +72,7 @@ def compile_for(source: str, target: str, ending: str) -> Path:
         c_file, built = Path(folder) / "source.c", Path(folder) / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
         compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-        command = [*compiler, *FLAGS, str(c_file), "-o", str(built), "-lm"]
+        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
         result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         if result.returncode:
             raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}")

@@ -5,6 +5,7 @@ directional derivatives and may be stepped from many threads, one per instance a
 """
 
 import hashlib
+from collections.abc import Mapping
 from importlib.metadata import version as version_of
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from fmus.toolchain.description import model_description
 from fmus.toolchain.description3 import model_description_3
 from fmus.toolchain.model import Model
 from fmus.toolchain.native_source import FmiVersion, native_source
-from fmus.toolchain.terminals import electrical_ports, terminals_and_icons
+from fmus.toolchain.terminals import has_port, terminals_and_icons
 
 _FOLDERS_3 = {
     # zig target -> platform tuple of FMI 3.0
@@ -27,7 +28,11 @@ _FOLDERS_3 = {
 
 
 def export_native(
-    model: Model, destination: Path, platforms: tuple[str, ...] | None = None, version: FmiVersion = "2.0"
+    model: Model,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
+    version: FmiVersion = "2.0",
+    extra: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Write ``<model name>.fmu`` into a folder.
 
@@ -42,6 +47,8 @@ def export_native(
         kinds of Mac.
     version
         Of FMI.
+    extra
+        Further members of the archive, by path.
 
     Returns
     -------
@@ -56,7 +63,7 @@ def export_native(
     digest = _digest(model, version)
     chosen = tuple(TARGETS) if platforms is None else platforms
     contents = _contents_2(model, digest, chosen) if version == "2.0" else _contents_3(model, digest, chosen)
-    return write_archive(destination / f"{model.name}.fmu", contents)
+    return write_archive(destination / f"{model.name}.fmu", contents | dict(extra or {}))
 
 
 def cached_native(model: Model) -> Path:
@@ -78,7 +85,7 @@ def cached_native(model: Model) -> Path:
 def _digest(model: Model, version: FmiVersion) -> str:
     """Hash over everything that the FMU is made from."""
     texts = [_source(model, version, ""), _description(model, version, "").decode(), *FLAGS]
-    if version == "3.0":
+    if version == "3.0" and has_port(model):
         texts.append(terminals_and_icons(model).decode())
     hasher = hashlib.sha256()
     for text in texts:
@@ -109,7 +116,7 @@ def _contents_2(model: Model, digest: str, platforms: tuple[str, ...]) -> dict[s
 def _contents_3(model: Model, digest: str, platforms: tuple[str, ...]) -> dict[str, bytes]:
     source = _source(model, "3.0", digest)
     contents = {"modelDescription.xml": _description(model, "3.0", digest)}
-    if electrical_ports(model):
+    if has_port(model):
         contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model)
     for platform in platforms:
         for target in TARGETS[platform]:

@@ -7,6 +7,7 @@ files, every bundled module needs a name of its own (all Python-backed FMUs of a
 
 import hashlib
 import json
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -23,7 +24,12 @@ from fmus.toolchain.python_kernel import python_source
 _SLAVE = Path(__file__).with_name("slave.py")
 
 
-def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = None) -> Path:
+def export(
+    model: Model,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
+    extra: Mapping[str, bytes] | None = None,
+) -> Path:
     """Write ``<model name>.fmu`` into a folder.
 
     Parameters
@@ -35,6 +41,8 @@ def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = 
     platforms
         FMI platforms to compile the kernel for; by default this machine's. Elsewhere the FMU
         evaluates the same equations in pure Python.
+    extra
+        Further members of the archive, by path.
 
     Returns
     -------
@@ -49,7 +57,7 @@ def export(model: Model, destination: Path, platforms: tuple[str, ...] | None = 
     if platforms is None:
         host = host_platform()
         platforms = (host,) if host else ()
-    return write_archive(destination / f"{model.name}.fmu", _contents(model, platforms))
+    return write_archive(destination / f"{model.name}.fmu", _contents(model, platforms) | dict(extra or {}))
 
 
 def cached(model: Model) -> Path:

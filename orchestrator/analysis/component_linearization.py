@@ -1,14 +1,21 @@
-"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs."""
+"""Linear model of one running FMU over one communication step, by perturbation of its states and inputs.
+
+Where an FMU gives directional derivatives, they are the independent way to the same.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
+from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.state_access import StateAccess
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.linear_model import EmbeddedModel
 
 PERTURBATIONS = (1e-5, 2e-5)
 """Central differences are taken with both, relative to max(1, |value|); they should agree."""
@@ -50,38 +57,6 @@ class ComponentLinearization:
     disagreement: float
 
 
-class StateAccess:
-    """Reads and sets the continuous states of one component.
-
-    Raises
-    ------
-    AnalysisError
-        If the FMU does not let a master set its states, or cannot save and restore its state.
-    """
-
-    def __init__(self, component: Component) -> None:
-        description = component.description
-        if not description.can_save_state:
-            raise AnalysisError(
-                f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-                "so it cannot be perturbed and put back; ask for an export that can"
-            )
-        if description.states and not description.states_are_settable:
-            raise AnalysisError(
-                f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-                "linearisation by perturbation needs; our FMUs declare it under VendorAnnotations"
-            )
-        self.batch = RealBatch(component, description.states)
-        self._buffer = RealBatch(component, description.states)
-
-    def read(self) -> Matrix:
-        return self.batch.read().copy()
-
-    def write(self, values: Matrix) -> None:
-        self._buffer.values[:] = values
-        self._buffer.write()
-
-
 def linearize_component(
     exchange: Exchange,
     time: float,
@@ -93,6 +68,8 @@ def linearize_component(
 ) -> ComponentLinearization:
     """Perturb one component around where it is, and put it back.
 
+    Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
+
     Parameters
     ----------
     inputs, observed
@@ -101,6 +78,9 @@ def linearize_component(
         Also difference the FMU's own derivatives, if it declares them; it costs a third more.
     """
     component = exchange.component
+    StateAccess(component)  # refuses what can be neither perturbed nor looked up
+    if (inside := embedded_model(component)) is not None:
+        return _from_inside(exchange, inside, step_size, inputs, observed)
     names = component.description.states
     rates = [f"der({s})" for s in names] if derivatives else []
     rates = rates if all(r in component.description.variables for r in rates) else []
@@ -131,6 +111,89 @@ def linearize_component(
     )
 
 
+def linearize_by_derivatives(
+    exchange: Exchange, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
+) -> ComponentLinearization:
+    """The same from the FMU's own directional derivatives, without a perturbation and without a step.
+
+    The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
+
+    Parameters
+    ----------
+    inputs, observed
+        As `linearize_component`.
+
+    Raises
+    ------
+    AnalysisError
+        If the FMU gives no directional derivatives, or none of its states.
+    """
+    component = exchange.component
+    states = component.description.states
+    rates = [f"der({s})" for s in states]
+    if not component.description.gives_directional_derivatives:
+        raise AnalysisError(
+            f"component {component.name!r}: its FMU gives no directional derivatives; native FMUs do (--native), "
+            "or linearise by perturbation"
+        )
+    n = len(states)
+    entries = (*exchange.inputs.names, *inputs)
+    whole = component.jacobian([*rates, *exchange.outputs.names, *observed], [*states, *entries])
+    blocks = whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
+    return _over_step(exchange, step_size, states, entries, observed, *blocks)
+
+
+def _from_inside(
+    exchange: Exchange, model: EmbeddedModel, step_size: float, inputs: Sequence[str], observed: Sequence[str]
+) -> ComponentLinearization:
+    """The model inside an FMU, taken over one communication step with its inputs held."""
+    component = exchange.component
+    check_operating_point(component, model)
+    entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
+    missing = [v for v in entries if v not in model.inputs] + [v for v in exits if v not in model.outputs]
+    if missing:
+        raise AnalysisError(
+            f"component {component.name!r}: the linear model inside its FMU has no {', '.join(map(repr, missing))}; it "
+            f"has the inputs {', '.join(model.inputs)} and the outputs {', '.join(model.outputs)}"
+        )
+    columns = [list(model.inputs).index(v) for v in entries]
+    rows = [list(model.outputs).index(v) for v in exits]
+    blocks = model.A, model.B[:, columns], model.C[rows], model.D[np.ix_(rows, columns)]
+    return _over_step(exchange, step_size, tuple(model.states), entries, observed, *blocks)
+
+
+def _over_step(
+    exchange: Exchange,
+    step_size: float,
+    states: tuple[str, ...],
+    entries: tuple[str, ...],
+    observed: Sequence[str],
+    A_c: Matrix,
+    B_c: Matrix,
+    C: Matrix,
+    D: Matrix,
+) -> ComponentLinearization:
+    """A continuous model, and its exact map over a communication step with the inputs held."""
+    (n, m), p = B_c.shape, len(exchange.outputs.names)
+    step_map = scipy.linalg.expm(step_size * np.block([[A_c, B_c], [np.zeros((m, n + m))]]))
+    return ComponentLinearization(
+        exchange.component.name,
+        states,
+        entries,
+        exchange.outputs.names,
+        A=step_map[:n, :n],
+        B=step_map[:n, n:],
+        C=C[:p],
+        D=D[:p],
+        observed=tuple(observed),
+        C_o=C[p:],
+        D_o=D[p:],
+        A_c=A_c,
+        B_c=B_c,
+        disagreement=0.0,
+    )
+
+
 def _differences(
     component: Component,
     inputs: Sequence[str],
@@ -141,7 +204,6 @@ def _differences(
     rates: Sequence[str],
 ) -> tuple[Matrix, Matrix, Matrix]:
     """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input."""
-    StateAccess(component)  # refuses what cannot be perturbed
     names = (*component.description.states, *inputs)
     z_0 = RealBatch(component, names).read().copy()
     perturbed = [RealBatch(component, [name]) for name in names]

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.component_linearization import StateAccess
 from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.state_access import StateAccess
 from orchestrator.coupling.master import Master
 
 

@@ -11,7 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from orchestrator.analysis.component_linearization import ComponentLinearization, linearize_component
+from orchestrator.analysis.component_linearization import (
+    ComponentLinearization,
+    linearize_by_derivatives,
+    linearize_component,
+)
 from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
@@ -34,6 +38,8 @@ class Blocks:
         parameters or open inputs, and any outputs.
     derivatives
         Whether `continuous` will be asked for as well.
+    directional
+        Take the FMUs' own directional derivatives instead of perturbing them.
     known
         Components whose linear model is known already, such as an identified one; they are not perturbed.
 
@@ -51,6 +57,7 @@ class Blocks:
         outputs: Sequence[str] = (),
         *,
         derivatives: bool = False,
+        directional: bool = False,
         known: Mapping[str, ComponentLinearization] | None = None,
     ) -> None:
         known = known or {}
@@ -60,8 +67,12 @@ class Blocks:
         _check_driven(master, driven)
         self.components = {
             name: known.get(name)
-            or linearize_component(
-                exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
+            or (
+                linearize_by_derivatives(exchange, self.step_size, driven[name], observed[name])
+                if directional
+                else linearize_component(
+                    exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
+                )
             )
             for name, exchange in master.exchanges.items()
         }

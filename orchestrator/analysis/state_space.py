@@ -1,6 +1,7 @@
 """The linear model with inputs and outputs: what a disturbance does, and what other tools can import."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import scipy.linalg
@@ -8,6 +9,8 @@ import scipy.linalg
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.coupling.schedule import Schedule
+from orchestrator.errors import InputError
+from orchestrator.fmi.linear_model import read_embedded_model
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,21 @@ class StateSpace:
             A, B = A @ A, A @ B + B
             steps >>= 1
         return A_all, B_all
+
+
+def read_linear_model(path: Path) -> StateSpace:
+    """The continuous linear model that an FMU carries; names are those of its variables.
+
+    Raises
+    ------
+    InputError
+        If the file is no FMU, or has no linear model inside.
+    """
+    model = read_embedded_model(path)
+    if model is None:
+        raise InputError(f"{path}: there is no linear model inside; `gfor build --with-linear-model` packs one")
+    names = (tuple(model.states), tuple(model.inputs), tuple(model.outputs))
+    return StateSpace(model.A, model.B, model.C, model.D, *names, step_size=None)
 
 
 def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.analysis.component_linearization import ComponentLinearization, StateAccess
+from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.state_access import StateAccess
 from orchestrator.black_box.fitting import IdentifiedModel, fit
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.black_box.test_bench import TestBench

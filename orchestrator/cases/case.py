@@ -6,14 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tomli_w
 from pydantic import ValidationError
 
+from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.locate import line_of
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ScenarioTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.ssp.reading import read_ssp
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
@@ -26,21 +29,29 @@ def built_in_cases() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Case:
-    """A case file.
+    """A case file, or what an SSP comes to as one.
 
     Attributes
     ----------
     table
         Its contents. Where the form was wrong, the wrong entries are left out and stand in
         ``problems``, so that what the rest means can be checked as well.
-    text, path
+    text
+        Of the case file.
+    path
         The file itself.
+    directory
+        Where relative paths in the tables start.
+    numbered
+        Whether the text is the file's own, so that its lines mean something to the user.
     """
 
     table: CaseTable
     text: str
     path: Path
     problems: tuple[Problem, ...]
+    directory: Path
+    numbered: bool = True
 
     @property
     def name(self) -> str:
@@ -114,22 +125,22 @@ class Case:
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
         scenario = self.scenarios[name]
-        return Preparer(self.table, name, scenario, dict(overrides or {}), self.path.parent, self.place, parameters)
+        return Preparer(self.table, name, scenario, dict(overrides or {}), self.directory, self.place, parameters)
 
     def place(self, *path: str | int) -> str:
         """A key path as text, with its line in the file."""
-        return _place(self.text, path)
+        return _place(self.text if self.numbered else "", path)
 
 
 def load_case(name_or_path: str | Path) -> Case:
-    """Read a built-in case by name, or a case file by path.
+    """Read a built-in case by name, or a case file or an SSP by path.
 
     Raises
     ------
     InputError
-        If there is neither, or the file is not TOML.
+        If there is neither, or the file is not TOML, or not an SSP.
     CaseError
-        If the file lacks what nothing can be checked without.
+        If the file lacks what nothing can be checked without, or an SSP holds what is not supported.
     """
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():
@@ -139,13 +150,23 @@ def load_case(name_or_path: str | Path) -> Case:
             f"{name_or_path}: there is no such file, nor a built-in case of that name; "
             f"built-in: {', '.join(built_in_cases())}"
         )
+    if path.suffix.lower() == ".ssp":
+        return _from_ssp(path)
     try:
         text = path.read_text(encoding="utf-8")
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: it is not a TOML file: {error}") from error
     table, problems = _validate(raw, text, path)
-    return Case(table, text, path, tuple(problems))
+    return Case(table, text, path, tuple(problems), path.parent)
+
+
+def _from_ssp(path: Path) -> Case:
+    """The case that an SSP comes to; its FMUs are unpacked where built ones are kept."""
+    ssp = read_ssp(path, cache_directory("ssp"))
+    text = f"# What {path.name} comes to (SHA-256 {ssp.digest})\n\n{tomli_w.dumps(ssp.tables)}"
+    table, problems = _validate(tomllib.loads(text), "", path)
+    return Case(table, text, path, tuple(problems), ssp.folder, numbered=False)
 
 
 def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, list[Problem]]:

@@ -237,9 +237,9 @@ class Preparer:
             return None
 
     def _recorded(self) -> tuple[str, ...]:
-        """All outputs that fit one of the file's patterns."""
-        components = self.draft.system.components
-        outputs = [f"{n}.{v}" for n, plan in components.items() for v in plan.description.outputs]
+        """All Real outputs that fit one of the file's patterns."""
+        plans = {name: plan.description for name, plan in self.draft.system.components.items()}
+        outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
         wanted = {name for pattern in self.draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
         return tuple(name for name in outputs if name in wanted)
 

@@ -264,6 +264,38 @@ class Component:
         batch = RealBatch(self, tuple(names))
         return dict(zip(batch.names, batch.read().tolist(), strict=True))
 
+    def values(self, names: Iterable[str]) -> dict[str, float | bool]:
+        """Read variables of any numeric type by name; slower than `get`."""
+        getters = {"Real": self._fmu.getReal, "Boolean": self._fmu.getBoolean}
+        found: dict[str, float | bool] = {}
+        for name in names:
+            variable = self.description.variables[name]
+            getter = getters.get(variable.type, self._fmu.getInteger)
+            (value,) = self._call(f"reading {name}", getter, [variable.reference])
+            found[name] = bool(value) if variable.type == "Boolean" else float(value)
+        return found
+
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
+        """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
+
+        Returns
+        -------
+        ndarray
+            Shape (unknowns, knowns).
+
+        Raises
+        ------
+        ComponentError
+            If the FMU refuses.
+        """
+        variables = self.description.variables
+        rows = [variables[name].reference for name in unknowns]
+        columns = [
+            self._call("fmi2GetDirectionalDerivative", self._fmu.getDirectionalDerivative, rows, [reference], [1.0])
+            for reference in (variables[name].reference for name in knowns)
+        ]
+        return np.array(columns).reshape(len(knowns), len(unknowns)).T
+
     # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:

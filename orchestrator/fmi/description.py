@@ -14,6 +14,8 @@ from fmpy.model_description import ModelDescription
 from orchestrator.errors import FmuFileError
 
 VENDOR = "gfor-cosim"
+REVERSE_DOMAIN = "org.gfor-cosim"
+"""Begins the names of what is ours inside other people's formats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,12 @@ class FmuDescription:
         an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
     can_save_state
         ``canGetAndSetFMUstate``.
+    gives_directional_derivatives
+        ``providesDirectionalDerivative``.
+    units
+        Exponents of SI base units, factor and offset of every unit that the FMU defines, as text.
+    default_step_size
+        Communication step that the FMU suggests [s].
     """
 
     path: Path
@@ -61,8 +69,11 @@ class FmuDescription:
     states: tuple[str, ...]
     states_are_settable: bool
     can_save_state: bool
+    gives_directional_derivatives: bool
     output_dependencies: dict[str, tuple[str, ...] | None]
     platforms: tuple[str, ...]
+    units: dict[str, dict[str, str]]
+    default_step_size: float | None
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -149,7 +160,9 @@ def _fmi_version(path: Path, text: bytes) -> str:
 
 def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...]) -> FmuDescription:
     variables = {v.name: _variable(v) for v in md.modelVariables}
-    tool = ElementTree.fromstring(text).find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    root = ElementTree.fromstring(text)
+    tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    step_size = None if md.defaultExperiment is None else md.defaultExperiment.stepSize
     dependencies = {
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
@@ -165,9 +178,17 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
         states_are_settable=tool is not None and tool.get("settable") == "true",
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
+        gives_directional_derivatives=bool(md.coSimulation.providesDirectionalDerivative),
         output_dependencies=dependencies,
         platforms=platforms,
+        units=_units(root),
+        default_step_size=None if step_size is None else float(step_size),
     )
+
+
+def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:
+    bases = ((unit, unit.find("BaseUnit")) for unit in root.findall("UnitDefinitions/Unit"))
+    return {unit.get("name", ""): {} if base is None else dict(base.attrib) for unit, base in bases}
 
 
 def _variable(v: Any) -> VariableInfo:

@@ -147,7 +147,7 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
     return {
         "name": modes.prepared.name,
         "title": modes.prepared.title,
-        "residual": modes.operating_point.residual,
+        "residual": None if math.isnan(modes.operating_point.residual) else modes.operating_point.residual,
         "states": modes.model.number_of_states,
         "modes": {name: _mode_summary(mode) for name, mode in modes.named.items()},
         "references": {name: table.model_dump(exclude_none=True) for name, table in modes.references.items()},

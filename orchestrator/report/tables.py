@@ -33,8 +33,7 @@ def steady_states(results: Sequence["ModesResult"]) -> Table:
         table.add_row(
             r.prepared.title,
             str(r.model.number_of_states),
-            f"{r.operating_point.residual:.1e}",
-            f"{r.operating_point.drift:.1e}",
+            *("–" if math.isnan(v) else f"{v:.1e}" for v in (r.operating_point.residual, r.operating_point.drift)),
             f"{flow.residual:.1e}" if flow else "–",
         )
     return table

@@ -78,6 +78,8 @@ def compute_modes(
     prepared: PreparedScenario,
     frequency_range: tuple[float, float] = (0.1, 2.0),
     critical: float | None = None,
+    *,
+    directional: bool = False,
 ) -> ModesResult:
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
@@ -88,9 +90,11 @@ def compute_modes(
     critical
         Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
         knows too little to give modes their names.
+    directional
+        Linearise with the FMUs' own directional derivatives instead of by perturbation.
     """
     with running(prepared) as master:
-        return modes_of(case, prepared, master, frequency_range, critical)
+        return modes_of(case, prepared, master, frequency_range, critical, directional=directional)
 
 
 def running(prepared: PreparedScenario) -> Master:
@@ -104,10 +108,12 @@ def modes_of(
     master: Master,
     frequency_range: tuple[float, float],
     critical: float | None = None,
+    *,
+    directional: bool = False,
 ) -> ModesResult:
     """Steady state and modes of a running system; see `compute_modes`."""
     point = find_operating_point(master)
-    model = compose(Blocks(master), master.schedule)
+    model = compose(Blocks(master, directional=directional), master.schedule)
     low, high = frequency_range
     if critical is None:
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
@@ -128,6 +134,21 @@ def modes_of(
         warnings=_warnings(master, model),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
+    )
+
+
+def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:
+    """The result for a system that can be simulated but not linearised: no modes, and a warning with the reasons."""
+    return ModesResult(
+        prepared=prepared,
+        operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
+        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size),
+        modes=[],
+        named={},
+        references={},
+        warnings=(f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",),
+        swing=(),
+        areas={},
     )
 
 

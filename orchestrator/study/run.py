@@ -9,6 +9,7 @@ from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.state_access import obstacle
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -20,7 +21,7 @@ from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
-from orchestrator.study.modes import ModesResult, modes_of, running
+from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 
 STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
 """Communication steps [s] for which the shift of the electromechanical mode is reported."""
@@ -75,12 +76,14 @@ def run_scenario(
 ) -> RunResult:
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
+    A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
     A component that fails in the middle ends the run; what was recorded until then is in the result.
     """
     recorder = Recorder(prepared.record, prepared.record_every)
     statistics, failure = None, None
     with running(prepared) as master:
-        modes = modes_of(case, prepared, master, frequency_range)
+        reasons = [text for component in master.components.values() if (text := obstacle(component))]
+        modes = unknown_modes(prepared, reasons) if reasons else modes_of(case, prepared, master, frequency_range)
         shifts = _shifts(master, modes.electromechanical)
         follows = linear_response(master, prepared) if linear else None
         try:

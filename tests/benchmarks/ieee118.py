@@ -1,9 +1,9 @@
 """Speed and size of the 118-bus study: ``python -m tests.benchmarks.ieee118``.
 
 Prints, taken in one run: memory of 57 FMUs; communication steps per second against 57 empty pythonfmu models
-with the same connections in the same loop; the share of time outside the FMUs; the time from instantiated FMUs
-to modes, against perturbing the coupled system state by state; and how all that grows with the size of ring
-networks.
+with the same connections in the same loop, and against native FMUs; the share of time outside the FMUs; the time
+from instantiated FMUs to modes, against perturbing the coupled system state by state; and how all that grows with
+the size of ring networks.
 """
 
 import os
@@ -142,6 +142,15 @@ def print_speed(prepared: PreparedScenario) -> None:
             copy = empty_copy(prepared.system, Path(folder), lean)
             empty, _ = best_rate(lambda c=copy: Master(c, prepared.schedule, prepared.step_size), STEPS)  # type: ignore[misc]
             print(f"  {n} empty pythonfmu models {what}: {empty:,.0f} steps/s; ours / empty = {rate / empty:.2f}")
+
+
+def print_native(case: Case, backed: PreparedScenario) -> None:
+    (native,) = case.prepare([backed.name], {"*.native": True})
+    rates = {}
+    for name, prepared in (("Python-backed", backed), ("native", native)):
+        rates[name], share = best_rate(lambda p=prepared: start(p), STEPS)  # type: ignore[misc]
+        print(f"  {name}: {rates[name]:,.0f} steps/s; {1 - share:.1%} of the time outside FMUs")
+    print(f"  native / Python-backed = {rates['native'] / rates['Python-backed']:.2f}")
 
 
 # -- linearisation -------------------------------------------------------------------------------
@@ -285,6 +294,7 @@ def main() -> None:
     (prepared,) = case.prepare(["pod_pq"])
     print_memory(prepared)
     print_speed(prepared)
+    print_native(case, prepared)
     print_linearisation(case, prepared)
     print_growth()
 

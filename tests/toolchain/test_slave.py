@@ -6,123 +6,18 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy import calloc, free
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.support.host import DISCARD, GENERATOR, OK, H, Host, running
+
 ROOT = Path(__file__).parents[2]
-H = 1e-4
-OK, DISCARD = 0, 2
-GENERATOR = "synchronous_generator_st1"
-
-
-class Host:
-    """One instance through FMPy, with everything it logged."""
-
-    def __init__(self, directory, instance="one"):
-        md = fmpy.read_model_description(str(directory), validate=False)
-        self.md = md
-        self.vr = {v.name: v.valueReference for v in md.modelVariables}
-        self.reals = [v.name for v in md.modelVariables if v.type == "Real"]
-        self.log = []
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda *a: self.log.append(a[-1].decode()))
-        self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-        self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-        identifier = md.coSimulation.modelIdentifier
-        self.fmu = FMU2Slave(
-            guid=md.guid, unzipDirectory=str(directory), modelIdentifier=identifier, instanceName=instance
-        )
-        self.fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
-
-    def initialise(self):
-        self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-        return self
-
-    def status(self, function, *arguments):
-        """Status of a call that may be refused."""
-        try:
-            function(*arguments)
-        except FMICallException as error:
-            return error.status
-        return OK
-
-    def step(self, time=0.0, size=H):
-        return self.status(self.fmu.doStep, time, size)
-
-    def set(self, **values):
-        self.fmu.setReal([self.vr[name.replace("__", ".")] for name in values], list(values.values()))
-
-    def get(self, *names):
-        values = self.fmu.getReal([self.vr[name] for name in names])
-        return values[0] if len(names) == 1 else values
-
-    def everything(self):
-        """Every Real as bits, so that NaN and −0 count."""
-        return np.array(self.get(*self.reals)).tobytes()
-
-    def run(self, steps=50, first=0):
-        """Drive with varying inputs; every Real after every step."""
-        inputs = [v.name for v in self.md.modelVariables if v.causality == "input"]
-        rows = []
-        for k in range(first, first + steps):
-            self.fmu.setReal([self.vr[n] for n in inputs], [drive(k, j) for j in range(len(inputs))])
-            assert self.step(k * H) == OK, self.log
-            rows.append(self.everything())
-        return rows
-
-    def close(self):
-        self.fmu.freeInstance()
-
-
-def drive(step, channel):
-    return (1.0 if channel == 0 else 0.0) + 0.03 * math.sin(0.05 * step + channel)
-
-
-@pytest.fixture(scope="session")
-def extracted(fmu_path):
-    folders = {}
-
-    def extract(name):
-        if name not in folders:
-            folders[name] = str(fmpy.extract(str(fmu_path(name))))
-        return folders[name]
-
-    yield extract
-    for folder in folders.values():
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-@pytest.fixture
-def host(extracted):
-    open_hosts = []
-
-    def create(name="gfor", instance="one"):
-        open_hosts.append(Host(extracted(name), instance))
-        return open_hosts[-1]
-
-    yield create
-    for instance in open_hosts:
-        instance.close()
-
 
 # -- misuse ------------------------------------------------------------------------------------
 
@@ -351,75 +246,20 @@ def test_the_process_outlives_all_misuse(kernel, extracted):
         "python",
     ],
 )
-def test_a_broken_rule_is_named_even_where_initialisation_divides_by_zero(kernel, host, monkeypatch):
+def test_a_broken_rule_is_named_even_where_initialisation_divides_by_zero(kernel, open_host, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
-    h = host(GENERATOR)
+    h = open_host(GENERATOR)
     h.set(machine__X_d=0.2)
     h.initialise()
     assert "machine.X_d must exceed machine.X_d1" in "\n".join(h.log)
     assert h.step() == DISCARD
 
 
-# -- state -------------------------------------------------------------------------------------
+# -- failure and recovery -----------------------------------------------------------------------
 
 
-def spoil(h):
-    """Change parameters, inputs and states of a running converter."""
-    h.fmu.setBoolean([h.vr["pod_p.enabled"]], [False])
-    h.set(droop__R_f=0.01, pod_p__K=3.0, v_re=0.7, droop__theta=1.0, filter__u_c_q=0.2)
-    h.run(7, first=1000)
-
-
-def running(h):
-    h.initialise()
-    h.fmu.setBoolean([h.vr["pod_p.enabled"]], [True])
-    h.set(pod_p__K=50.0)
-    h.run(50)
-    return h
-
-
-def test_a_saved_state_restores_everything_and_the_same_future(host):
-    h = running(host())
-    state, before = h.fmu.getFMUstate(), h.everything()
-    future = h.run(50, first=50)
-    spoil(h)
-    assert h.everything() != before
-    h.fmu.setFMUstate(state)
-    assert h.everything() == before
-    assert h.fmu.getBoolean([h.vr["pod_p.enabled"]]) == [True]
-    assert h.run(50, first=50) == future
-    h.fmu.setFMUstate(state)  # a state can be restored more than once
-    assert h.everything() == before
-    h.fmu.freeFMUstate(state)
-    assert h.log == []
-
-
-def test_a_serialised_state_continues_in_another_instance(host):
-    h, twin = running(host()), host(instance="twin").initialise()
-    state = h.fmu.getFMUstate()
-    data, before = h.fmu.serializeFMUstate(state), h.everything()
-    future = h.run(50, first=50)
-    twin.fmu.setFMUstate(twin.fmu.deSerializeFMUstate(data))
-    assert twin.everything() == before
-    assert twin.fmu.serializeFMUstate(twin.fmu.getFMUstate()) == data
-    assert twin.run(50, first=50) == future
-
-
-def test_a_state_saved_before_initialisation_keeps_its_parameters(host):
-    h = host()
-    h.set(P_0=0.4)
-    state, before = h.fmu.getFMUstate(), h.everything()
-    h.set(P_0=0.5)
-    h.initialise()
-    h.run(3)
-    h.fmu.setFMUstate(state)
-    assert h.everything() == before
-    h.initialise()
-    assert h.get("p") == pytest.approx(0.4, abs=1e-12)
-
-
-def test_a_failed_instance_recovers_when_a_good_state_is_restored(host):
-    h = running(host())
+def test_a_failed_instance_recovers_when_a_good_state_is_restored(open_host):
+    h = running(open_host())
     state = h.fmu.getFMUstate()
     future = h.run(5, first=50)
     h.set(v_re=math.nan)
@@ -428,131 +268,13 @@ def test_a_failed_instance_recovers_when_a_good_state_is_restored(host):
     assert h.run(5, first=50) == future
 
 
-def test_a_state_saved_after_a_broken_rule_is_not_taken_as_good(host):
-    h = host()
+def test_a_state_saved_after_a_broken_rule_is_not_taken_as_good(open_host):
+    h = open_host()
     h.set(P_0=2.0)
     h.initialise()
     assert h.step() == DISCARD
     h.fmu.setFMUstate(h.fmu.getFMUstate())
     assert h.step() == DISCARD
-
-
-def test_reset_brings_back_start_values(host):
-    h, fresh = host(), host(instance="fresh")
-    start = fresh.everything()
-    h.set(P_0=0.5)
-    running(h)
-    assert h.everything() != start
-    h.fmu.reset()
-    assert h.everything() == start
-    assert h.step() == DISCARD
-    assert h.initialise().run(10) == fresh.initialise().run(10)
-
-
-def test_instances_are_independent(host):
-    alone = running(host()).run(50, first=50)
-    one, two = running(host()), host(instance="two")
-    two.set(P_0=0.3)
-    two.initialise()
-    mixed = []
-    for k in range(50):
-        two.run(1, first=7 * k)
-        mixed += one.run(1, first=50 + k)
-    assert mixed == alone
-
-
-# -- values ------------------------------------------------------------------------------------
-
-
-def test_outputs_are_fresh_after_setting_inputs_without_a_step(host):
-    """The grid's voltage is v = Σ i / G, with G = P / v_0² = 26 pu at bus 2."""
-    h = host("two_area_grid").initialise()
-    line = h.get("L.i_re")
-    h.set(sg1__i_re=10.0, gfor__i_re=16.0)
-    assert h.get("bus_2.v_re") == pytest.approx((26.0 - line) / 26.0, rel=1e-14)
-    h.set(gfor__i_re=3.0)
-    assert h.get("bus_2.v_re") == pytest.approx((13.0 - line) / 26.0, rel=1e-14)
-    h.set(load_2__scale=2.0)
-    assert h.get("bus_2.v_re") == pytest.approx((13.0 - line) / 52.0, rel=1e-14)
-
-
-def test_initialisation_meets_the_power_flow(host):
-    h = host()
-    h.set(P_0=0.6, Q_0=0.1, v_0=1.02, theta_0=0.3, v_re=1.02 * math.cos(0.3), v_im=1.02 * math.sin(0.3))
-    h.initialise()
-    assert h.get("p", "q") == pytest.approx([0.6, 0.1], abs=1e-13)
-    derivatives = [n for n in h.reals if n.startswith("der(")]
-    assert np.abs(h.get(*derivatives)).max() < 1e-9
-
-
-def test_states_can_be_set_after_initialisation(host):
-    h = host().initialise()
-    h.set(droop__P_f=0.7)
-    assert h.get("droop.P_f") == 0.7
-    assert h.get("omega") == pytest.approx(1 + 0.05 * (h.get("droop.P_ref") - 0.7), abs=1e-15)
-
-
-@pytest.mark.parametrize("name", ["gfor", GENERATOR, "two_area_grid"])
-def test_derivatives_equal_a_finite_difference(name, host):
-    h = host(name).initialise()
-    h.run(20)
-    states = [d.variable.derivative.name for d in h.md.derivatives]
-    rate = np.array(h.get(*(f"der({s})" for s in states)))
-    start, x = h.fmu.getFMUstate(), np.array(h.get(*states))
-
-    def quotient(size):
-        h.fmu.setFMUstate(start)
-        assert h.step(20 * H, size) == OK
-        return (np.array(h.get(*states)) - x) / size
-
-    extrapolated = 2 * quotient(5e-8) - quotient(1e-7)
-    assert np.abs(rate).max() > 1e-2
-    np.testing.assert_allclose(extrapolated, rate, rtol=1e-5, atol=1e-6 * np.abs(rate).max())
-
-
-def test_one_long_step_equals_its_short_ones_exactly(host):
-    long, short = host(), host(instance="short")
-    for h in (long, short):
-        h.initialise()
-        h.set(v_re=0.95, v_im=0.05)
-    assert long.step(0.0, 5e-4) == OK
-    assert [short.step(k * H) for k in range(5)] == [OK] * 5
-    assert long.everything() == short.everything()
-
-
-def test_the_internal_step_cuts_a_communication_step(host):
-    coarse, fine = host(), host(instance="fine")
-    fine.set(internal_step=2.5e-5)
-    for h in (coarse, fine):
-        h.initialise()
-        h.set(v_re=0.95)
-        assert h.step() == OK
-    x = "feed_forward.u_q"
-    assert fine.get(x) != coarse.get(x)
-    assert fine.get(x) == pytest.approx(coarse.get(x), abs=1e-3)
-    quarters = host(instance="quarters").initialise()
-    quarters.set(v_re=0.95)
-    assert [quarters.step(k * H / 4, H / 4) for k in range(4)] == [OK] * 4
-    assert quarters.get(x) == fine.get(x)
-
-
-def test_tunable_parameters_take_effect_while_running(host):
-    h = host().initialise()
-    for k in range(500):
-        h.set(v_im=0.1 * math.sin(6.0 * k * H))
-        assert h.step(k * H) == OK
-    assert h.get("delta_p_pod") == 0.0
-    h.fmu.setBoolean([h.vr["pod_p.enabled"]], [True])
-    h.set(pod_p__K=10.0)
-    ten = h.get("delta_p_pod")
-    assert 1e-6 < abs(ten) < 0.1
-    h.set(pod_p__K=20.0)
-    assert h.get("delta_p_pod") == pytest.approx(2 * ten, rel=1e-14)
-    h.set(pod_p__limit=abs(ten))
-    assert abs(h.get("delta_p_pod")) == abs(ten)
-    assert h.step(500 * H) == OK
-    h.fmu.setBoolean([h.vr["pod_p.enabled"]], [False])
-    assert h.get("delta_p_pod") == 0.0
 
 
 # -- a bare interpreter ------------------------------------------------------------------------
@@ -605,9 +327,9 @@ def on_a_bare_interpreter(directory, name, kernel):
 
 @pytest.mark.parametrize("name", ["gfor", GENERATOR, "two_area_grid"])
 @pytest.mark.parametrize("kernel", ["", "python"], ids=["compiled", "python"])
-def test_the_slave_runs_where_there_is_neither_numpy_nor_casadi(name, kernel, host, extracted):
+def test_the_slave_runs_where_there_is_neither_numpy_nor_casadi(name, kernel, open_host, extracted):
     compiled, bare = on_a_bare_interpreter(extracted(name), name, kernel)
-    here = np.array([np.frombuffer(row) for row in host(name).initialise().run(50)])
+    here = np.array([np.frombuffer(row) for row in open_host(name).initialise().run(50)])
     assert compiled is (kernel == "")
     if compiled:
         assert np.array_equal(bare, here)
@@ -616,9 +338,9 @@ def test_the_slave_runs_where_there_is_neither_numpy_nor_casadi(name, kernel, ho
         assert (np.abs(bare - here) / scale).max() < 1e-11
 
 
-def test_two_fmus_in_one_process_do_not_mix_their_code(host, extracted):
+def test_two_fmus_in_one_process_do_not_mix_their_code(open_host, extracted):
     names = ["gfor", GENERATOR]
-    together = [host(name) for name in names]
+    together = [open_host(name) for name in names]
     rows = [[], []]
     for h in together:
         h.initialise()

@@ -327,9 +327,13 @@ static int propagate(struct instance *s, evaluation evaluate, const unsigned *fr
     if (!d) return say(s, ERROR, "no memory for a derivative");
     for (size_t i = 0; i < n_from; ++i) d[from[i]] += seed[i];
     evaluate(s, d, d + NV);
-    for (size_t i = 0; i < n_to; ++i) sensitivity[i] = d[to[i]];
+    int status = OK;
+    for (size_t i = 0; i < n_to; ++i) {
+        sensitivity[i] = d[to[i]];
+        if (!isfinite(d[to[i]])) status = say(s, DISCARD, "the derivative at %s is not finite here", NAME[to[i]]);
+    }
     free(d);
-    return OK;
+    return status;
 }
 
 static int directional_derivative(struct instance *s, const unsigned *unknowns, size_t n_unknowns, const unsigned *knowns,

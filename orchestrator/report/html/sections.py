@@ -102,7 +102,8 @@ def operating_point(results: Results) -> str:
                 + "</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"
-        rows.append([escape(s["title"]), f"{s['residual']:.1e}", residual, low, high])
+        change = "–" if s["residual"] is None else f"{s['residual']:.1e}"
+        rows.append([escape(s["title"]), change, residual, low, high])
     columns = ["Scenario", "Change in one step [pu]", "Power-flow mismatch [pu]", "Lowest voltage [pu]", "Highest [pu]"]
     return table("Coupled steady state", columns, rows) + "".join(details)
 

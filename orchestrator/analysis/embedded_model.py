@@ -1,0 +1,54 @@
+"""The linear model inside an FMU in place of perturbation, for FMUs whose states a master cannot set.
+
+It holds at one operating point and for one set of parameters, so both are compared with
+the running FMU before it is used.
+"""
+
+from orchestrator.errors import AnalysisError
+from orchestrator.fmi.component import Component
+from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
+
+_TOLERANCE = 1e-6
+"""Largest difference of a variable from the model's operating point, relative to max(1, |value|)."""
+
+
+def embedded_model(component: Component) -> EmbeddedModel | None:
+    """The model to use for a component; None where it is better perturbed, or has none."""
+    return None if component.description.states_are_settable else read_embedded_model(component.description.path)
+
+
+def check_operating_point(component: Component, model: EmbeddedModel) -> None:
+    """Compare a running FMU with the operating point and the parameters of the model inside it.
+
+    Raises
+    ------
+    AnalysisError
+        Naming what differs most.
+    """
+    where = f"component {component.name!r}: the linear model inside its FMU"
+    if tuple(model.states) != component.description.states:
+        raise AnalysisError(f"{where} has other states than the FMU; build the FMU again with its model")
+    variables = component.description.variables
+    expected = {**model.states, **model.inputs, **model.outputs, **_parameters(component, model)}
+    unknown = [name for name in expected if name not in variables]
+    if unknown:
+        raise AnalysisError(f"{where} speaks of {unknown[0]!r}, which the FMU does not have; build both together")
+    found = component.values(expected)
+    far = {name: abs(found[name] - value) / max(1.0, abs(value)) for name, value in expected.items()}
+    worst = max(far, key=lambda name: far[name], default=None)
+    if worst is not None and not far[worst] <= _TOLERANCE:
+        raise AnalysisError(
+            f"{where} is of another operating point: {worst} is {found[worst]:.9g}, but {expected[worst]:.9g} there; "
+            "build an FMU with the model of this case and scenario"
+        )
+
+
+def _parameters(component: Component, model: EmbeddedModel) -> dict[str, float | bool]:
+    """What every parameter of the FMU must be: the model's value, else its start."""
+    variables = component.description.variables
+    starts = {
+        name: variables[name].start in ("true", "1") if variables[name].type == "Boolean" else float(start)
+        for name in component.description.parameters
+        if variables[name].type != "String" and (start := variables[name].start) is not None
+    }
+    return starts | model.parameters

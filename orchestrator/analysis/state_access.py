@@ -1,0 +1,48 @@
+"""Reading and setting the continuous states of a running FMU, and whether that can be done at all."""
+
+from orchestrator.analysis.embedded_model import embedded_model
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.errors import AnalysisError
+from orchestrator.fmi.component import Component, RealBatch
+
+
+def obstacle(component: Component) -> str | None:
+    """Why a component can neither be perturbed and put back, nor has a linear model inside; None where it can."""
+    description = component.description
+    if not description.can_save_state:
+        return (
+            f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
+            "so it cannot be perturbed and put back; ask for an export that can"
+        )
+    if description.states and not description.states_are_settable and embedded_model(component) is None:
+        return (
+            f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
+            "linearisation by perturbation needs, and has no linear model inside; our FMUs declare the one under "
+            "VendorAnnotations, and `gfor build --with-linear-model` packs the other"
+        )
+    return None
+
+
+class StateAccess:
+    """Reads and sets the continuous states of one component; those that cannot be set stay as they are.
+
+    Raises
+    ------
+    AnalysisError
+        If the component can neither be perturbed and put back, nor has a linear model inside.
+    """
+
+    def __init__(self, component: Component) -> None:
+        if reason := obstacle(component):
+            raise AnalysisError(reason)
+        self._settable = component.description.states_are_settable
+        self.batch = RealBatch(component, component.description.states)
+        self._buffer = RealBatch(component, component.description.states)
+
+    def read(self) -> Matrix:
+        return self.batch.read().copy()
+
+    def write(self, values: Matrix) -> None:
+        if self._settable:
+            self._buffer.values[:] = values
+            self._buffer.write()

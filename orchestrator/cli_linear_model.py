@@ -1,0 +1,77 @@
+"""``gfor build --with-linear-model``: which component of which case the model inside the FMU is of."""
+
+import argparse
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.fmi.linear_model import EmbeddedModel, linear_model_members
+from orchestrator.study.component_model import component_model
+
+OPTION = "--with-linear-model"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of ``gfor build``."""
+    parser.add_argument(
+        OPTION,
+        dest="linear_case",
+        metavar="CASE",
+        help="pack the model's linear model at the steady state of this case into the FMU",
+    )
+    parser.add_argument("--scenario", metavar="NAME", help="scenario of that case (default: its only one)")
+    parser.add_argument(
+        "--component", metavar="NAME", help="component of that case (default: the only one of this model)"
+    )
+
+
+def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:
+    """Members for the FMU's ``extra/`` folder; nothing without the option.
+
+    Raises
+    ------
+    InputError
+        If it is not clear what is meant.
+    AnalysisError
+        If the case has no steady state, or the component no derivatives.
+    """
+    if options.linear_case is None:
+        if options.scenario or options.component:
+            raise InputError(f"--scenario and --component say more of {OPTION}; add it")
+        return {}
+    if len(models) != 1:
+        raise InputError(f"{OPTION} needs one model to build, not {len(models)}; name it before the options")
+    case = load_case(options.linear_case)
+    scenario = _one("--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}")
+    (prepared,) = case.prepare([scenario], {"*.native": True} if options.native else {})
+    component = _component(options.component, models[0], prepared)
+    return linear_model_members(component_model(case.name, prepared, component))
+
+
+def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> str:
+    plans = prepared.system.components
+    known = [name for name, plan in plans.items() if plan.description.model_name == model]
+    if not known:
+        made = sorted({plan.description.model_name for plan in plans.values()})
+        raise InputError(
+            f"{OPTION}: scenario {prepared.name!r} has no component of the model {model!r}; it has some of: "
+            f"{', '.join(made)}"
+        )
+    return _one("--component", f"component of the model {model!r}", wanted, known, f"scenario {prepared.name!r}")
+
+
+def _one(option: str, what: str, wanted: str | None, known: list[str], where: str) -> str:
+    """The one that is wanted, or the only one there is."""
+    if wanted is None and len(known) == 1:
+        return known[0]
+    if wanted not in known:
+        asked = f"there is no {what} {wanted!r}" if wanted else f"there are several {what}s"
+        raise InputError(f"{OPTION}: {asked} in {where}; choose with {option} from: {', '.join(known)}")
+    return wanted
+
+
+def in_words(model: EmbeddedModel) -> str:
+    """One line for ``gfor info``."""
+    size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+    origin = ", ".join(f"{key} {model.origin[key]}" for key in ("case", "scenario", "component") if key in model.origin)
+    return f"linear model inside: {size}" + (f", at the operating point of {origin}" if origin else "")

@@ -1,0 +1,154 @@
+"""An SSP archive as the tables of a case file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.ssp.archive import SspArchive
+from orchestrator.ssp.names import SYSTEM_FILE, children, plain_name, tag
+from orchestrator.ssp.parameter_sets import SspValue
+from orchestrator.ssp.structure import Owner, Structure, read_structure
+from orchestrator.ssp.study import Study, foreign_step, read_study
+
+
+@dataclass(frozen=True)
+class SspCase:
+    """What an SSP comes to.
+
+    Attributes
+    ----------
+    tables
+        Contents of a case file, without any that need another program.
+    folder
+        Where its FMUs are unpacked; paths in the tables are relative to it.
+    digest
+        SHA-256 of the archive.
+    """
+
+    tables: dict[str, Any]
+    folder: Path
+    digest: str
+
+
+def read_ssp(path: Path, cache: Path) -> SspCase:
+    """Read an SSP and unpack its FMUs; nested systems are laid flat.
+
+    Parameters
+    ----------
+    cache
+        Folder for what is unpacked; each archive has one of its own in there.
+
+    Raises
+    ------
+    InputError
+        If the file is no SSP 1.0.
+    CaseError
+        With everything in it that is not supported.
+    """
+    archive = SspArchive(path)
+    description = archive.xml(SYSTEM_FILE)
+    version = description.get("version", "unknown")
+    if description.tag != tag("ssd:SystemStructureDescription") or not version.startswith("1."):
+        raise InputError(f"{path}: {SYSTEM_FILE} is of version {version}; SSP 1.0 can be read, ask for that export")
+    problems: list[Problem] = []
+    structure = read_structure(archive, description, lambda place, text: problems.append(Problem(place, text)))
+    name = description.get("name", "")
+    tables: dict[str, Any] = {"name": plain_name(name), "title": description.get("description", name)}
+    study, step = None, None
+    try:
+        tables["solver"] = _times(description)
+        study, step = read_study(description), foreign_step(description)
+    except InputError as error:
+        problems.append(Problem(SYSTEM_FILE, str(error)))
+    if problems:
+        raise CaseError(str(path), problems)
+    names = _component_names(structure)
+    folder = cache / archive.digest[:32]
+    fmus = {owner: archive.unpack(member, folder) for owner, member in structure.sources.items()}
+    descriptions = {owner: _description(fmu) for owner, fmu in fmus.items()}
+    tables["connections"] = [
+        {"from": f"{names[source]}.{output}", "to": f"{names[sink]}.{into}"}
+        for (source, output), (sink, into) in structure.connections
+    ]
+    tables["components"] = {
+        names[owner]: {"fmu": member, "parameters": _values(structure, owner, descriptions[owner])}
+        for owner, member in structure.sources.items()
+    }
+    if study is not None:
+        _add_study(tables, study)
+    else:
+        suggested = [d.default_step_size for d in descriptions.values() if d is not None and d.default_step_size]
+        tables["solver"] |= {"step_size": step or min(suggested)} if step or suggested else {}
+        tables["solver"]["schedule"] = "jacobi"  # does not depend on the order of the elements
+    return SspCase(tables, folder, archive.digest)
+
+
+def _times(description: Element) -> dict[str, float]:
+    """Stop time of the default experiment [s], where it has one."""
+    times = {}
+    for experiment in children(description, "ssd:DefaultExperiment"):
+        for name, text in experiment.attrib.items():
+            try:
+                times[name] = float(text)
+            except ValueError as error:
+                raise InputError(f"DefaultExperiment: {name} is {text!r}, which is no number") from error
+    if times.get("startTime", 0.0) != 0:
+        raise InputError(f"DefaultExperiment: the start time is {times['startTime']:g} s; runs start at 0 s here")
+    return {"stop_time": times["stopTime"]} if "stopTime" in times else {}
+
+
+def _component_names(structure: Structure) -> dict[Owner, str]:
+    """A name for every component that a case file can have; those of nested ones begin with their system's."""
+    names: dict[Owner, str] = {}
+    for owner in structure.sources:
+        names[owner] = plain_name("_".join(owner), names.values())
+    return names
+
+
+def _description(fmu: Path) -> FmuDescription | None:
+    """None for an FMU that cannot be used: the case tells why, with all its other problems."""
+    try:
+        return read_description(fmu)
+    except InputError:
+        return None
+
+
+def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> dict[str, Any]:
+    """Values of a component, as SSP means them.
+
+    Names that the FMU does not have are passed over; an input that nothing feeds stays at its start; a start value
+    of one that is fed gives way to what feeds it.
+    """
+    given = structure.values[owner]
+    if fmu is None:
+        return {}
+    fed = {variable for _, (sink, variable) in structure.connections if sink == owner}
+    values = {v: _converted(value, fmu.variables[v].unit) for v, value in given.items() if v in fmu.variables}
+    open_inputs = {v: float(fmu.variables[v].start or 0) for v in fmu.inputs if fmu.variables[v].type == "Real"}
+    return {v: value for v, value in (open_inputs | values).items() if v not in fed}
+
+
+def _converted(value: SspValue, unit: str) -> float | bool | str:
+    """A number in the variable's own unit as it is; one in another unit with that unit, to be converted."""
+    if not value.unit or value.unit == unit or isinstance(value.value, bool | str):
+        return value.value
+    return f"{value.value!r} {value.unit}"
+
+
+def _add_study(tables: dict[str, Any], study: Study) -> None:
+    """What our annotation says; its tables join those of SSP."""
+    for name, content in study.tables.items():
+        tables[name] = tables.get(name, {}) | content if isinstance(content, dict) else content
+    tables["solver"] |= {
+        "step_size": study.step_size,
+        "schedule": study.schedule,
+        "groups": [list(group) for group in study.groups],
+    }
+    tables["events"] = [
+        {"type": "parameter_change", "time": time, "component": component, "parameter": variable, "value": value}
+        for time, component, variable, value in study.settings
+    ]
+    tables["scenarios"] = {plain_name(study.scenario): {"title": study.title}}

@@ -1,0 +1,141 @@
+"""What a run needs beside SSP's own contents: step, schedule, events, and what is looked for.
+
+It travels as an annotation, which other tools ignore. The step is written in libcosim's form as well.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+import tomli_w
+
+from orchestrator.coupling.events import Event
+from orchestrator.coupling.schedule import Schedule
+from orchestrator.errors import InputError
+from orchestrator.ssp.names import OSP_TYPE, STUDY_TYPE, children, tag
+
+_OMS_TYPE = "org.openmodelica"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A scenario without its system.
+
+    Attributes
+    ----------
+    step_size
+        Communication step [s].
+    groups
+        Of the schedule.
+    settings
+        What the events set, in order: time [s], component, variable, value.
+    tables
+        Tables of the case file that only this project knows, such as ``analysis`` and ``plots``.
+    """
+
+    scenario: str
+    title: str
+    step_size: float
+    schedule: str
+    groups: tuple[tuple[str, ...], ...]
+    settings: tuple[tuple[float, str, str, float | bool], ...]
+    tables: Mapping[str, Any] = field(default_factory=dict)
+
+
+def study_of(
+    scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
+) -> Study:
+    """The study of a scenario; its events come down to the variables that they set."""
+    settings = tuple(
+        (event.time, component, variable, value)
+        for event in events
+        for component, new in event.changes().items()
+        for variable, value in new.items()
+    )
+    return Study(scenario, title, step_size, schedule.name, schedule.groups, settings, tables)
+
+
+def write_study(annotations: Element, study: Study) -> None:
+    """Our annotation."""
+    annotation = SubElement(annotations, tag("ssc:Annotation"), type=STUDY_TYPE)
+    root = SubElement(annotation, tag("gfor:Study"), scenario=study.scenario, title=study.title)
+    SubElement(root, tag("gfor:CommunicationStep"), seconds=repr(study.step_size))
+    schedule = SubElement(root, tag("gfor:Schedule"), name=study.schedule)
+    for group in study.groups:
+        element = SubElement(schedule, tag("gfor:Group"))
+        for name in group:
+            SubElement(element, tag("gfor:Component"), name=name)
+    events = SubElement(root, tag("gfor:Events"))
+    for time, component, variable, value in study.settings:
+        text = str(value).lower() if isinstance(value, bool) else repr(float(value))
+        SubElement(events, tag("gfor:Set"), time=repr(float(time)), component=component, variable=variable, value=text)
+    SubElement(root, tag("gfor:CaseTables")).text = tomli_w.dumps(study.tables)
+
+
+def write_osp_step(annotations: Element, step_size: float) -> None:
+    """The communication step as libcosim and its relatives read it."""
+    annotation = SubElement(annotations, tag("ssc:Annotation"), type=OSP_TYPE)
+    algorithm = SubElement(annotation, tag("osp:Algorithm"))
+    SubElement(algorithm, tag("osp:FixedStepAlgorithm"), baseStepSize=repr(step_size))
+
+
+def read_study(description: Element) -> Study | None:
+    """Our annotation of a system structure description, if it has one.
+
+    Raises
+    ------
+    InputError
+        If it is not as `write_study` writes it.
+    """
+    for annotation in children(description, "ssd:Annotations/ssc:Annotation"):
+        if annotation.get("type") == STUDY_TYPE:
+            try:
+                return _read(annotation)
+            except (AttributeError, KeyError, ValueError) as error:
+                raise InputError(
+                    f"the annotation {STUDY_TYPE} cannot be read ({error}); export the SSP again"
+                ) from error
+    return None
+
+
+def _read(annotation: Element) -> Study:
+    (root,) = children(annotation, "gfor:Study")
+    (step,), (schedule,) = children(root, "gfor:CommunicationStep"), children(root, "gfor:Schedule")
+    groups = tuple(
+        tuple(c.attrib["name"] for c in children(group, "gfor:Component")) for group in children(schedule, "gfor:Group")
+    )
+    settings = tuple(
+        (float(e.attrib["time"]), e.attrib["component"], e.attrib["variable"], _value(e.attrib["value"]))
+        for e in children(root, "gfor:Events/gfor:Set")
+    )
+    return Study(
+        root.attrib["scenario"],
+        root.get("title", ""),
+        float(step.attrib["seconds"]),
+        schedule.attrib["name"],
+        groups,
+        settings,
+        tomllib.loads("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
+    )
+
+
+def _value(text: str) -> float | bool:
+    return text == "true" if text in ("true", "false") else float(text)
+
+
+def foreign_step(description: Element) -> float | None:
+    """The communication step [s] that libcosim's or OMSimulator's annotations give, if there are any."""
+    for annotation in description.iter(tag("ssc:Annotation")):
+        if annotation.get("type") in (OSP_TYPE, _OMS_TYPE):
+            for element in annotation.iter():
+                text = element.get("baseStepSize") or element.get("stepSize")
+                if text is not None:
+                    try:
+                        return float(text)
+                    except ValueError as error:
+                        raise InputError(
+                            f"the annotation {annotation.get('type')} gives the step size {text!r}, which is no number"
+                        ) from error
+    return None
