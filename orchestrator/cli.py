@@ -16,7 +16,7 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_certify, cli_compare, cli_design, cli_linear_model, cli_ssp
+from orchestrator import cli_black_box, cli_certify, cli_compare, cli_design, cli_linear_model, cli_ssp
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -50,6 +50,8 @@ examples:
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor black-box two_area --scenario gfor --component gfor
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
@@ -187,6 +189,17 @@ def _parser() -> argparse.ArgumentParser:
     _case_arguments(design)
     cli_design.add_arguments(design)
     design.set_defaults(command=_design)
+
+    admittance = commands.add_parser("admittance", help="measure a device's admittance, and fit a model to it")
+    cli_black_box.add_admittance(admittance, _seconds, cli_certify.setting)
+    admittance.set_defaults(
+        command=lambda o: cli_black_box.run_admittance(o, _console(stderr=o.json), read_description(o.fmu))
+    )
+
+    black_box = commands.add_parser("black-box", help="modes of a case with a component known by its port alone")
+    _case_arguments(black_box)
+    cli_black_box.add_black_box(black_box)
+    black_box.set_defaults(command=_black_box)
 
     certificate = commands.add_parser("certify", help="the grid code's damping test on a converter FMU")
     cli_certify.add_arguments(certificate, _count)
@@ -424,6 +437,11 @@ def _sweep(options: argparse.Namespace) -> int:
 
         result = run_points(plan, executor, folder, report)
     return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
+
+
+def _black_box(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    return cli_black_box.run_black_box(options, _console(stderr=options.json), scenarios, case)
 
 
 def _certify(options: argparse.Namespace) -> int:

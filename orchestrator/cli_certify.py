@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser, workers: Callable[[str], int]
         "--pod", choices=PODS, help="damping controllers that are active (default: as the FMU shows them)"
     )
     parser.add_argument(
-        "--set", action="append", default=[], type=_setting, metavar="VARIABLE=VALUE",
+        "--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
         help="a value of the converter, such as pod_p.enabled=true, or of the study, such as "
         "sg1.governor.enabled=true (repeatable)",
     )  # fmt: skip
@@ -31,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser, workers: Callable[[str], int]
         "--reactances", type=_reactances, default=REACTANCES, metavar="X,X,…",
         help="line reactances X_L [pu] (default: the norm's, 0.01 and 0.05 to 0.60)",
     )  # fmt: skip
+    parser.add_argument("--black-box", action="store_true",
+                        help="do not use the converter's states for the modes, even if it shows them")  # fmt: skip
     parser.add_argument("--workers", type=workers, metavar="N", help="processes to compute in (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/certify_<file>)")
@@ -51,7 +53,9 @@ def run_certify(
         raise InputError(f"--out {folder}: results cannot be written there: {error.strerror}") from error
     study = {name: value for name, value in options.set if name.split(".")[0] in ("sg1", "sg2", "grid")}
     own = {name: value for name, value in options.set if name not in study}
-    request = CertificationRequest(options.fmu, options.binding, own, options.pod, options.reactances, study)
+    request = CertificationRequest(
+        options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
+    )
     executor = choose_executor(options.workers, options.scheduler)
     try:
         result = certify(request, executor, folder, report)
@@ -96,7 +100,8 @@ def _table(result: Certification) -> Table:
     return table
 
 
-def _setting(text: str) -> tuple[str, bool | float | str]:
+def setting(text: str) -> tuple[str, bool | float | str]:
+    """``variable=value`` of one FMU."""
     name, equals, value = text.partition("=")
     if not equals or not name or not value:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")

@@ -22,6 +22,7 @@ FLOORS = (
     ("orchestrator.certification",),
     ("orchestrator.cli_sweep",),
     (
+        "orchestrator.cli_black_box",
         "orchestrator.cli_certify",
         "orchestrator.cli_compare",
         "orchestrator.cli_design",

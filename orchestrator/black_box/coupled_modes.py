@@ -10,15 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.embedded_model import embedded_model
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, find_spectrum
-from orchestrator.analysis.state_access import StateAccess
+from orchestrator.analysis.state_access import StateAccess, obstacle
 from orchestrator.black_box.fitting import IdentifiedModel, fit
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.black_box.test_bench import TestBench
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, InputError
+from orchestrator.fmi.component import Component
 
 STEADY = 1e-6
 """Largest change of a state or of the box's current in one communication step that passes for a steady state."""
@@ -50,6 +52,13 @@ class BoxedSystem:
     def participation(self, mode: Mode) -> float:
         """Participation of the box as a whole; see `component_participation`."""
         return component_participation(mode, self.component)
+
+
+def is_black_box(component: Component) -> bool:
+    """Whether a component does not show its states, so that it cannot be perturbed like the others."""
+    return obstacle(component) is not None or not (
+        component.description.states_are_settable or embedded_model(component) is not None
+    )
 
 
 def component_participation(mode: Mode, component: str) -> float:

@@ -14,13 +14,13 @@ _CHUNK = 4096
 
 
 def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int64]:
-    """About ``count`` odd multiples of the lowest frequency, spread over its logarithm.
+    """About ``count`` odd multiples of the lowest frequency up to the highest, spread over its logarithm.
 
     Even multiples stay silent, so that a quadratic part of the device does not reach the excited ones.
     """
-    wanted = np.geomspace(1.0, highest_hz / lowest_hz, count)
-    lines = np.unique(2 * np.round((wanted - 1) / 2).astype(np.int64) + 1)
-    return np.asarray(lines[lines * lowest_hz <= highest_hz * (1 + 1e-9)])
+    last = int((highest_hz / lowest_hz * (1 + 1e-9) - 1) // 2)  # the largest odd multiple is 2·last + 1
+    wanted = (np.geomspace(1.0, 2 * last + 1, count) - 1) / 2
+    return np.asarray(2 * np.unique(np.round(wanted).astype(np.int64)) + 1)
 
 
 def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Numbers:

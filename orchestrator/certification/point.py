@@ -9,6 +9,7 @@ from threadpoolctl import ThreadpoolController
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import load_case
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.master import Master
@@ -35,12 +36,15 @@ class PointTask:
         Path of the case file.
     values
         Values by ``component.variable``.
+    black_box
+        Identify the converter even if it shows its states.
     """
 
     case: str
     scenario: str
     X_L: float
     values: dict[str, Value]
+    black_box: bool = False
 
 
 @dataclass
@@ -57,6 +61,8 @@ class PointResult:
         Largest real part of any eigenvalue [1/s].
     residual
         Of the steady state.
+    identified
+        Order of the model that stands for the converter in the modes; None where its own states do.
     signals
         By name, each of the shape of ``times``.
     failure
@@ -69,6 +75,7 @@ class PointResult:
     components: list[str] = field(default_factory=list)
     growth: float = float("nan")
     residual: float = float("nan")
+    identified: int | None = None
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -92,9 +99,15 @@ def _compute(task: PointTask, result: PointResult) -> None:
     (prepared,) = case.prepare([task.scenario], {**task.values, "grid.X_L": task.X_L})
     recorder = Recorder(prepared.record, prepared.record_every)
     with running(prepared) as master:
-        found = modes_of(case, prepared, master, COMPUTED)
-        result.residual, result.warnings = found.operating_point.residual, found.warnings
-        _keep_modes(result, found.model)
+        converter = master.components.get(CONVERTER)
+        if converter is not None and (task.black_box or is_black_box(converter)):
+            boxed = linearize_with_box(master, CONVERTER)
+            result.residual, result.identified = boxed.residual, len(boxed.identified.A)
+            _keep_modes(result, boxed.model)
+        else:
+            found = modes_of(case, prepared, master, COMPUTED)
+            result.residual, result.warnings = found.operating_point.residual, found.warnings
+            _keep_modes(result, found.model)
         f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
         try:
             master.run(prepared.stop_time, prepared.events, [recorder])

@@ -63,6 +63,9 @@ def _tested(c: Certification) -> str:
              "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
              "Values set": ", ".join(f"{k} = {v}" for k, v in c.request.values.items()) or "none",
              "Damping controllers": texts.PODS[c.pod], "Watched in time": _signal_name(c.signal)}  # fmt: skip
+    orders = [str(p.identified) for p in c.points.values() if p.identified is not None]
+    if orders:
+        given["In the modes"] = f"a model identified at its port, of order {', '.join(dict.fromkeys(orders))}"
     rows = [[escape(name), escape(str(value))] for name, value in given.items()]
     return table("The converter", ["", ""], rows, left=2) + texts.STUDY
 

@@ -44,6 +44,8 @@ class CertificationRequest:
         One of `PODS`: which damping controllers are active; None to see it from ``pod_p.enabled``, ``pod_q.enabled``.
     study_values
         Values of the study's other components, by ``component.variable``.
+    black_box
+        Identify the converter for the modes even if it shows its states; one that does not is always identified.
     """
 
     fmu: Path
@@ -52,6 +54,7 @@ class CertificationRequest:
     pod: str | None = None
     reactances: Sequence[float] = REACTANCES
     study_values: Mapping[str, Value] = field(default_factory=dict)
+    black_box: bool = False
 
 
 @dataclass(frozen=True)
@@ -186,7 +189,7 @@ def certify(
     description = prepared.system.components[CONVERTER].description
     pod = request.pod or _pod_of(description, prepared.values)
     tasks = [
-        PointTask(str(path), scenario, X_L, {**fixed, **(own if scenario == WITH else {})})
+        PointTask(str(path), scenario, X_L, {**fixed, **(own if scenario == WITH else {})}, request.black_box)
         for X_L in request.reactances
         for scenario in (WITHOUT, WITH)
     ]
