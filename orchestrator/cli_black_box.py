@@ -160,8 +160,9 @@ def _summary(content: dict[str, Any]) -> Group:
         table.add_column(column, justify="right")
     for pole in content["model"]["poles"]:
         size = math.hypot(pole["real"], pole["imag"])
-        table.add_row(f"{pole['real']:.4g} ± j{pole['imag']:.4g}" if pole["imag"] else f"{pole['real']:.4g}",
-                      f"{pole['imag'] / (2 * math.pi):.4g}", f"{-100 * pole['real'] / size:.2f}" if size else "–")  # fmt: skip
+        value = f"{pole['real']:.4g}" + (f" ± j{pole['imag']:.4g}" if pole["imag"] else "")
+        damping = f"{-100 * pole['real'] / size:.2f}" if size else "–"
+        table.add_row(value, f"{pole['imag'] / (2 * math.pi):.4g}", damping)
     return Group(heading, table)
 
 
