@@ -1,6 +1,8 @@
 """Frequency response of a device on the test bench, by multi-sine or by pulses, each value with a bound."""
 
 from dataclasses import dataclass
+from itertools import chain, repeat
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +12,11 @@ from orchestrator.black_box.test_bench import Runs, TestBench
 from orchestrator.errors import AnalysisError
 
 METHODS = ("multisine", "pulse")
-_MOST_PERIODS = 8
 _MOST_SECONDS = 400.0
+"""After so long a response must have settled [s]."""
+
+_APART = 10.0
+"""Periods are compared over at least so long [s]: neighbours that are short always look alike."""
 
 Numbers = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,7 +29,7 @@ class Excitation:
     Attributes
     ----------
     method
-        ``multisine``: periods of many sines until two of them agree. ``pulse``: one step up and one step down, each
+        ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each
         followed until it has died out.
     lowest_hz, highest_hz, lines
         Range of frequencies [Hz], and about how many.
@@ -153,20 +158,21 @@ def _by_multisine(
             f"a period of {e.lowest_hz:g} Hz is no whole number of steps of {bench.step_size:g} s; choose another"
         )
     u = multisine(lines, period, amplitude)
-    deviations = np.zeros((_MOST_PERIODS * period, len(bench.inputs)))
-    deviations[:, column] = np.tile(u, _MOST_PERIODS)
-    before: Complex | None = None
-    for count, y in enumerate(runs.respond_in_parts(deviations, period), start=1):
-        response = line_response(u, y, lines)
-        if before is not None:
-            change = np.abs(response - before)
-            if change.max() <= e.settled * np.abs(response).max():
-                return response, change, count * period * bench.step_size
-        before = response
+    deviations = np.zeros((period, len(bench.inputs)))
+    deviations[:, column] = u
+    seconds = period * bench.step_size
+    apart, most = ceil(_APART / seconds), ceil(_MOST_SECONDS / seconds)
+    found: list[Complex] = []
+    for y in runs.respond(repeat(deviations, max(most, 2 * apart))):
+        found.append(line_response(u, y, lines))
+        if len(found) > apart:
+            change = np.abs(found[-1] - found[-1 - apart])
+            if change.max() <= e.settled * np.abs(found[-1]).max():
+                return found[-1], change, len(found) * seconds
     raise AnalysisError(
-        f"{bench.description.path.name}: after {_MOST_PERIODS} periods of {period * bench.step_size:g} s its response "
-        f"to {bench.inputs[column]} still changes by {change.max() / np.abs(response).max():.2g} from one to the next; "
-        "it is unstable at an ideal bus, or slower than that: try --method pulse, or a lower lowest frequency"
+        f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
+        f"response still changes by {change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it is "
+        "unstable at an ideal bus, or slower than that: try --method pulse, or a smaller amplitude"
     )
 
 
@@ -174,16 +180,17 @@ def _by_pulses(
     runs: Runs, bench: TestBench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
 ) -> tuple[Complex, Numbers, float]:
     """The same from a pulse up and a pulse down, so that even parts of the device drop out."""
-    part = round(10.0 / bench.step_size)
-    count = round(_MOST_SECONDS / bench.step_size)
+    part = round(_APART / bench.step_size)
+    silence = np.zeros((part, len(bench.inputs)))
     frequencies: Numbers = np.asarray(lines * e.lowest_hz, dtype=float)
     sums, changes, seconds = [], [], 0.0
     for sign in (1.0, -1.0):
-        deviations = np.zeros((count, len(bench.inputs)))
-        deviations[0, column] = sign * amplitude
+        pulse = silence.copy()
+        pulse[0, column] = sign * amplitude
+        parts = chain([pulse], repeat(silence, ceil(_MOST_SECONDS / _APART) - 1))
         total = np.zeros((len(lines), len(bench.outputs)), dtype=complex)
         turn = np.exp(-2j * np.pi * frequencies * part * bench.step_size)[:, None]
-        for number, y in enumerate(runs.respond_in_parts(deviations, part)):
+        for number, y in enumerate(runs.respond(parts)):
             added = pulse_response(y, frequencies, bench.step_size) * turn**number / (sign * amplitude)
             total += added
             if np.abs(added).max() <= e.settled * np.abs(total).max():

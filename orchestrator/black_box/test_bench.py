@@ -5,7 +5,7 @@ are read or set, and parameters only before initialisation.
 """
 
 import ctypes
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -115,26 +115,22 @@ class Runs:
         assert self._component is not None
         return self._component
 
-    def respond(self, deviations: Numbers) -> Numbers:
-        """Outputs after every step while the inputs deviate from rest.
+    def respond(self, parts: Iterable[Numbers]) -> Iterator[Numbers]:
+        """Outputs after every step while the inputs deviate from rest, part by part as they are asked for.
 
         Parameters
         ----------
-        deviations
-            Shape (n, m); row k holds from point k to point k + 1.
+        parts
+            Deviations in the order of time, each of shape (n, m); row k holds from point k to point k + 1.
 
-        Returns
-        -------
+        Yields
+        ------
         Deviations of the outputs from the operating point, shape (n, p); row k is read at the end of step k, with
         the inputs of that step still in place.
         """
-        return np.concatenate(list(self.respond_in_parts(deviations, len(deviations))))
-
-    def respond_in_parts(self, deviations: Numbers, length: int) -> Iterator[Numbers]:
-        """The same in parts of ``length`` steps, each computed when it is asked for."""
         self._rewind()
-        for first in range(0, len(deviations), length):
-            yield self._drive(self._bench.rest + deviations[first : first + length]) - self.operating_point
+        for deviations in parts:
+            yield self._drive(self._bench.rest + deviations) - self.operating_point
 
     def feedthrough(self, size: float) -> Numbers:
         """Direct effect of the inputs on the outputs, shape (p, m): set and read without a step, ± ``size``."""
