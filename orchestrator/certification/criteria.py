@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarity
@@ -125,7 +126,8 @@ def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: f
     """Judge the modes that the matrix pencil finds in a signal after ``start`` [s]."""
     window = times >= start
     try:
-        found = identify_modes(times[window], signal[window])
+        with ThreadpoolController().limit(limits=1):  # small matrices: many threads would only wait for each other
+            found = identify_modes(times[window], signal[window])
     except AnalysisError as error:
         return ModalTest((), False, str(error))
     except np.linalg.LinAlgError:
