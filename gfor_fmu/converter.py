@@ -1,36 +1,80 @@
 """The grid-forming converter: electrical side, inner loops, droops and both POD controllers put together."""
 
-from fmus.toolchain.frames import power
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model, ModelBuilder
-from fmus.toolchain.port import declare_port_outputs, device_port
-from gfor_fmu.droop import declare_droop, frequency, voltage_reference
+from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
+from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.filter import declare_filter, filter_equations
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
+
+S_N, P_0 = 1500.0, 0.9
+"""Default rating [MVA] and dispatch [pu]: the two-area system's converter."""
+
+
+@dataclass(frozen=True)
+class OuterControl:
+    """Droops and POD controllers, and what they give: frequency, voltage reference, supplementary references [pu]."""
+
+    droop: Droop
+    omega: ca.SX
+    u_ref: Phasor
+    delta_p: ca.SX
+    delta_q: ca.SX
+
+
+@dataclass(frozen=True)
+class Converter:
+    """What every variant shows: current into the grid (network frame), control signals, magnitudes inside [pu, S_n]."""
+
+    current: Phasor
+    control: OuterControl
+    u: ca.SX
+    i_s: ca.SX
 
 
 def grid_forming_converter() -> Model:
     """Average EMT-type model of a droop-controlled grid-forming converter, stiff DC side (the paper's Fig. 1)."""
     m = ModelBuilder("gfor", "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)")
-    port = device_port(m, S_n=1500.0, P_0=0.9)
+    port = device_port(m, S_n=S_N, P_0=P_0)
+    converter = declare_converter(m, port)
+    declare_port_outputs(m, port, converter.current)
+    declare_converter_outputs(m, converter)
+    return m.build()
+
+
+def declare_converter(m: ModelBuilder, port: DevicePort) -> Converter:
+    """Everything behind a port, whatever its inputs are."""
     electrical = declare_filter(m, port)
     droop = declare_droop(m, electrical.initial, power(electrical.u, electrical.i_g.value))
+    control = outer_control(m, droop, port.omega_b)
+    v_c = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref)
+    filter_equations(m, electrical, port, v_c, droop.theta, control.omega)
+    current = electrical.i_g.value.rotated(droop.theta)
+    return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude())
 
+
+def outer_control(m: ModelBuilder, droop: Droop, omega_b: ca.SX) -> OuterControl:
+    """Both POD controllers around the droops, and the angle that follows."""
     # The POD acts on the frequency that its own output changes. Only states lie between them (T_f),
     # so each controller can be given the deviation symbolically: first w as a function of ΔP, then ΔP.
     omega = m.algebraic("w")
     delta_p = pod(m, "pod_p", omega - 1, sign=-1, T_S1=0.20, T_S2=0.37)
     delta_q = pod(m, "pod_q", omega - 1, sign=+1, T_S1=0.26, T_S2=0.29)
     m.close(omega, frequency(droop, delta_p))
-    m.derivative(droop.theta, port.omega_b * (omega - 1))
+    m.derivative(droop.theta, omega_b * (omega - 1))
+    return OuterControl(droop, omega, voltage_reference(droop, delta_q), delta_p, delta_q)
 
-    v_c = inner_loops(m, electrical, port.omega_b, omega, voltage_reference(droop, delta_q))
-    filter_equations(m, electrical, port, v_c, droop.theta, omega)
 
-    declare_port_outputs(m, port, electrical.i_g.value.rotated(droop.theta))
-    m.output("omega", omega, "pu", "Frequency imposed by the converter", base="f_n")
-    m.output("delta_p_pod", delta_p, "pu", "Supplementary active-power reference of POD-P", base="S_n")
-    m.output("delta_q_pod", delta_q, "pu", "Supplementary reactive-power reference of POD-Q", base="S_n")
-    m.output("u", electrical.u.magnitude(), "pu", "Voltage magnitude at the filter capacitor", base="S_n")
-    m.output("i_s", electrical.i_s.value.magnitude(), "pu", "Current magnitude in the converter", base="S_n")
-    return m.build()
+def declare_converter_outputs(m: ModelBuilder, converter: Converter) -> None:
+    """Declare the control's signals and the magnitudes inside."""
+    control = converter.control
+    m.output("omega", control.omega, "pu", "Frequency imposed by the converter", base="f_n")
+    m.output("delta_p_pod", control.delta_p, "pu", "Supplementary active-power reference of POD-P", base="S_n")
+    m.output("delta_q_pod", control.delta_q, "pu", "Supplementary reactive-power reference of POD-Q", base="S_n")
+    m.output("u", converter.u, "pu", "Voltage magnitude at the filter capacitor", base="S_n")
+    m.output("i_s", converter.i_s, "pu", "Current magnitude in the converter", base="S_n")

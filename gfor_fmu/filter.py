@@ -28,11 +28,8 @@ class SteadyState:
 
 
 @dataclass(frozen=True)
-class Filter:
-    """Parameters, states and algebraic quantities of the electrical side.
-
-    ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
-    """
+class FilterData:
+    """Parameters of the electrical side [pu, S_n], and its operating point."""
 
     R_c: ca.SX
     X_c: ca.SX
@@ -40,15 +37,24 @@ class Filter:
     R_t: ca.SX
     X_t: ca.SX
     R_cap: ca.SX
+    initial: SteadyState
+
+
+@dataclass(frozen=True)
+class Filter(FilterData):
+    """With states and algebraic quantities.
+
+    ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
+    """
+
     i_s: QdState
     u_c: QdState
     i_g: QdState
     u: Phasor
-    initial: SteadyState
 
 
-def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
-    """Declare parameters and states; the equations follow once the control has formed v_c."""
+def declare_filter_data(m: ModelBuilder, port: DevicePort) -> FilterData:
+    """Declare parameters alone; the power flow gives the operating point."""
     with m.scope("filter"):
         R_c = m.parameter("R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX)
         X_c = m.parameter("X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=0.01, source=APPENDIX)
@@ -59,15 +65,23 @@ def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
 
     # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
     R_cap = 1 / (30 * B_c)
-    start = _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap)
-    u_c_start = start.u - (start.i_s - start.i_g) * R_cap
+    return FilterData(R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap))
+
+
+def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
+    """Declare parameters and states; the equations follow once the control has formed v_c."""
+    data = declare_filter_data(m, port)
+    start = data.initial
+    u_c_start = start.u - (start.i_s - start.i_g) * data.R_cap
     with m.scope("filter"):
         i_s = qd_state(m, "i_s", start.i_s, "Current of the converter-side inductor")
         u_c = qd_state(m, "u_c", u_c_start, "Capacitor voltage")
     with m.scope("transformer"):
         i_g = qd_state(m, "i_g", start.i_g, "Current into the grid")
-    u = u_c.value + R_cap * (i_s.value - i_g.value)
-    return Filter(R_c, X_c, B_c, R_t, X_t, R_cap, i_s, u_c, i_g, u, start)
+    u = u_c.value + data.R_cap * (i_s.value - i_g.value)
+    return Filter(
+        data.R_c, data.X_c, data.B_c, data.R_t, data.X_t, data.R_cap, start, i_s=i_s, u_c=u_c, i_g=i_g, u=u
+    )  # fmt: skip
 
 
 def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: ca.SX, w: ca.SX) -> None:

@@ -4,7 +4,7 @@ import casadi as ca
 
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model import ModelBuilder
-from gfor_fmu.filter import APPENDIX, Filter
+from gfor_fmu.filter import APPENDIX, Filter, SteadyState
 
 LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
@@ -16,8 +16,7 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
     with m.scope("voltage_control"):
         tau = m.parameter("tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX)
         xi = m.parameter("xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX)
-        i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
-        i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
+        i_q_max, i_d_max = declare_current_limits(m, start)
         C_c = f.B_c / omega_b
         omega_n = 4 / (tau * xi)
         k_p = 2 * xi * omega_n * C_c * 100  # the factor 100 is the paper's
@@ -27,14 +26,6 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
         i_ref = demanded.clamped(i_q_max, i_d_max)
         _integrate_unless_clamped(m, x, k_i * error, demanded, i_q_max, i_d_max)
-        m.require(
-            i_q_max - ca.fabs(start.i_s.re),
-            "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
-        )
-        m.require(
-            i_d_max - ca.fabs(start.i_s.im),
-            "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
-        )
     with m.scope("current_control"):
         tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX)
         L_c = f.X_c / omega_b
@@ -43,6 +34,21 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
         error = i_ref - i_s
         x.set_derivative(m, f.R_c / tau * error)
         return L_c / tau * error + x.value + Phasor(0, w * f.X_c) * i_s + u_lagged
+
+
+def declare_current_limits(m: ModelBuilder, start: SteadyState) -> tuple[ca.SX, ca.SX]:
+    """Declare the limits of i_q,ref and i_d,ref; a dispatch beyond them is refused."""
+    i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
+    i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
+    m.require(
+        i_q_max - ca.fabs(start.i_s.re),
+        "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
+    )
+    m.require(
+        i_d_max - ca.fabs(start.i_s.im),
+        "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
+    )
+    return i_q_max, i_d_max
 
 
 def _feed_forwards(m: ModelBuilder, f: Filter) -> tuple[Phasor, Phasor]:

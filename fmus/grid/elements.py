@@ -1,10 +1,11 @@
 """Elements of a network as parameters and states: what each adds to its buses, and its own equation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.grid.network import SMALLEST_REACTANCE, SYSTEM_BASE_MVA, Line, Load, Port, Shunt
+from fmus.grid.network import SMALLEST_REACTANCE, SYSTEM_BASE_MVA, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
 from fmus.toolchain.model import ModelBuilder, Scalar
 from fmus.toolchain.port import BREAKER_TIME, SYSTEM_BASE
@@ -59,6 +60,20 @@ class DeclaredLoad:
     branches: list[Branch]
 
 
+Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
+"""Puts an inductor of reactance X [pu, 100 MVA], of which ``scale`` times is drawn, between a bus and earth."""
+
+
+@dataclass(frozen=True)
+class LineValues:
+    """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open."""
+
+    R: ca.SX
+    X: ca.SX
+    ratio: Phasor | None
+    connected: ca.SX
+
+
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
     """Declare the power flow's voltage of a bus."""
     with m.scope(name):
@@ -80,8 +95,8 @@ def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
     return fed
 
 
-def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
-    """Declare a π section, with a ratio at its from side where it has one."""
+def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> LineValues:
+    """Declare the parameters of a π section and add its charging to both buses."""
 
     def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> ca.SX:
         base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
@@ -95,30 +110,48 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     R = parameter("R", line.R, "pu", "Resistance", 0, None)
     with m.scope(line.name):
         connected = m.switch("connected", True, f"Line {line.name} is closed at both ends", tunable=True)
-    v_from, ratio, turns = start.v_0, None, ca.SX(1)
+    ratio, turns = None, ca.SX(1)
     if line.has_ratio:
         turns = parameter("tap", line.tap, "1", "Magnitude of the ratio at the from side", 0.1, 10)
         ratio = polar(turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None))
-        v_from = v_from / ratio
     if line.B:
         B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (OPEN_CHARGING + (1 - OPEN_CHARGING) * connected)
         start.B += B / 2 / turns**2
         end.B += B / 2
-    initial = (v_from - end.v_0) / Phasor(R, X) * connected
+    return LineValues(R, X, ratio, connected)
+
+
+def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
+    """Declare a π section with its current as a state."""
+    start, end = buses[line.from_bus], buses[line.to_bus]
+    values = declare_line_values(m, line, buses)
+    v_from = start.v_0 if values.ratio is None else start.v_0 / values.ratio
+    initial = (v_from - end.v_0) / Phasor(values.R, values.X) * values.connected
     with m.scope(line.name):
         current = _current_state(m, initial, f"Current of line {line.name}")
-    drawn = current if ratio is None else current / ratio.conjugate()
+    drawn = current if values.ratio is None else current / values.ratio.conjugate()
     start.injected -= drawn
     end.injected += current
-    return Branch(current, drawn, R, X, line.from_bus, line.to_bus, ratio, connected)
+    return Branch(
+        current, drawn, values.R, values.X, line.from_bus, line.to_bus, values.ratio, values.connected
+    )  # fmt: skip
 
 
-def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool) -> DeclaredLoad:
-    """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus.
+def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> list[Branch]:
+    """An inductor whose state is its current at scale 1.
 
-    The inductor's state is its current at scale 1, of which ``scale`` times is drawn: a load that is switched off
-    and on again comes back without a direct component.
+    ``scale`` times of it is drawn: a load that is switched off and on again comes back without a direct component.
     """
+    current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
+    drawn = current * scale
+    bus.injected -= drawn
+    return [Branch(current, drawn, 0.0, X, name)]
+
+
+def declare_load(
+    m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool, inductor: Inductor = inductor_state
+) -> DeclaredLoad:
+    """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus."""
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
     text = "Load step: factor on G and 1/X; 0 is switched off"
@@ -140,10 +173,12 @@ def declare_load(m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: b
             bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
             return DeclaredLoad(G, scale, [])
         X = v_squared / (Q / SYSTEM_BASE_MVA)
-        return DeclaredLoad(G, scale, [_inductor(m, bus, load.bus, X, scale)])
+        return DeclaredLoad(G, scale, inductor(m, bus, load.bus, X, scale))
 
 
-def declare_shunt(m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus]) -> list[Branch]:
+def declare_shunt(
+    m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus], *, inductor: Inductor = inductor_state
+) -> list[Branch]:
     """Declare an admittance to earth: conductance, and a capacitor or an inductor."""
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
@@ -159,7 +194,34 @@ def declare_shunt(m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus]) -> list[
         if capacitive:
             bus.B += B / SYSTEM_BASE_MVA
             return []
-        return [_inductor(m, bus, shunt.bus, -SYSTEM_BASE_MVA / B, 1.0)]
+        return inductor(m, bus, shunt.bus, -SYSTEM_BASE_MVA / B, 1.0)
+
+
+def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
+    """Declare the capacitance of every bus that has none of its own, where the network has it."""
+    floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
+    if floating:
+        text = "Capacitance to earth of every bus that has none of its own"
+        stray = m.parameter("stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100)
+        for bus in floating:
+            bus.B += stray
+
+
+def declare_network_outputs(
+    m: ModelBuilder, network: Network, buses: dict[str, Bus], drawn: list[Phasor], fed: list[Phasor]
+) -> None:
+    """Declare all voltages, what every line draws from its from bus, and what every device feeds."""
+    for name, bus in buses.items():
+        with m.scope(name):
+            m.output("v_re", bus.v.re, "pu", "Bus voltage, real part, network frame", base="bus")
+            m.output("v_im", bus.v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus")
+            m.output("v", bus.v.magnitude(), "pu", "Bus voltage magnitude", base="bus")
+    for line, current in zip(network.lines, drawn, strict=True):
+        texts = "Active power entering the line", "Reactive power entering the line"
+        declare_power(m, line.name, buses[line.from_bus].v, current, *texts)
+    for port, current in zip(network.ports, fed, strict=True):
+        texts = "Active power fed into the bus", "Reactive power fed into the bus"
+        declare_power(m, port.name, buses[port.bus].v, current, *texts)
 
 
 def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: ca.SX) -> None:
@@ -185,13 +247,6 @@ def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active
     with m.scope(name):
         m.output("p", s.re, "pu", active, base=SYSTEM_BASE)
         m.output("q", s.im, "pu", reactive, base=SYSTEM_BASE)
-
-
-def _inductor(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> Branch:
-    current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
-    drawn = current * scale
-    bus.injected -= drawn
-    return Branch(current, drawn, 0.0, X, name)
 
 
 def _current_state(m: ModelBuilder, initial: Phasor, text: str) -> Phasor:

@@ -11,18 +11,18 @@ from fmus.grid.current_load import CurrentLoad, current_load_equation, declare_c
 from fmus.grid.elements import (
     Branch,
     Bus,
+    add_stray,
     branch_equation,
     declare_bus,
     declare_line,
     declare_load,
+    declare_network_outputs,
     declare_port,
-    declare_power,
     declare_shunt,
 )
 from fmus.grid.network import Network
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model, ModelBuilder
-from fmus.toolchain.port import SYSTEM_BASE
 
 
 def grid(network: Network) -> Model:
@@ -42,27 +42,18 @@ def grid(network: Network) -> Model:
             currents.append(declare_current_load(m, load, declared, buses))
     for shunt in network.shunts:
         others += declare_shunt(m, shunt, buses)
-    _add_stray(m, network, buses)
+    add_stray(m, network, buses)
     for name, bus in buses.items():
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
         branch_equation(m, branch, buses, omega_b)
     for current_load in currents:
         current_load_equation(m, current_load)
-    _declare_outputs(m, network, buses, lines, fed)
+    declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
     # Bus capacitances against small line reactances are far faster than any communication step: such a
     # network needs an integrator that is stable at any step and damps the ringing after a switching.
     stiff = any(network.has_capacitance(bus) for bus in network.buses)
     return m.build(integrator="sdirk" if stiff else "runge_kutta")
-
-
-def _add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
-    floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
-    if floating:
-        text = "Capacitance to earth of every bus that has none of its own"
-        stray = m.parameter("stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100)
-        for bus in floating:
-            bus.B += stray
 
 
 def _bus_voltage(m: ModelBuilder, name: str, bus: Bus, omega_b: ca.SX, network: Network) -> None:
@@ -82,19 +73,3 @@ def _bus_voltage(m: ModelBuilder, name: str, bus: Bus, omega_b: ca.SX, network: 
     rate = (bus.injected - Phasor(bus.G, bus.B) * bus.v) * (omega_b / bus.B)
     m.derivative(re, rate.re)
     m.derivative(im, rate.im)
-
-
-def _declare_outputs(
-    m: ModelBuilder, network: Network, buses: dict[str, Bus], lines: list[Branch], fed: list[Phasor]
-) -> None:
-    for name, bus in buses.items():
-        with m.scope(name):
-            m.output("v_re", bus.v.re, "pu", "Bus voltage, real part, network frame", base="bus")
-            m.output("v_im", bus.v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus")
-            m.output("v", bus.v.magnitude(), "pu", "Bus voltage magnitude", base="bus")
-    for line, branch in zip(network.lines, lines, strict=True):
-        texts = "Active power entering the line", "Reactive power entering the line"
-        declare_power(m, line.name, buses[line.from_bus].v, branch.drawn, *texts)
-    for port, current in zip(network.ports, fed, strict=True):
-        texts = "Active power fed into the bus", "Reactive power fed into the bus"
-        declare_power(m, port.name, buses[port.bus].v, current, *texts)

@@ -5,8 +5,11 @@ Mateu-Barriendos et al. 2024. The step-up transformers belong to the devices, so
 are inside them.
 """
 
+from dataclasses import replace
+
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
+from fmus.grid.phasor_grid import phasor_grid
 from fmus.toolchain.model import Model
 
 TWO_AREA = Network(
@@ -17,7 +20,14 @@ TWO_AREA = Network(
     ports=(Port("sg1", "bus_2"), Port("sg2", "bus_3"), Port("gfor", "bus_2")),
 )
 
+TWO_AREA_PHASOR = replace(TWO_AREA, name="two_area_phasor_grid")
+
 
 def two_area_grid(network: Network = TWO_AREA) -> Model:
     """EMT line and constant-impedance loads of the two-area system."""
     return grid(network)
+
+
+def two_area_phasor_grid(network: Network = TWO_AREA_PHASOR) -> Model:
+    """The same without network transients."""
+    return phasor_grid(network)

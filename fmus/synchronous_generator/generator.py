@@ -54,13 +54,18 @@ def _generator(name: str, exciter: Exciter, data: MachineData, governor: Governo
     machine_equations(m, machine, port, E_fd, P_m)
 
     declare_port_outputs(m, port, machine.current.rotated(machine.delta))
+    declare_generator_outputs(m, machine, v_t, E_fd, P_m)
+    return m.build()
+
+
+def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_fd: ca.SX, P_m: ca.SX) -> None:
+    """Declare what a generator shows beside its port."""
     m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
     m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
     m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")
     m.output("E_fd", E_fd, "pu", "Field voltage; 1 gives 1 pu on open circuit", base="E_fd")
     m.output("P_m", P_m, "pu", "Mechanical power", base="S_n")
     m.output("T_e", machine.torque, "pu", "Electrical torque", base="S_n")
-    return m.build()
 
 
 def _pss2a(m: ModelBuilder, machine: Machine, port: DevicePort) -> ca.SX:

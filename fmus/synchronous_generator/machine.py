@@ -9,6 +9,7 @@ bus and no snubber is needed:
     2H·ẇ = P_m/w − (ψ_d·i_q − ψ_q·i_d) − D·(w − 1)     δ̇ = ω_b·(w − 1)
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -18,6 +19,9 @@ from fmus.synchronous_generator.data import STAMP, MachineData
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
+
+FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]
+"""Declares a flux by its name, start value and description."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +49,16 @@ class Axis:
         return self.X_subtransient / self.branches.X_2
 
     @property
+    def emf(self) -> ca.SX:
+        return self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2
+
+    @property
     def i(self) -> ca.SX:
-        emf = self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2
-        return (emf - self.psi) / self.X_between
+        return (self.emf - self.psi) / self.X_between
 
     @property
     def psi_airgap(self) -> ca.SX:
-        return self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2 - self.X_subtransient * self.i
+        return self.emf - self.X_subtransient * self.i
 
     @property
     def i_1(self) -> ca.SX:
@@ -72,11 +79,13 @@ class Axis:
 
 @dataclass(frozen=True)
 class Start:
-    """What the exciter and the governor start from: terminal voltage, field voltage and current, torque."""
+    """What others start from: |v_t|, field voltage and current, torque; bus voltage and current, rotor's frame."""
 
     v_t: ca.SX
     E_fd: ca.SX
     T_e: ca.SX
+    v: Phasor
+    i: Phasor
 
 
 @dataclass(frozen=True)
@@ -109,8 +118,18 @@ class Machine:
         return self.d.X_m * self.d.i_1
 
 
-def declare_machine(m: ModelBuilder, port: DevicePort, data: MachineData) -> Machine:
-    """Declare the machine's parameters and states; the power flow gives the operating point."""
+def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
+    """Declare a flux linkage as a state [pu, S_n]."""
+    return m.state(name, start, "pu", text, base="S_n")
+
+
+def declare_machine(
+    m: ModelBuilder, port: DevicePort, data: MachineData, stator_flux: FluxDeclaration = flux_state
+) -> Machine:
+    """Declare the machine's parameters and states; the power flow gives the operating point.
+
+    ``stator_flux`` declares ψ̃_d and ψ̃_q: as states, or as what a model without stator transients closes.
+    """
     with m.scope("transformer"):
         R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
         X_t = m.parameter("X_t", data.X_t, "pu", "Reactance", base="S_n", minimum=0, source=data.source)
@@ -123,7 +142,9 @@ def declare_machine(m: ModelBuilder, port: DevicePort, data: MachineData) -> Mac
             "exact_conversion", data.exact_conversion, "Standard data to circuit: exact, not classical"
         )
         saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
-        start, d, q, delta_0 = _operating_point(m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation)
+        start, d, q, delta_0 = _operating_point(
+            m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation, stator_flux
+        )
         w = m.state("omega", 1.0, "pu", "Rotor speed", base="f_n")
         delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
     return Machine(R_s + R_t, R_t, X_t, H, D, d, q, w, delta, start)
@@ -131,8 +152,16 @@ def declare_machine(m: ModelBuilder, port: DevicePort, data: MachineData) -> Mac
 
 def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
     """Give the derivatives of fluxes, speed and angle."""
-    rates = _flux_rates(g, port, E_fd)
-    for psi, rate in zip((g.q.psi, g.d.psi, g.d.psi_1, g.d.psi_2, g.q.psi_1, g.q.psi_2), rates, strict=True):
+    psi_q, psi_d = _flux_rates(g, port, E_fd)[:2]
+    m.derivative(g.q.psi, psi_q)
+    m.derivative(g.d.psi, psi_d)
+    rotor_equations(m, g, port, E_fd, P_m)
+
+
+def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
+    """Give the derivatives of the rotor's fluxes, speed and angle."""
+    rates = _rotor_flux_rates(g, port, E_fd)
+    for psi, rate in zip((g.d.psi_1, g.d.psi_2, g.q.psi_1, g.q.psi_2), rates, strict=True):
         m.derivative(psi, rate)
     m.derivative(g.w, (P_m / g.w - g.torque - g.D * (g.w - 1)) / (2 * g.H))
     m.derivative(g.delta, port.omega_b * (g.w - 1))
@@ -153,15 +182,21 @@ def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
     Behind an open breaker the stator's flux follows the rotor's in such a way that the current fades as every open
     breaker's does; the voltage at the breaker is then what the stator's equation leaves for it.
     """
-    psi_f = port.omega_b * g.d.branches.R_1 * (E_fd / g.d.X_m - g.d.i_1)
-    psi_1d = -port.omega_b * g.d.branches.R_2 * g.d.i_2
-    psi_1q = -port.omega_b * g.q.branches.R_1 * g.q.i_1
-    psi_2q = -port.omega_b * g.q.branches.R_2 * g.q.i_2
+    psi_f, psi_1d, psi_1q, psi_2q = _rotor_flux_rates(g, port, E_fd)
     v = port.v.rotated(-g.delta)
     closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
     opened = Phasor(g.q.open_rate(psi_1q, psi_2q), g.d.open_rate(psi_f, psi_1d))
     psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
     return ca.SX(psi.re), ca.SX(psi.im), psi_f, psi_1d, psi_1q, psi_2q
+
+
+def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
+    """Rates of ψ_f, ψ_1d, ψ_1q, ψ_2q."""
+    psi_f = port.omega_b * g.d.branches.R_1 * (E_fd / g.d.X_m - g.d.i_1)
+    psi_1d = -port.omega_b * g.d.branches.R_2 * g.d.i_2
+    psi_1q = -port.omega_b * g.q.branches.R_1 * g.q.i_1
+    psi_2q = -port.omega_b * g.q.branches.R_2 * g.q.i_2
+    return psi_f, psi_1d, psi_1q, psi_2q
 
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:
@@ -225,6 +260,7 @@ def _operating_point(
     q_data: AxisData,
     use_exact: ca.SX,
     saturation: ca.SX,
+    stator_flux: FluxDeclaration,
 ) -> tuple[Start, Axis, Axis, ca.SX]:
     """Circuit of both axes, rotor angle and every flux of the steady state."""
     reactances = {}
@@ -263,21 +299,18 @@ def _operating_point(
     airgap_d, airgap_q = E_fd - X_md * i_d, -X_mq * i_q
     psi_f = airgap_d + reactances["d"][1].X_1 * E_fd / X_md
 
-    def flux(name: str, value: ca.SX, text: str) -> ca.SX:
-        return m.state(name, value, "pu", text, base="S_n")
-
     d = Axis(
         *reactances["d"][:2],
-        flux("psi_d", psi_d, "Flux of stator and transformer, d axis"),
-        flux("psi_f", psi_f, "Field flux"),
-        flux("psi_1d", airgap_d, "Damper flux, d axis"),
+        stator_flux(m, "psi_d", psi_d, "Flux of stator and transformer, d axis"),
+        flux_state(m, "psi_f", psi_f, "Field flux"),
+        flux_state(m, "psi_1d", airgap_d, "Damper flux, d axis"),
         *reactances["d"][2:],
     )
     q = Axis(
         *reactances["q"][:2],
-        flux("psi_q", psi_q, "Flux of stator and transformer, q axis"),
-        flux("psi_1q", airgap_q, "First damper flux, q axis"),
-        flux("psi_2q", airgap_q, "Second damper flux, q axis"),
+        stator_flux(m, "psi_q", psi_q, "Flux of stator and transformer, q axis"),
+        flux_state(m, "psi_1q", airgap_q, "First damper flux, q axis"),
+        flux_state(m, "psi_2q", airgap_q, "Second damper flux, q axis"),
         *reactances["q"][2:],
     )
-    return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d), d, q, delta_0
+    return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

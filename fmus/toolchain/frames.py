@@ -62,12 +62,32 @@ class Phasor:
         return Phasor(ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im))
 
 
+Phases = tuple[Scalar, Scalar, Scalar]
+"""Instantaneous values of phases a, b and c."""
+
 ZERO = Phasor(0.0, 0.0)
 
 
 def polar(magnitude: Scalar, angle: Scalar) -> Phasor:
     """Magnitude and angle [rad] as a complex quantity."""
     return Phasor(magnitude * ca.cos(angle), magnitude * ca.sin(angle))
+
+
+def of_phases(values: Phases, angle: Scalar) -> Phasor:
+    """Instantaneous values of three phases as one complex quantity in a frame at ``angle`` [rad].
+
+    (2/3)·(a + b·e^{j2π/3} + c·e^{−j2π/3})·e^{−j·angle}: a balanced cosine keeps its amplitude. What the phases
+    have in common, the zero sequence, drops out.
+    """
+    a, b, c = values
+    return Phasor((2 * a - b - c) / 3, (b - c) / ca.sqrt(3)).rotated(-angle)
+
+
+def phases(value: Phasor, angle: Scalar) -> Phases:
+    """The other way: Re f·e^{j·angle}, and the same 120° and 240° later; without a zero sequence."""
+    fixed = value.rotated(angle)
+    half, swing = fixed.re / 2, ca.sqrt(3) / 2 * fixed.im
+    return fixed.re, swing - half, -swing - half
 
 
 def power(voltage: Phasor, current: Phasor) -> Phasor:

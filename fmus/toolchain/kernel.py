@@ -48,6 +48,10 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
         functions["iteration"] = elimination.values
         sizes |= {"NM": len(elimination.matrix_column), "NLU": len(elimination.column)}
         tables = _tables(elimination)
+    else:
+        held = [index for index, state in enumerate(model.states) if state.stepwise]
+        sizes["NS"] = len(held)
+        tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     if further:
         sizes["NWD"] = max(f.sz_w() for f in further.values())

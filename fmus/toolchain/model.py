@@ -99,9 +99,11 @@ class ModelBuilder:
         Identifier of the FMU (letters, digits, underscore).
     title
         One line that says what the model is.
+    internal_step, longest_step
+        Default and maximum of the parameter ``internal_step`` [s]. The defaults are for electromagnetic transients.
     """
 
-    def __init__(self, name: str, title: str) -> None:
+    def __init__(self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4) -> None:
         self.name = name
         self.title = title
         self._prefix: list[str] = []
@@ -113,11 +115,11 @@ class ModelBuilder:
         self._algebraic: list[tuple[ca.SX, ca.SX]] = []
         self.internal_step = self.parameter(
             "internal_step",
-            1e-4,
+            internal_step,
             "s",
             "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
             minimum=1e-6,
-            maximum=2e-4,
+            maximum=longest_step,
         )
 
     # -- names -------------------------------------------------------------------------------
@@ -187,13 +189,18 @@ class ModelBuilder:
         """Declare an input."""
         return self._declare(Input(self._full(name), unit, description, base, start))
 
-    def state(self, name: str, initial: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
-        """Declare a continuous state with its initial value, an expression of parameters."""
+    def state(
+        self, name: str, initial: Scalar, unit: str, description: str, base: str = "", *, stepwise: bool = False
+    ) -> ca.SX:
+        """Declare a continuous state with its initial value, an expression of parameters.
+
+        ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end.
+        """
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
             raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
         self._expressions[full] = ca.SX(initial)
-        return self._declare(State(full, unit, description, base))
+        return self._declare(State(full, unit, description, base, stepwise))
 
     def derivative(self, state: ca.SX, rate: Scalar) -> None:
         """Give the time derivative [unit of the state per second] of a declared state."""
@@ -254,6 +261,8 @@ class ModelBuilder:
         missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
         if missing:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
+        if integrator == "sdirk" and any(isinstance(v, State) and v.stepwise for v, _ in kinds[State]):
+            raise ValueError(f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta")
 
         def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
             stacked = _stack([values[variable.name] for variable, _ in entries])

@@ -32,7 +32,7 @@ class DevicePort:
     omega_b
         Base angular frequency [rad/s].
     current_scale
-        Device current [pu, S_n] times this is the current on the system base.
+        Device current [pu, S_n] times this is the current in the port's unit: mostly pu on the system base.
     connected
         1 where the breaker is closed, 0 where it is open.
     """
@@ -51,8 +51,22 @@ class DevicePort:
 
 def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     """Declare rating, power-flow start values and the voltage input of a device."""
-    rating = m.parameter("S_n", S_n, "MVA", "Rated apparent power, the device's base", minimum=1e-3)
+    rating = declare_rating(m, S_n)
     system = m.parameter("S_base", 100.0, "MVA", "Base power of the network", minimum=1e-3)
+    v = Phasor(
+        m.input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0),
+        m.input("v_im", "pu", "Bus voltage, imaginary part, network frame", base="bus"),
+    )
+    return port_at(m, v, P_0, rating / system)
+
+
+def declare_rating(m: ModelBuilder, S_n: float) -> ca.SX:
+    """Declare the rating [MVA]."""
+    return m.parameter("S_n", S_n, "MVA", "Rated apparent power, the device's base", minimum=1e-3)
+
+
+def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> DevicePort:
+    """Declare the power-flow start values of a device at a bus voltage, network frame [pu]."""
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     v_0 = m.parameter(
         "v_0", 1.0, "pu", "Power flow: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0
@@ -64,11 +78,7 @@ def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     )
     connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     bus = polar(v_0, theta_0)
-    v = Phasor(
-        m.input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0),
-        m.input("v_im", "pu", "Bus voltage, imaginary part, network frame", base="bus"),
-    )
-    return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, rating / system, connected)
+    return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, current_scale, connected)
 
 
 def declare_port_outputs(m: ModelBuilder, port: DevicePort, current: Phasor) -> None:

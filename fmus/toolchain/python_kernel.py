@@ -92,17 +92,30 @@ def _finish(z, x):
 
 _RUNGE_KUTTA = """
 
+def _held_rates(z, x):
+    rates = _rates(z, x)
+    for index in STEPWISE:
+        rates[index] = 0.0
+    return rates
+
+
 def advance(z, h, n, workspace):
     x = z[X:Y]
+    moved = []
+    if STEPWISE:
+        rates = _rates(z, x)
+        moved = [n * h * rates[index] for index in STEPWISE]
     for _ in range(n):
-        k1 = _rates(z, x)
-        k2 = _rates(z, [a + h / 2 * k for a, k in zip(x, k1)])
-        k3 = _rates(z, [a + h / 2 * k for a, k in zip(x, k2)])
-        k4 = _rates(z, [a + h * k for a, k in zip(x, k3)])
+        k1 = _held_rates(z, x)
+        k2 = _held_rates(z, [a + h / 2 * k for a, k in zip(x, k1)])
+        k3 = _held_rates(z, [a + h / 2 * k for a, k in zip(x, k2)])
+        k4 = _held_rates(z, [a + h * k for a, k in zip(x, k3)])
         x = [
             a + h / 6 * (b + 2 * c + 2 * d + e)
             for a, b, c, d, e in zip(x, k1, k2, k3, k4)
         ]
+    for index, change in zip(STEPWISE, moved):
+        x[index] += change
     return _finish(z, x)
 """
 
@@ -208,7 +221,8 @@ def python_source(model: Model) -> str:
         nx=len(model.states),
         ny=len(model.outputs),
     )
-    functions, tables, advance = kernel_functions(model), "", _RUNGE_KUTTA
+    functions, advance = kernel_functions(model), _RUNGE_KUTTA
+    tables = f"STEPWISE = {[index for index, state in enumerate(model.states) if state.stepwise]}\n\n"
     if model.integrator == "sdirk":
         e = plan_elimination(model)
         functions["iteration"] = e.values

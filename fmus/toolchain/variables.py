@@ -22,6 +22,9 @@ UNITS: dict[str, dict[str, float]] = {
     "MVA": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
     "MW": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
     "Mvar": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "kV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e3},
+    "A": {"A": 1},
 }
 
 
@@ -87,7 +90,12 @@ class Input(Variable):
 
 @dataclass(frozen=True, slots=True)
 class State(Variable):
-    """A continuous state; its initial value is computed from the parameters."""
+    """A continuous state; its initial value is computed from the parameters.
+
+    ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end.
+    """
+
+    stepwise: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from fmus.grid.network import Network, Port
-from fmus.toolchain.catalogue import build_model, model_names, network_of
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.assignment import assign_values
@@ -26,6 +26,7 @@ from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.system import System
+from orchestrator.coupling.told_step import tell_step
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
 
@@ -55,6 +56,11 @@ class PreparedScenario:
     events: tuple[Event, ...]
     power_flow: PowerFlow | None
     values: dict[str, float | bool]
+
+
+def _takes_network(table: ComponentTable) -> bool:
+    """Whether a component's model is built for the case's network table."""
+    return table.model in model_names() and needs_arguments(table.model or "")
 
 
 @cache
@@ -109,6 +115,8 @@ class Preparer:
         check_inputs(draft)
         flow = None if draft.problems else self._power_flow()
         clock = self._clock(step_size)
+        if clock is not None:
+            tell_step(draft.system, clock.step_size)
         stop = stop_time if stop_time is not None else draft.case.solver.stop_time
         events = scenario_events(draft, clock, stop)
         schedule = self._schedule()
@@ -153,18 +161,18 @@ class Preparer:
         grid = draft.tables.get(draft.grid)
         if grid is None:
             draft.note(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}")
-        elif grid.model == "grid":
-            draft.network = self._network_from_table()
+        elif _takes_network(grid):
+            draft.network = self._network_from_table(grid)
         elif grid.model in model_names():
             draft.network = network_of(grid.model or "")
 
-    def _network_from_table(self) -> Network | None:
+    def _network_from_table(self, grid: ComponentTable) -> Network | None:
         draft, data = self.draft, self.draft.data
         if data is None:
             if draft.case.network is None:
                 draft.note_network(
                     draft.place("power_flow", "grid"),
-                    "the model 'grid' needs a [network] table with buses, lines and loads",
+                    f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
                 )
             return None
         held = {table.bus for table in self._everything.values()}
@@ -186,14 +194,14 @@ class Preparer:
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
         where = self.draft.place("components", name)
-        if table.model == "grid" and self.draft.network_failed:
+        if _takes_network(table) and self.draft.network_failed:
             return
         if (table.model is None) == (table.fmu is None):
             self.draft.note(where, "give either 'model' (a model of the catalogue) or 'fmu' (the path of an .fmu)")
             return
         try:
             self.draft.system.add(name, self._description(table, is_native(self.draft, name, table)))
-        except InputError as error:
+        except (InputError, ValueError) as error:  # the latter from a model that does not fit the network
             self.draft.note(where, str(error))
         except KeyError as error:
             self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))
@@ -201,10 +209,10 @@ class Preparer:
     def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
         if table.fmu is not None:
             return read_description(self.draft.directory / table.fmu)
-        own = table.model == "grid"
+        own = _takes_network(table)
         if own and self.draft.network is None:
             raise InputError(
-                "the model 'grid' needs a [network] table and a [power_flow] table that names this component"
+                f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
         return catalogue_fmu(table.model or "", self.draft.network if own else None, native)
 

@@ -51,7 +51,11 @@ def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
     if draft.grid in draft.system.components:
         for part in ("re", "im"):
             _try_connect(draft, f"{draft.grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
-            _try_connect(draft, f"{name}.i_{part}", f"{draft.grid}.{name}.i_{part}", where)
+        # The grid says what it takes from a device: its current, or an emf with its admittance.
+        for taken in draft.system.components[draft.grid].description.inputs:
+            port, _, variable = taken.rpartition(".")
+            if port == name:
+                _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{taken}", where)
 
 
 def _try_connect(draft: Draft, source: str, target: str, where: str) -> None:

@@ -3,6 +3,7 @@
 from orchestrator.analysis.component_linearization import PERTURBATIONS, linearize_by_derivatives, linearize_component
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.told_step import as_if_told, told_parameters
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.fmi.linear_model import EmbeddedModel
@@ -30,18 +31,22 @@ def component_model(case: str, prepared: PreparedScenario, name: str) -> Embedde
         exchange = master.exchanges[name]
         open_inputs = [v for v in inputs if v not in exchange.inputs.names]
         exact = plan.description.gives_directional_derivatives
-        c = (
-            linearize_by_derivatives(exchange, prepared.step_size, open_inputs, outputs)
-            if exact
-            else linearize_component(exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True)
-        )
+        with as_if_told(master, 0.0):
+            c = (
+                linearize_by_derivatives(exchange, prepared.step_size, open_inputs, outputs)
+                if exact
+                else linearize_component(
+                    exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True
+                )
+            )
         if c.A_c is None or c.B_c is None:
             raise AnalysisError(
                 f"component {name!r}: its FMU does not give its derivatives, so no continuous model can be made"
             )
         values = master.components[name].get([*c.states, *inputs, *outputs])
+        told = told_parameters(master, name)
     columns = [c.inputs.index(v) for v in inputs]
-    parameters = {v: x for v, x in plan.parameters.items() if x != _start(info[v])}
+    parameters = {v: x for v, x in plan.parameters.items() if x != _start(info[v]) and v not in told}
     return EmbeddedModel(
         A=c.A_c,
         B=c.B_c[:, columns],

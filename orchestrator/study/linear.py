@@ -12,6 +12,7 @@ from orchestrator.analysis.steady_state import OperatingPoint, find_operating_po
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import InputError
 from orchestrator.report.signals import variables_of
 from orchestrator.study.modes import running
@@ -58,7 +59,8 @@ def linear_model(
     """
     with running(prepared) as master:
         point = find_operating_point(master)
-        blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=as_continuous)
+        with as_if_told(master, 0.0 if as_continuous else prepared.step_size):
+            blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=as_continuous)
         return state_space(blocks, None if as_continuous else master.schedule), point
 
 

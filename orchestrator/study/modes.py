@@ -19,6 +19,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import AnalysisError
 
 _NAMING_RANGE = (0.1, 2.0)
@@ -175,7 +176,8 @@ def _warnings(master: Master, model: LinearModel) -> tuple[str, ...]:
     if coupled is None or coupled <= _COUPLING_UNSTABLE:
         return ()
     try:
-        growth = eigenvalues(continuous(Blocks(master, derivatives=True))).real.max()
+        with as_if_told(master, 0.0):
+            growth = eigenvalues(continuous(Blocks(master, derivatives=True))).real.max()
     except AnalysisError:
         return ()
     if coupled - growth <= _COUPLING_UNSTABLE:

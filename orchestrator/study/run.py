@@ -17,14 +17,15 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
+from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 
-STEP_SIZES = (50e-6, 100e-6, 200e-6, 500e-6)
-"""Communication steps [s] for which the shift of the electromechanical mode is reported."""
+STEPS = (0.5, 1.0, 2.0, 5.0)
+"""Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +111,16 @@ def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:
     if mode is None:
         return []
     try:
-        exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
+        with as_if_told(master, 0.0):
+            exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
     except AnalysisError:
         return []
     schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
     shifts = []
-    for step_size in STEP_SIZES:
-        at_step = Blocks(master, step_size)
+    for part in STEPS:
+        step_size = part * master.clock.step_size
+        with as_if_told(master, step_size):
+            at_step = Blocks(master, step_size)
         for name, schedule in sorted(schedules.items()):
             value = nearest_eigenvalue(compose(at_step, schedule), exact)
             shifts.append(ModeShift(name, step_size, exact, value))

@@ -65,9 +65,10 @@ def test_governor_is_its_block_diagram(T, K):
         assert found == pytest.approx(wanted, rel=1e-10)
 
 
+@pytest.mark.parametrize("variant", ["", "_phasor"])
 @pytest.mark.parametrize("name", ["gfor", *(f"synchronous_generator_{e}" for e in ("ac4a", "st1", "st4b"))])
-def test_any_dispatch_starts_in_steady_state(name):
-    model = build_model(name)
+def test_any_dispatch_starts_in_steady_state(name, variant):
+    model = build_model(name + variant)
     rng = np.random.default_rng(7)
     for _ in range(20):
         start = {"P_0": rng.uniform(-0.3, 0.95), "Q_0": rng.uniform(-0.3, 0.3)}

@@ -45,6 +45,18 @@ REFERENCES = (
     Reference("synchronous_generator_st1", f"{_FOLDER}/reference_st1.csv", {"P_0": 0.78}, *_BUS, _GENERATOR),
     Reference("synchronous_generator_st4b", f"{_FOLDER}/reference_st4b.csv", {"P_0": 0.9}, *_BUS, _GENERATOR),
     Reference(
+        "gfor_phasor", "gfor_fmu/reference_phasor.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
+        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
+    ),
+    *(
+        Reference(
+            f"synchronous_generator_{exciter}_phasor", f"{_FOLDER}/reference_{exciter}_phasor.csv", {"P_0": P_0},
+            *_BUS, (*_GENERATOR, "e_re", "e_im"),
+        )
+        for exciter, P_0 in (("ac4a", 0.8), ("st1", 0.78), ("st4b", 0.9))
+    ),
+    Reference(
         "two_area_grid", "fmus/grid/reference.csv", {"X_L": 0.1},
         {"sg1.i_re": 27.0, "sg2.i_re": 39.0}, {"sg1.i_re": 26.5, "sg1.i_im": -0.5, "sg2.i_re": 39.0},
         ("bus_2.v_re", "bus_2.v_im", "bus_3.v_re", "bus_3.v_im", "L.p"),

@@ -10,9 +10,15 @@ from fmus.toolchain.variables import CalculatedParameter, Input, Output, Paramet
 ROOT = Path(__file__).parents[2]
 LEAFLETS = {
     "gfor": ROOT / "gfor_fmu" / "README.md",
+    "gfor_abc": ROOT / "gfor_fmu" / "README.md",
     "synchronous_generator_ac4a": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st1": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st4b": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "gfor_phasor": ROOT / "gfor_fmu" / "README.md",
+    "synchronous_generator_ac4a_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "synchronous_generator_st1_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "synchronous_generator_st4b_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
+    "two_area_phasor_grid": ROOT / "fmus" / "grid" / "README.md",
     "two_area_grid": ROOT / "fmus" / "grid" / "README.md",
 }
 KINDS = {

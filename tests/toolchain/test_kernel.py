@@ -464,3 +464,37 @@ def test_units_are_declared_ones_and_pu_names_its_base():
         m.parameter("P", 1.0, "kW", "Power")
     with pytest.raises(ValueError, match="'P' is in pu and names no base; add base='S_n' or '100 MVA'"):
         m.parameter("P", 1.0, "pu", "Power")
+
+
+def turning_frame():
+    """A lag in a frame that turns by ``rate``; the input is held as seen in the frame at the communication point."""
+    m = ModelBuilder("turning_frame", "Stepwise state")
+    u = m.input("u", "1", "Input", start=2.0)
+    rate = m.parameter("rate", 30.0, "rad/s", "Speed of the frame")
+    angle = m.state("angle", 0.5, "rad", "Angle of the frame", stepwise=True)
+    x = m.state("x", 0.0, "1", "Lag")
+    m.derivative(angle, rate + x)
+    m.derivative(x, u * ca.cos(angle) - x)
+    m.output("seen", u * ca.cos(angle), "1", "Input in the frame")
+    return m
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_a_stepwise_state_stands_still_during_a_step_and_moves_at_its_end(kernel):
+    model = turning_frame().build()
+    code, z, at = KERNELS[kernel](model), vector(model), model.value_references
+    code.initialise(z)
+    code.derivatives(z)
+    assert z[at["der(angle)"]] == 30.0
+    assert code.advance(z, 1e-3, 50) == 0
+    x = 2.0 * math.cos(0.5) * (1 - math.exp(-0.05))  # with the angle held: an exponential
+    assert z[at["x"]] == pytest.approx(x, rel=1e-12)
+    assert z[at["angle"]] == pytest.approx(0.5 + 0.05 * 30.0, rel=1e-15)
+    assert z[at["seen"]] == 2.0 * math.cos(z[at["angle"]])
+    assert code.advance(z, 1e-3, 50) == 0
+    assert z[at["angle"]] == pytest.approx(2.0 + 0.05 * (30.0 + x), rel=1e-12)  # its rate where the step began
+
+
+def test_the_implicit_method_refuses_stepwise_states():
+    with pytest.raises(ValueError, match="turning_frame: the implicit integrator knows no stepwise states"):
+        turning_frame().build(integrator="sdirk")

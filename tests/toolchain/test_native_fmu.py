@@ -19,7 +19,7 @@ from orchestrator.fmi.description import read_description
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, running
 
 MODELS = [name for name in model_names() if not needs_arguments(name)]
-SOME = ["gfor", GENERATOR, "two_area_grid"]
+SOME = ["gfor", "gfor_abc", "gfor_phasor", "two_area_phasor_grid", GENERATOR, "two_area_grid"]
 
 
 # -- the file ----------------------------------------------------------------------------------

@@ -1,0 +1,40 @@
+"""Solution of complex nodal equations Y·v = i with symbols, by elimination in an order that keeps them sparse."""
+
+from fmus.toolchain.frames import ZERO, Phasor
+
+Admittances = dict[str, dict[str, Phasor]]
+"""Rows and columns by bus; the pattern is symmetric."""
+
+
+def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None:
+    """Add to one element."""
+    Y[row][column] = Y[row].get(column, ZERO) + value
+
+
+def solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
+    """Voltages of all buses.
+
+    The bus with the fewest neighbours is eliminated first. There is no pivoting: a passive network needs none, unless
+    a bus has no admittance at all, and then its voltage is not finite.
+    """
+    rows = {bus: dict(entries) for bus, entries in Y.items()}
+    right, waiting, order = dict(currents), list(Y), []
+    while waiting:
+        bus = min(waiting, key=lambda b: (len(rows[b]), waiting.index(b)))
+        waiting.remove(bus)
+        order.append(bus)
+        for other in waiting:
+            if bus in rows[other]:
+                factor = rows[other].pop(bus) / rows[bus][bus]
+                for column, value in rows[bus].items():
+                    if column != bus:
+                        rows[other][column] = rows[other].get(column, ZERO) - factor * value
+                right[other] -= factor * right[bus]
+    voltages: dict[str, Phasor] = {}
+    for bus in reversed(order):
+        known = right[bus]
+        for column, value in rows[bus].items():
+            if column != bus:
+                known -= value * voltages[column]
+        voltages[bus] = known / rows[bus][bus]
+    return voltages

@@ -1,0 +1,109 @@
+"""A network without transients: admittances at rated frequency, and devices as emfs behind admittances of their own.
+
+    (Y + Σ y)·v = Σ y·e          solved directly from the newest emfs whenever an output is read: there is no state
+
+Elements, parameters and outputs are those of `grid`; what is said there of constant-impedance loads, ratios and open
+lines holds here.
+"""
+
+import casadi as ca
+
+from fmus.grid.elements import (
+    Branch,
+    Bus,
+    LineValues,
+    add_stray,
+    declare_bus,
+    declare_line_values,
+    declare_load,
+    declare_network_outputs,
+    declare_shunt,
+)
+from fmus.grid.network import Line, Network, Port
+from fmus.grid.nodal import Admittances, add_admittance, solve
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model import Model, ModelBuilder, Scalar
+from fmus.toolchain.phasor_port import phasor_builder
+from fmus.toolchain.port import SYSTEM_BASE
+
+
+def phasor_grid(network: Network) -> Model:
+    """Build the model of a network; parameters are named after its elements, as in `grid`.
+
+    Raises
+    ------
+    ValueError
+        If a load is of constant current: the voltages are solved for as a linear system.
+    """
+    currents = [load.name for load in network.loads if load.active == "current"]
+    if currents:
+        raise ValueError(
+            f"network {network.name!r}: load {', '.join(currents)} is of constant current, which the phasor grid does "
+            "not have; make it a constant impedance, or take the model 'grid'"
+        )
+    m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency")
+    buses = {bus: declare_bus(m, bus) for bus in network.buses}
+    Y: Admittances = {bus: {} for bus in buses}
+    sources = [_declare_source(m, port, buses, Y) for port in network.ports]
+    lines = [declare_line_values(m, line, buses) for line in network.lines]
+    for load in network.loads:
+        declare_load(m, load, buses, alone=False, inductor=_susceptance)
+    for shunt in network.shunts:
+        declare_shunt(m, shunt, buses, inductor=_susceptance)
+    add_stray(m, network, buses)
+    for name, bus in buses.items():
+        add_admittance(Y, name, name, Phasor(bus.G, bus.B))
+    for line, values in zip(network.lines, lines, strict=True):
+        _add_line(Y, line, values)
+    voltages = solve(Y, {name: bus.injected for name, bus in buses.items()})
+    for name, bus in buses.items():
+        bus.v = voltages[name]
+    drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
+    fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
+    declare_network_outputs(m, network, buses, drawn, fed)
+    return m.build()
+
+
+def _declare_source(m: ModelBuilder, port: Port, buses: dict[str, Bus], Y: Admittances) -> tuple[Phasor, Phasor]:
+    """Declare a device's emf and admittance, add them to its bus, and return both."""
+    with m.scope(port.name):
+        e = Phasor(
+            m.input("e_re", "pu", "Emf of the device, real part", base="bus"),
+            m.input("e_im", "pu", "Emf of the device, imaginary part", base="bus"),
+        )
+        y = Phasor(
+            m.input("y_re", "pu", "Admittance between emf and bus, real part", base=SYSTEM_BASE),
+            m.input("y_im", "pu", "Admittance between emf and bus, imaginary part", base=SYSTEM_BASE),
+        )
+        y *= m.switch("connected", True, "The device's breaker at the bus is closed", tunable=True)
+    buses[port.bus].injected += e * y
+    add_admittance(Y, port.bus, port.bus, y)
+    return e, y
+
+
+def _susceptance(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> list[Branch]:
+    """An inductor between a bus and earth, as an admittance."""
+    bus.B -= scale / X
+    return []
+
+
+def _add_line(Y: Admittances, line: Line, values: LineValues) -> None:
+    """Series admittance y behind the ratio t: y/|t|² and y on the diagonal, −y/t* and −y/t beside it."""
+    y = _series(values)
+    t = Phasor(1.0, 0.0) if values.ratio is None else values.ratio
+    add_admittance(Y, line.from_bus, line.from_bus, y / (t.re**2 + t.im**2))
+    add_admittance(Y, line.to_bus, line.to_bus, y)
+    add_admittance(Y, line.from_bus, line.to_bus, -y / t.conjugate())
+    add_admittance(Y, line.to_bus, line.from_bus, -y / t)
+
+
+def _drawn(line: Line, values: LineValues, buses: dict[str, Bus]) -> Phasor:
+    """What a line takes from its from bus, without its charging."""
+    v_from, v_to = buses[line.from_bus].v, buses[line.to_bus].v
+    if values.ratio is None:
+        return (v_from - v_to) * _series(values)
+    return (v_from / values.ratio - v_to) * _series(values) / values.ratio.conjugate()
+
+
+def _series(values: LineValues) -> Phasor:
+    return Phasor(1.0, 0.0) / Phasor(values.R, values.X) * values.connected

@@ -1,0 +1,99 @@
+"""Generators without stator transients, for RMS tools with steps of milliseconds: an emf behind X''_d.
+
+Rotor, exciters, governors and data are those of `generator`. With dψ̃/dt and the transformer's di/dt left out, and the
+voltage drops taken at rated frequency as in the network,
+
+    v = w·(e''_d + j·e''_q) − R·i − X_d·i_d − j·X_q·i_q        (rotor frame, f = f_q − j·f_d; X with the transformer)
+
+The emf keeps the rotor's speed w: it stands for the first-order part of the transients that are left out, and without
+it electromechanical modes are up to 0.4 points of damping off.
+
+Where X''_q ≠ X''_d a constant admittance needs an emf of its own for the difference, −j·(X''_q − X''_d)·i_q. It is
+taken from i_q through a short lag, so that the emf follows from states alone; in steady state it is exact.
+"""
+
+import casadi as ca
+
+from fmus.synchronous_generator.data import (
+    IEEE118,
+    IEEEG1_NTS631,
+    IEEEG1_STAMP,
+    SG1,
+    SG2,
+    GovernorData,
+    MachineData,
+)
+from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
+from fmus.synchronous_generator.generator import declare_generator_outputs
+from fmus.synchronous_generator.governors import ieeeg1
+from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
+from fmus.toolchain.port import DevicePort, device_port
+
+
+def synchronous_generator_ac4a_phasor() -> Model:
+    """`synchronous_generator_ac4a` without stator transients."""
+    return _generator("ac4a", ac4a, IEEE118, IEEEG1_STAMP)
+
+
+def synchronous_generator_st1_phasor() -> Model:
+    """`synchronous_generator_st1` without stator transients."""
+    return _generator("st1", st1, SG2, IEEEG1_NTS631)
+
+
+def synchronous_generator_st4b_phasor() -> Model:
+    """`synchronous_generator_st4b` without stator transients."""
+    return _generator("st4b", st4b, SG1, IEEEG1_NTS631)
+
+
+def _generator(name: str, exciter: Exciter, data: MachineData, governor: GovernorData) -> Model:
+    m = phasor_builder(
+        f"synchronous_generator_{name}_phasor",
+        f"Synchronous generator with {name.upper()} exciter, IEEEG1 governor and step-up transformer (phasor type)",
+    )
+    port = device_port(m, data.S_n, data.P_0)
+    g = declare_machine(m, port, data, stator_flux=lambda m, name, start, text: m.algebraic(name))
+    emf = Phasor(g.d.emf, g.q.emf) * g.w
+    _close_stator(m, g, port, emf)
+    v_t = _terminal_voltage(g, port, emf)
+    E_fd, _ = exciter(m, g.start, lambda E: v_t, g.field_current)
+    P_m = ieeeg1(m, g.w, g.start.T_e, governor)
+    rotor_equations(m, g, port, E_fd, P_m)
+
+    impedance = Phasor(g.R, g.d.X_between)
+    start = g.start.v + impedance * g.start.i
+    source = source_emf(m, emf - _saliency(m, g), start, g.delta, port.omega_b * (g.w - 1))
+    declare_phasor_outputs(m, port, source, impedance)
+    declare_generator_outputs(m, g, v_t, E_fd, P_m)
+    return m.build()
+
+
+def _close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
+    """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i."""
+    over = (emf - port.v.rotated(-g.delta)) * port.connected
+    R, X_d, X_q = g.R, g.d.X_between, g.q.X_between
+    determinant = R**2 + X_d * X_q
+    i_q = (R * over.re + X_d * over.im) / determinant
+    i_d = (X_q * over.re - R * over.im) / determinant
+    m.close(g.d.psi, g.d.emf - X_d * i_d)
+    m.close(g.q.psi, g.q.emf - X_q * i_q)
+
+
+def _terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> ca.SX:
+    """|v_t|: the bus voltage plus the transformer's drop; the emf behind an open breaker."""
+    at_port = port.through_breaker(port.v.rotated(-g.delta), emf)
+    return (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()
+
+
+def _saliency(m: ModelBuilder, g: Machine) -> Phasor:
+    """j·(X''_q − X''_d)·i_q with i_q through a lag, rotor frame."""
+    with m.scope("machine"):
+        T = m.parameter(
+            "T_saliency", 0.005, "s", "Lag of i_q in the emf's part for X''_q − X''_d; no effect where they are equal",
+            minimum=1e-3,
+        )  # fmt: skip
+        lagged = m.state("i_q_lagged", g.start.i.re, "pu", "Stator current through a lag, q axis", base="S_n")
+    m.derivative(lagged, (g.q.i - lagged) / T)
+    return Phasor(0.0, (g.q.X_between - g.d.X_between) * lagged)

@@ -1,0 +1,99 @@
+"""The port of a device without network transients: an emf behind an impedance, beside the current that it gives.
+
+A network solver takes the admittance y into its matrix and the emf e as its source, and so finds the bus voltage in
+one solution: e follows from the device's states alone. The current i = (e − v)·y depends on the bus voltage directly;
+a solver that fed it back would have an algebraic loop.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.port import SYSTEM_BASE, DevicePort, declare_port_outputs
+
+INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
+"""Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs
+steps below 2.78 of them."""
+
+DERIVATIVE_LAG = 5e-3
+"""Lag [s] of the derivative that carries an emf half a communication step ahead."""
+
+
+def phasor_builder(name: str, title: str) -> ModelBuilder:
+    """A builder for a model without network transients."""
+    return ModelBuilder(name, title, INTERNAL_STEP, LONGEST_STEP)
+
+
+@dataclass(frozen=True)
+class SourceEmf:
+    """An emf in the network frame [pu], half a communication step ago, and in half a step."""
+
+    behind: Phasor
+    ahead: Phasor
+
+
+def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
+    """Declare what is to be known of the master; return the emf in the middle of the step done and of that to come.
+
+    A master holds the bus voltage during a step, so that it is half a step old on average. With the emfs of the middle
+    of the coming step the network's voltages are those of the middle. The emf turns with its frame, and its components
+    in that frame move as a derivative with a short lag tells, so that all of it follows from states.
+
+    Parameters
+    ----------
+    emf, start
+        In the device's frame [pu], a function of states; and its value at the operating point.
+    angle, rate
+        Of the device's frame in the network frame [rad], and the rate of that [rad/s].
+    """
+    step = m.parameter(
+        "communication_step",
+        0.0,
+        "s",
+        "Communication step of the master: emf and admittance are given for the middle of the step to come; 0: for now",
+        minimum=0.0,
+        maximum=0.1,
+        tunable=True,
+    )
+    late = m.parameter(
+        "steps_late",
+        0,
+        "1",
+        "Steps by which the bus voltage comes late: 0 where the master steps devices and then the grid; Jacobi: 1",
+        minimum=0,
+        maximum=2,
+        tunable=True,
+        type="Integer",
+    )
+    moving = []
+    with m.scope("source"):
+        for name, now, initial in (("e_q", emf.re, start.re), ("e_d", -emf.im, -start.im)):
+            slow = m.state(name, initial, "pu", f"Emf through a lag, {name[-1]} component", base="S_n")
+            moving.append((now - slow) / DERIVATIVE_LAG)
+            m.derivative(slow, moving[-1])
+    change = Phasor(moving[0], -moving[1])
+
+    def moved(time: ca.SX) -> Phasor:
+        return (emf + change * time).rotated(angle + rate * time)
+
+    return SourceEmf(behind=moved(-step / 2), ahead=moved((late + 0.5) * step))
+
+
+def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor) -> None:
+    """Declare the port's outputs: current and powers as every device has them, emf and admittance.
+
+    Current and powers are read after a step, with the voltage that was held in it: they are those of its middle.
+    ``impedance`` lies between emf and bus [pu, S_n], an expression of fixed parameters.
+    """
+    with m.scope("source"):
+        R = m.calculated("R", impedance.re, "pu", "Resistance between emf and bus", base="S_n")
+        X = m.calculated("X", impedance.im, "pu", "Reactance between emf and bus", base="S_n")
+    y = Phasor(1.0, 0.0) / Phasor(R, X) * port.connected
+    declare_port_outputs(m, port, (emf.behind - port.v) * y)
+    m.output("e_re", emf.ahead.re, "pu", "Emf behind the impedance, real part, network frame", base="bus")
+    m.output("e_im", emf.ahead.im, "pu", "Emf behind the impedance, imaginary part, network frame", base="bus")
+    y *= port.current_scale
+    m.output("y_re", y.re, "pu", "Admittance between emf and bus, real part; 0 while open", base=SYSTEM_BASE)
+    m.output("y_im", y.im, "pu", "Admittance between emf and bus, imaginary part; 0 while open", base=SYSTEM_BASE)

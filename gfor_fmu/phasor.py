@@ -1,0 +1,57 @@
+"""The converter without network transients, for RMS tools with steps of milliseconds: an emf behind the transformer.
+
+Filter, inner loops, feed-forwards and transformer settle within a few milliseconds, and are algebraic here: the
+voltage control holds u = u_ref, so that the emf is u_ref·e^{jθ}, a function of the droops' and the POD controllers'
+states alone. The current limit is not represented; ``current_limit`` tells when it would act.
+"""
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor, power
+from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
+from fmus.toolchain.port import device_port
+from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
+from gfor_fmu.droop import declare_droop
+from gfor_fmu.filter import FilterData, declare_filter_data
+from gfor_fmu.inner_loops import declare_current_limits
+
+
+def grid_forming_converter_phasor() -> Model:
+    """Droops and POD controllers of `grid_forming_converter` behind an algebraic electrical side."""
+    m = phasor_builder("gfor_phasor", "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)")
+    port = device_port(m, S_n=S_N, P_0=P_0)
+    electrical = declare_filter_data(m, port)
+    P, Q = m.algebraic("P"), m.algebraic("Q")
+    droop = declare_droop(m, electrical.initial, Phasor(P, Q))
+    control = outer_control(m, droop, port.omega_b)
+
+    u, impedance = control.u_ref, Phasor(electrical.R_t, electrical.X_t)
+
+    i_g = (u - port.v.rotated(-droop.theta)) / impedance * port.connected
+    s = power(u, i_g)
+    m.close(P, s.re)
+    m.close(Q, s.im)
+
+    emf = source_emf(m, u, electrical.initial.u, droop.theta, port.omega_b * (control.omega - 1))
+    declare_phasor_outputs(m, port, emf, impedance)
+    i_s = i_g + _capacitor_current(electrical, u)
+    declare_converter_outputs(m, Converter(i_g.rotated(droop.theta), control, u.magnitude(), i_s.magnitude()))
+    m.output(
+        "current_limit",
+        _of_limit(m, electrical, i_s),
+        "1",
+        "Current in parts of its limit; above 1 the current limit, which is not represented, would act",
+    )
+    return m.build()
+
+
+def _capacitor_current(f: FilterData, u: Phasor) -> Phasor:
+    """Into the capacitor with its series resistance, at rated frequency."""
+    return Phasor(0.0, f.B_c) * u / Phasor(1.0, f.R_cap * f.B_c)
+
+
+def _of_limit(m: ModelBuilder, f: FilterData, i_s: Phasor) -> ca.SX:
+    with m.scope("voltage_control"):
+        i_q_max, i_d_max = declare_current_limits(m, f.initial)
+    return ca.fmax(ca.fabs(i_s.re) / i_q_max, ca.fabs(i_s.im) / i_d_max)

@@ -1,0 +1,1 @@
+"""The paper's first case study with phasor models."""
