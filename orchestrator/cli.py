@@ -16,7 +16,16 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design, cli_interop, cli_linear_model, cli_ssp, cli_vendor
+from orchestrator import (
+    cli_black_box,
+    cli_certify,
+    cli_compare,
+    cli_design,
+    cli_interop,
+    cli_linear_model,
+    cli_ssp,
+    cli_vendor,
+)
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -52,6 +61,9 @@ examples:
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
   gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
   gfor which-master --build probes               two FMUs that tell which schedule a tool runs
+  gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor black-box two_area --scenario gfor --component gfor
+  gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
   gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
@@ -191,6 +203,21 @@ def _parser() -> argparse.ArgumentParser:
     _case_arguments(design)
     cli_design.add_arguments(design)
     design.set_defaults(command=_design)
+
+    admittance = commands.add_parser("admittance", help="measure a device's admittance, and fit a model to it")
+    cli_black_box.add_admittance(admittance, _seconds, cli_certify.setting)
+    admittance.set_defaults(
+        command=lambda o: cli_black_box.run_admittance(o, _console(stderr=o.json), read_description(o.fmu))
+    )
+
+    black_box = commands.add_parser("black-box", help="modes of a case with a component known by its port alone")
+    _case_arguments(black_box)
+    cli_black_box.add_black_box(black_box)
+    black_box.set_defaults(command=_black_box)
+
+    certificate = commands.add_parser("certify", help="the grid code's damping test on a converter FMU")
+    cli_certify.add_arguments(certificate, _count)
+    certificate.set_defaults(command=_certify)
 
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
@@ -432,6 +459,20 @@ def _sweep(options: argparse.Namespace) -> int:
 
         result = run_points(plan, executor, folder, report)
     return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
+
+
+def _black_box(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    return cli_black_box.run_black_box(options, _console(stderr=options.json), scenarios, case)
+
+
+def _certify(options: argparse.Namespace) -> int:
+    console = _console(stderr=options.json)
+    with _progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+        return cli_certify.run_certify(
+            options, console, lambda done, total: bar.update(task, completed=done, total=total)
+        )
 
 
 def _folder(path: Path, option: str = "--out") -> Path:
