@@ -13,10 +13,19 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
-from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.native_fmu import export_native
 from fmus.toolchain.python_fmu import export
-from orchestrator import cli_compare, cli_design, cli_linear_model, cli_ssp, cli_vendor
+from orchestrator import (
+    cli_black_box,
+    cli_certify,
+    cli_compare,
+    cli_design,
+    cli_interop,
+    cli_linear_model,
+    cli_ssp,
+    cli_vendor,
+)
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
@@ -50,6 +59,11 @@ examples:
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
+  gfor which-master --build probes               two FMUs that tell which schedule a tool runs
+  gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor black-box two_area --scenario gfor --component gfor
+  gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
   gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
@@ -95,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
     run.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     run.add_argument("--json", action="store_true", help="print the summary as JSON")
+    cli_interop.add_like(run)
     run.set_defaults(command=_run)
 
     modes = commands.add_parser("modes", help="steady state and eigenvalues of a case's scenarios")
@@ -189,6 +204,21 @@ def _parser() -> argparse.ArgumentParser:
     cli_design.add_arguments(design)
     design.set_defaults(command=_design)
 
+    admittance = commands.add_parser("admittance", help="measure a device's admittance, and fit a model to it")
+    cli_black_box.add_admittance(admittance, _seconds, cli_certify.setting)
+    admittance.set_defaults(
+        command=lambda o: cli_black_box.run_admittance(o, _console(stderr=o.json), read_description(o.fmu))
+    )
+
+    black_box = commands.add_parser("black-box", help="modes of a case with a component known by its port alone")
+    _case_arguments(black_box)
+    cli_black_box.add_black_box(black_box)
+    black_box.set_defaults(command=_black_box)
+
+    certificate = commands.add_parser("certify", help="the grid code's damping test on a converter FMU")
+    cli_certify.add_arguments(certificate, _count)
+    certificate.set_defaults(command=_certify)
+
     build = commands.add_parser("build", help="build FMUs of the catalogue's models")
     build.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     build.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
@@ -203,6 +233,9 @@ def _parser() -> argparse.ArgumentParser:
     cli_linear_model.add_arguments(build)
     build.set_defaults(command=_build)
 
+    which = commands.add_parser("which-master", help="which schedule another tool runs, told by a pair of probe FMUs")
+    cli_interop.add_which_master(which, sorted(TARGETS))
+    which.set_defaults(command=_which_master)
     cli_vendor.add_commands(commands)
 
     info = commands.add_parser("info", help="show what an FMU declares")
@@ -374,7 +407,10 @@ def _design(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    rules = cli_interop.like_of(options)
     case, scenarios = _prepare(options)
+    if rules is not None:
+        return cli_interop.run_like_master(case, scenarios, rules, options)
     folder = _folder(options.out or Path("results") / case.name)
     console = _console(stderr=options.json)
     results: list[RunResult] = []
@@ -425,13 +461,27 @@ def _sweep(options: argparse.Namespace) -> int:
     return INTERRUPTED if result is None else present(result, folder, console, as_json=options.json)
 
 
-def _folder(path: Path) -> Path:
+def _black_box(options: argparse.Namespace) -> int:
+    case, scenarios = _prepare(options)
+    return cli_black_box.run_black_box(options, _console(stderr=options.json), scenarios, case)
+
+
+def _certify(options: argparse.Namespace) -> int:
+    console = _console(stderr=options.json)
+    with _progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+        return cli_certify.run_certify(
+            options, console, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+
+
+def _folder(path: Path, option: str = "--out") -> Path:
     """The folder for results, made before anything is computed."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
-            f"--out {path}: results cannot be written there: {error.strerror}; choose another folder"
+            f"{option} {path}: results cannot be written there: {error.strerror}; choose another folder"
         ) from error
     return path
 
@@ -502,6 +552,19 @@ def _build(options: argparse.Namespace) -> int:
             print(export_native(model, options.dest, platforms, options.fmi, extra))
         else:
             print(export(model, options.dest, platforms, extra))
+    return 0
+
+
+def _which_master(options: argparse.Namespace) -> int:
+    if (options.build is None) == (options.result is None):
+        raise InputError("give either the tool's RESULT.csv, or --build DIR for the probe pair")
+    if options.build is None:
+        return cli_interop.run_which_master(options, _console(stderr=options.json))
+    folder, host = _folder(options.build, "--build"), host_platform()
+    platforms = tuple(options.platform or ([host] if host else []))
+    for name in ("probe_a", "probe_b"):
+        print(export_native(build_model(name), folder, platforms))
+    print(cli_interop.write_instructions(folder, options, platforms))
     return 0
 
 

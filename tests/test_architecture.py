@@ -16,21 +16,26 @@ FLOORS = (
     ("orchestrator.coupling", "orchestrator.vendor"),
     ("orchestrator.ssp",),
     ("orchestrator.analysis", "orchestrator.cases", "orchestrator.distributed"),
-    ("orchestrator.report",),
+    ("orchestrator.report", "orchestrator.interop"),
     ("orchestrator.study",),
+    ("orchestrator.black_box",),
+    ("orchestrator.certification",),
+    ("orchestrator.cli_sweep",),
     (
+        "orchestrator.cli_black_box",
+        "orchestrator.cli_certify",
         "orchestrator.cli_compare",
         "orchestrator.cli_design",
+        "orchestrator.cli_interop",
         "orchestrator.cli_linear_model",
         "orchestrator.cli_ssp",
-        "orchestrator.cli_sweep",
         "orchestrator.cli_vendor",
     ),
     ("orchestrator.cli",),
 )
 """Lowest first; those on one floor do not know each other."""
 
-COMMANDS = FLOORS[-2] + FLOORS[-1]
+COMMANDS = FLOORS[-3] + FLOORS[-2] + FLOORS[-1]
 
 
 def modules():
@@ -134,7 +139,12 @@ def test_the_orchestrator_imports_downwards_only():
 
 def test_the_orchestrator_knows_fmus_and_never_equations():
     """Cases and the command line build models and archives; what is compiled here borrows the compiler."""
-    borrowers = {"orchestrator.coupling.loop", "orchestrator.fmi.bound", "orchestrator.fmi.mailbox"}
+    borrowers = {
+        "orchestrator.black_box.test_bench",
+        "orchestrator.coupling.loop",
+        "orchestrator.fmi.bound",
+        "orchestrator.fmi.mailbox",
+    }
     importers = {"orchestrator.cases", "orchestrator.cli", "orchestrator.cli_ssp"}
 
     def allowed(a, b):
@@ -152,7 +162,9 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
 def test_reports_know_studies_for_type_checkers_only():
     everything = imports()
     knowing = {name for name, targets in everything.items() if any(within(t, "orchestrator.study") for t in targets)}
-    knowing = {name for name in knowing if not within(name, *COMMANDS, "orchestrator.study")}
+    knowing = {
+        name for name in knowing if not within(name, *COMMANDS, "orchestrator.certification", "orchestrator.study")
+    }
     assert knowing
     assert all(within(name, "orchestrator.report") for name in knowing)
 
@@ -180,6 +192,7 @@ def test_there_is_no_cycle():
         ("fmpy", {f"orchestrator.fmi.{name}" for name in ("component", "description", "validation")}),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
+        ("skrf", {"orchestrator.black_box.fitting"}),
         ("pint", {"orchestrator.units"}),
         ("argparse", set(COMMANDS) - {"orchestrator.cli_sweep"}),
     ],

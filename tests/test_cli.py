@@ -59,6 +59,7 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
     assert all(line.startswith("  gfor ") for line in lines)
     known = {
         "export-ssp",
+        "which-master",
         "run",
         "modes",
         "linearize",
@@ -89,6 +90,7 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
         "report",
         "build",
         "info",
+        "which-master",
         "bind",
         "check",
     ],

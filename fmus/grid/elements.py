@@ -51,6 +51,15 @@ class Branch:
     connected: ca.SX | None = None
 
 
+@dataclass(frozen=True)
+class DeclaredLoad:
+    """A load's conductance at scale 1 [pu, 100 MVA], its ``scale``, and its inductor where it has one."""
+
+    G: ca.SX
+    scale: ca.SX
+    branches: list[Branch]
+
+
 Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
 """Puts an inductor of reactance X [pu, 100 MVA], of which ``scale`` times is drawn, between a bus and earth."""
 
@@ -141,7 +150,7 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
 
 def declare_load(
     m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool, inductor: Inductor = inductor_state
-) -> list[Branch]:
+) -> DeclaredLoad:
     """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus."""
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
@@ -151,9 +160,10 @@ def declare_load(
     with m.scope(load.name):
         scale = m.parameter("scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True)
         P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage", minimum=0)
-        bus.G += scale * P / SYSTEM_BASE_MVA / v_squared
+        G = P / SYSTEM_BASE_MVA / v_squared
+        bus.G += scale * G
         if load.q_mvar == 0:
-            return []
+            return DeclaredLoad(G, scale, [])
         inductive = load.q_mvar > 0
         Q = m.parameter(
             "Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage",
@@ -161,9 +171,9 @@ def declare_load(
         )  # fmt: skip
         if not inductive:
             bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
-            return []
+            return DeclaredLoad(G, scale, [])
         X = v_squared / (Q / SYSTEM_BASE_MVA)
-        return inductor(m, bus, load.bus, X, scale)
+        return DeclaredLoad(G, scale, inductor(m, bus, load.bus, X, scale))
 
 
 def declare_shunt(

@@ -1,4 +1,5 @@
-"""An EMT network in the frame that turns at ω_b: dynamic lines, constant-impedance loads, bus capacitances.
+"""An EMT network in the frame that turns at ω_b: dynamic lines, loads of constant impedance or current,
+bus capacitances.
 
 A bus with capacitance has its voltage as a state. A bus without has v = Σ i / G, directly from the
 currents that the devices inject: there the FMU has direct feed-through, and says so.
@@ -6,6 +7,7 @@ currents that the devices inject: there the FMU has direct feed-through, and say
 
 import casadi as ca
 
+from fmus.grid.current_load import CurrentLoad, current_load_equation, declare_current_load
 from fmus.grid.elements import (
     Branch,
     Bus,
@@ -32,8 +34,12 @@ def grid(network: Network) -> Model:
     fed = [declare_port(m, port, buses) for port in network.ports]
     lines = [declare_line(m, line, buses) for line in network.lines]
     others: list[Branch] = []
+    currents: list[CurrentLoad] = []
     for load in network.loads:
-        others += declare_load(m, load, buses, alone=network.hangs_on(load))
+        declared = declare_load(m, load, buses, alone=network.hangs_on(load))
+        others += declared.branches
+        if load.active == "current":
+            currents.append(declare_current_load(m, load, declared, buses))
     for shunt in network.shunts:
         others += declare_shunt(m, shunt, buses)
     add_stray(m, network, buses)
@@ -41,6 +47,8 @@ def grid(network: Network) -> Model:
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
         branch_equation(m, branch, buses, omega_b)
+    for current_load in currents:
+        current_load_equation(m, current_load)
     declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
     # Bus capacitances against small line reactances are far faster than any communication step: such a
     # network needs an integrator that is stable at any step and damps the ringing after a switching.

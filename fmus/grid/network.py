@@ -2,10 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 SYSTEM_BASE_MVA = 100.0
 SMALLEST_REACTANCE = 1e-5
 """Of a line [pu, 100 MVA]."""
+
+ActivePower = Literal["impedance", "current"]
+"""How a load's active power follows its voltage: with its square, or in proportion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +36,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A constant-impedance load that draws P + jQ [MW, Mvar] at the power flow's voltage."""
+    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage; by |v|², unless ``active`` says else."""
 
     name: str
     bus: str
     p_mw: float
     q_mvar: float = 0.0
+    active: ActivePower = "impedance"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +90,7 @@ class Network:
 
     def __post_init__(self) -> None:
         problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
+        problems += self._bad_loads()
         if problems:
             raise ValueError(f"network {self.name!r}: " + "; ".join(problems))
 
@@ -157,6 +163,18 @@ class Network:
                 yield f"line {line.name!r} has the ratio {line.tap:g} {ends}; it must exceed 0, and is 1 without one"
         if not self.stray_B >= 0:
             yield f"stray_B = {self.stray_B:g} pu; it must not be negative"
+
+    def _bad_loads(self) -> Iterable[str]:
+        for load in self.loads:
+            if load.active == "current":
+                if not load.p_mw > 0:
+                    yield f"load {load.name!r} of constant current draws {load.p_mw:g} MW; it must exceed 0"
+                if any(self.has_capacitance(bus) for bus in self.buses):
+                    yield (
+                        f"load {load.name!r} is of constant current, which needs a network without bus capacitances "
+                        "(line charging, capacitors, stray_B): their integrator takes linear loads only; leave the "
+                        "capacitances out, or make the load a constant impedance"
+                    )
 
     def _floating_buses(self) -> Iterable[str]:
         floating = [b for b in self.buses if not self.has_capacitance(b) and not self._has_conductance(b)]

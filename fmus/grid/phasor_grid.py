@@ -28,7 +28,19 @@ from fmus.toolchain.port import SYSTEM_BASE
 
 
 def phasor_grid(network: Network) -> Model:
-    """Build the model of a network; parameters are named after its elements, as in `grid`."""
+    """Build the model of a network; parameters are named after its elements, as in `grid`.
+
+    Raises
+    ------
+    ValueError
+        If a load is of constant current: the voltages are solved for as a linear system.
+    """
+    currents = [load.name for load in network.loads if load.active == "current"]
+    if currents:
+        raise ValueError(
+            f"network {network.name!r}: load {', '.join(currents)} is of constant current, which the phasor grid does "
+            "not have; make it a constant impedance, or take the model 'grid'"
+        )
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency")
     buses = {bus: declare_bus(m, bus) for bus in network.buses}
     Y: Admittances = {bus: {} for bus in buses}

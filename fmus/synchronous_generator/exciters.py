@@ -21,34 +21,40 @@ LOOP_PASSES = 4
 
 
 class Exciter(Protocol):
-    """Declares an excitation system and returns (E_fd, |v_t|) [pu]."""
+    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
 
     def __call__(
-        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX
+        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
     ) -> tuple[ca.SX, ca.SX]: ...
 
 
-def ac4a(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
+def ac4a(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A)."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
         T_A = m.parameter("T_A", 0.015, "s", "Amplifier", minimum=1e-3, source=PAPER)
-        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, T_R=0.01, source=STAMP)
+        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=STAMP)
         compensated = _transient_gain_reduction(m, error, start.E_fd / K_A, PAPER)
         E_fd = low_pass(m, "amplifier", K_A * compensated, T_A, start.E_fd)
         return _close_measurement(m, v_m, E_fd, terminal_voltage)
 
 
-def st1(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
+def st1(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
-        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, T_R=0.01, source=NTS631)
+        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=NTS631)
         E_fd = K_A * _transient_gain_reduction(m, error, start.E_fd / K_A, NTS631)
         return _close_measurement(m, v_m, E_fd, terminal_voltage)
 
 
-def st4b(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
+def st4b(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+) -> tuple[ca.SX, ca.SX]:
     """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)
@@ -62,7 +68,7 @@ def st4b(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd:
             return K_P * v_t * f_ex
 
         control_0 = start.E_fd / bridge(start.v_t, start.E_fd)
-        v_m, error = _measured_error(m, start.v_t, start.v_t, T_R=0.02, source=NTS631)
+        v_m, error = _measured_error(m, start.v_t, start.v_t, v_s, T_R=0.02, source=NTS631)
         control = proportional_integral(m, "regulator", error, K_PR, K_IR, control_0)
         control = low_pass(m, "bridge", control, T_A, control_0)
         E_fd = I_fd  # equal in steady state: a good first guess
@@ -72,14 +78,14 @@ def st4b(m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd:
 
 
 def _measured_error(
-    m: ModelBuilder, v_t_0: ca.SX, V_ref_0: Scalar, *, T_R: float, source: str
+    m: ModelBuilder, v_t_0: ca.SX, V_ref_0: Scalar, v_s: Scalar, *, T_R: float, source: str
 ) -> tuple[tuple[ca.SX, ca.SX], ca.SX]:
     """Declare the voltage measurement and the reference; return the measurement (state, T_R) and the error."""
     T = m.parameter("T_R", T_R, "s", "Voltage measurement", minimum=1e-3, source=source)
     V_ref = m.calculated("V_ref", V_ref_0, "pu", "Voltage reference of the operating point", base="S_n")
     delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
     v_m = m.state("v_m", v_t_0, "pu", "Measured terminal voltage", base="S_n")
-    return (v_m, T), V_ref + delta - v_m
+    return (v_m, T), V_ref + delta + v_s - v_m
 
 
 def _transient_gain_reduction(m: ModelBuilder, error: ca.SX, initial: Scalar, source: str) -> ca.SX:

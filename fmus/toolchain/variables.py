@@ -17,6 +17,7 @@ UNITS: dict[str, dict[str, float]] = {
     "rad": {"rad": 1},
     "rad/s": {"rad": 1, "s": -1},
     "s": {"s": 1},
+    "s/s": {},
     "1/s": {"s": -1},
     "Hz": {"s": -1},
     "MVA": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},

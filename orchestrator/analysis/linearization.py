@@ -11,7 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from orchestrator.analysis.component_linearization import linearize_by_derivatives, linearize_component
+from orchestrator.analysis.component_linearization import (
+    ComponentLinearization,
+    linearize_by_derivatives,
+    linearize_component,
+)
 from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
@@ -36,6 +40,8 @@ class Blocks:
         Whether `continuous` will be asked for as well.
     directional
         Take the FMUs' own directional derivatives instead of perturbing them.
+    known
+        Components whose linear model is known already, such as an identified one; they are not perturbed.
 
     Raises
     ------
@@ -52,16 +58,21 @@ class Blocks:
         *,
         derivatives: bool = False,
         directional: bool = False,
+        known: Mapping[str, ComponentLinearization] | None = None,
     ) -> None:
+        known = known or {}
         self.step_size = step_size or master.clock.step_size
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         driven, observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
         _check_driven(master, driven)
         self.components = {
-            name: linearize_by_derivatives(exchange, self.step_size, driven[name], observed[name])
-            if directional
-            else linearize_component(
-                exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
+            name: known.get(name)
+            or (
+                linearize_by_derivatives(exchange, self.step_size, driven[name], observed[name])
+                if directional
+                else linearize_component(
+                    exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
+                )
             )
             for name, exchange in master.exchanges.items()
         }

@@ -46,7 +46,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     """
     source = _source(table, directory)
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift) for n, t in table.lines.items()]
-    loads = [Load(n, t.bus, t.p, t.q) for n, t in table.loads.items()]
+    loads = [Load(n, t.bus, t.p, t.q, t.active) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
     if table.lines_file is not None:
         lines += _lines_of_file(directory / table.lines_file)

@@ -206,7 +206,7 @@ class Preparer:
         try:
             description = self._description(table, is_native(self.draft, name, table))
             self.draft.system.add(name, description, isolated=table.isolated)
-        except InputError as error:
+        except (InputError, ValueError) as error:  # the latter from a model that does not fit the network
             self.draft.note(where, str(error))
         except KeyError as error:
             self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))

@@ -76,6 +76,7 @@ class LoadTable(Table):
     bus: str
     p: Megawatt
     q: Megavar = 0.0
+    active: Literal["impedance", "current"] = "impedance"
 
 
 class ShuntTable(Table):

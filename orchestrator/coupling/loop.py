@@ -4,7 +4,7 @@ Where no library can be compiled for the platform, the same loop runs in Python.
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from time import perf_counter
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.coupling.schedule import Schedule
 from orchestrator.fmi.component import Component, RealBatch
 
 _SOURCE = Path(__file__).with_name("inner_loop.c")
@@ -27,12 +28,17 @@ class Exchange:
     ----------
     inputs, outputs
         Batches of the connected variables. The outputs' values are a window of the system's vector y.
+    window
+        Where in y that is.
     sources
         For each input the index in y of the output that feeds it.
     """
 
-    def __init__(self, component: Component, inputs: RealBatch, outputs: RealBatch, sources: NDArray[np.int64]) -> None:
-        self.component, self.inputs, self.outputs, self.sources = component, inputs, outputs, sources
+    def __init__(
+        self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
+    ) -> None:
+        self.component, self.inputs, self.outputs = component, inputs, outputs
+        self.window, self.sources = window, sources
 
 
 class Loop(Protocol):
@@ -135,39 +141,78 @@ class CompiledLoop:
 
 
 class PythonLoop:
-    """Steps a system in Python."""
+    """Steps a system in Python.
 
-    def __init__(self, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> None:
-        self._groups, self._y = groups, y
+    Parameters
+    ----------
+    schedule
+        For what is special about its steps.
+    hand_over
+        Sets all inputs before each step; by default each component takes its own as it steps.
+    """
+
+    def __init__(
+        self,
+        groups: Sequence[Sequence[Exchange]],
+        y: NDArray[np.float64],
+        schedule: Schedule,
+        hand_over: Callable[[], None] | None = None,
+    ) -> None:
+        self._groups, self._y, self._hand_over = groups, y, hand_over
+        self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
+        self._before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         self.completed = 0
         for k in range(index, index + count):
-            time = k * step_size
+            time, size = self._interval(k, step_size)
+            known = self._extrapolated() if self._extrapolation else self._y
+            if self._hand_over is not None:
+                self._hand_over()
             for group, spent in zip(self._groups, self._spent, strict=True):
                 for i, exchange in enumerate(group):
-                    np.take(self._y, exchange.sources, out=exchange.inputs.values, mode="clip")
+                    np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
                     start = perf_counter()
                     component = exchange.component
-                    if exchange.inputs.names:
+                    if exchange.inputs.names and self._hand_over is None:
                         component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
-                    component.step(time, step_size)
+                    component.step(time, size)
                     spent[i] += perf_counter() - start
                 for i, exchange in enumerate(group):
                     start = perf_counter()
                     if exchange.outputs.names:
                         component = exchange.component
                         component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
+                    known[exchange.window] = exchange.outputs.values
                     spent[i] += perf_counter() - start
             self.completed += 1
+
+    def _interval(self, index: int, step_size: float) -> tuple[float, float]:
+        """Time and size of a step [s]."""
+        if self._ticks_per_second is None:
+            return index * step_size, step_size
+        ticks = round(step_size * self._ticks_per_second)
+        time = index * ticks / self._ticks_per_second
+        return time, (index + 1) * ticks / self._ticks_per_second - time
+
+    def _extrapolated(self) -> NDArray[np.float64]:
+        """All outputs as they would go on rising; what has stepped since then is overwritten group by group."""
+        known = self._y + self._extrapolation * (self._y - (self._y if self._before is None else self._before))
+        self._before = self._y.copy()
+        return known
 
     def seconds(self) -> list[float]:
         return [seconds for group in self._spent for seconds in group]
 
 
-def make_loop(groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> Loop:
-    """The compiled loop where there is one, else the loop in Python."""
-    library = _library()
-    return PythonLoop(groups, y) if library is None else CompiledLoop(library, groups, y)
+def make_loop(
+    groups: Sequence[Sequence[Exchange]],
+    y: NDArray[np.float64],
+    schedule: Schedule,
+    hand_over: Callable[[], None] | None = None,
+) -> Loop:
+    """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
+    library = _library() if schedule.is_plain else None
+    return PythonLoop(groups, y, schedule, hand_over) if library is None else CompiledLoop(library, groups, y)

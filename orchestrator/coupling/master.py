@@ -16,7 +16,7 @@ from orchestrator.coupling.loop import Exchange, make_loop
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
-from orchestrator.coupling.system import System
+from orchestrator.coupling.system import Endpoint, System
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
@@ -74,7 +74,10 @@ class Master:
         except BaseException:
             self.close()
             raise
-        self._loop = make_loop([[self.exchanges[name] for name in group] for group in schedule.groups], self.y)
+        groups = [[self.exchanges[name] for name in group] for group in schedule.groups]
+        self._wires = self._single_wires() if schedule.wire_by_wire else []
+        self._handed_over = False
+        self._loop = make_loop(groups, self.y, schedule, self._hand_over if self._wires else None)
 
     # -- life cycle ------------------------------------------------------------------------------
 
@@ -98,22 +101,45 @@ class Master:
         self.y = np.zeros(len(sources))
         exchanges = {}
         for name, component in self.components.items():
-            window = [i for i, s in enumerate(sources) if s.component == name]
+            own = [i for i, s in enumerate(sources) if s.component == name]
             feeding = [c for c in self.system.connections if c.target.component == name]
-            values = self.y[window[0] : window[-1] + 1] if window else np.zeros(0)
+            window = slice(own[0], own[-1] + 1) if own else slice(0)
             exchanges[name] = Exchange(
                 component,
                 RealBatch(component, [c.target.variable for c in feeding]),
-                RealBatch(component, [sources[i].variable for i in window], values),
+                RealBatch(component, [sources[i].variable for i in own], self.y[window]),
+                window,
                 np.array([sources.index(c.source) for c in feeding], dtype=np.int64),
             )
         return exchanges
 
+    def _single_wires(self) -> list[tuple[RealBatch, RealBatch]]:
+        """Source and target of every connection by themselves, sharing their value."""
+        wires = []
+        for wire in self.system.connections:
+            source = RealBatch(self.components[wire.source.component], [wire.source.variable])
+            target = RealBatch(self.components[wire.target.component], [wire.target.variable], source.values)
+            wires.append((source, target))
+        return wires
+
     def _initialise(self) -> None:
-        """Initialise all FMUs together: outputs are propagated until nothing changes any more."""
+        """Bring all FMUs through initialisation, with the first inputs that the schedule gives them."""
         for name, component in self.components.items():
             component.enter_initialization_mode()
             component.set(self.system.components[name].inputs)
+        if self.schedule.first_inputs == "consistent":
+            self._propagate()
+            return
+        for component in self.components.values():
+            component.exit_initialization_mode()
+        if self.schedule.first_inputs == "once":
+            for exchange in self.exchanges.values():
+                exchange.outputs.read()
+        elif self.schedule.first_inputs == "start":
+            self._take_start_values()
+
+    def _propagate(self) -> None:
+        """Propagate outputs until nothing changes any more, and end initialisation."""
         for _ in range(_INITIAL_PASSES):
             before = self.y.copy()
             for group in self.schedule.groups:
@@ -127,6 +153,20 @@ class Master:
             component.exit_initialization_mode()
         for exchange in self.exchanges.values():
             exchange.outputs.read()
+
+    def _take_start_values(self) -> None:
+        """Let every output be what the inputs that it feeds start from."""
+        starts: dict[Endpoint, tuple[float, Endpoint]] = {}
+        for wire in self.system.connections:
+            info = self.system.components[wire.target.component].description.variables[wire.target.variable]
+            value = float(info.start or 0.0)
+            known, other = starts.setdefault(wire.source, (value, wire.target))
+            if known != value:
+                raise InputError(
+                    f"{wire.source} feeds {other}, which starts from {known:g}, and {wire.target}, which starts from "
+                    f"{value:g}; with first_inputs = 'start' all inputs of an output must start from the same value"
+                )
+            self.y[self.output_names.index(str(wire.source))] = value
 
     def close(self) -> None:
         """Terminate and free every FMU; calling it again does nothing."""
@@ -152,6 +192,22 @@ class Master:
         if len(exchange.sources):
             np.take(self.y, exchange.sources, out=exchange.inputs.values, mode="clip")
             exchange.inputs.write()
+
+    def exchange(self) -> None:
+        """Send every component the newest outputs of its partners, all at once or as the schedule has it."""
+        for source, target in self._wires:
+            source.read()
+            target.write()
+        if not self._wires:
+            for name in self.components:
+                self.exchange_inputs(name)
+        self._handed_over = True
+
+    def _hand_over(self) -> None:
+        """Exchange before a step, unless an observer had it done: wire by wire, a second time gives other values."""
+        if not self._handed_over:
+            self.exchange()
+        self._handed_over = False
 
     def advance(self, count: int) -> None:
         """Do ``count`` communication steps and nothing else.

@@ -16,6 +16,12 @@ if TYPE_CHECKING:
 class Recorder:
     """Records variables named ``component.variable``.
 
+    Parameters
+    ----------
+    after_exchange
+        Hand every component the newest outputs of its partners before anything is read; else outputs are recorded as
+        they were read at the end of the step, with the inputs that were held in it.
+
     Attributes
     ----------
     times
@@ -24,9 +30,10 @@ class Recorder:
         Shape (n, number of names), in the order of ``names``; only what was reached before a failure.
     """
 
-    def __init__(self, names: Sequence[str], every: int) -> None:
+    def __init__(self, names: Sequence[str], every: int, *, after_exchange: bool = False) -> None:
         self.names = tuple(names)
         self.every = every
+        self.after_exchange = after_exchange
         self._count = 0
         self._times = np.empty(0)
         self._values = np.empty((0, len(self.names)))
@@ -60,6 +67,8 @@ class Recorder:
         self._values = np.empty((rows, len(self.names)))
 
     def observe(self, master: "Master") -> None:
+        if self.after_exchange:
+            master.exchange()
         self._times[self._count] = master.time
         row = self._values[self._count]
         for batch, columns in self._batches:

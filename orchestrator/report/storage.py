@@ -5,14 +5,14 @@ import json
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.recorder import Recorder
 
 
 def provenance(case: Case, prepared: PreparedScenario) -> dict[str, str | float]:
@@ -36,7 +36,18 @@ def provenance(case: Case, prepared: PreparedScenario) -> dict[str, str | float]
     }
 
 
-def trajectory_dataset(recorder: Recorder, case: Case, prepared: PreparedScenario) -> xr.Dataset:
+class Recorded(Protocol):
+    """Values by time and name, such as those of a `Recorder`."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def times(self) -> NDArray[np.float64]: ...
+    @property
+    def values(self) -> NDArray[np.float64]: ...
+
+
+def trajectory_dataset(recorder: Recorded, case: Case, prepared: PreparedScenario) -> xr.Dataset:
     """Recorded variables as a labelled dataset over time [s]."""
     components = prepared.system.components
     data = {}

@@ -12,17 +12,13 @@ time with one doStep for 500 of them, so that its own master does the stepping.
 """
 
 import atexit
-import ctypes
 import json
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,9 +26,11 @@ import numpy as np
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
-from orchestrator.coupling.system import Endpoint, System
+from orchestrator.coupling.system import System
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
+from tests.interop import drivers
+from tests.interop.jobs import job_of
 
 STEPS, POINTS, REPEATS = 20_000, 40, 3
 STEP_SIZE = 1e-4
@@ -49,10 +47,6 @@ def two_area() -> System:
     (prepared,) = load_case("two_area").prepare(["pod_pq"])
     prepared.system.components["grid"].parameters["load_2.scale"] = 1.01
     return prepared.system
-
-
-def reference(system: System, component: str, variable: str) -> int:
-    return system.components[component].description.variables[variable].reference
 
 
 # -- masters -------------------------------------------------------------------------------------
@@ -73,27 +67,11 @@ def _stepper(master: Master, watched: tuple[str, str]) -> tuple[Stepper, Reader]
 
 
 def libcosim(observe: bool) -> tuple[Stepper, Reader]:
-    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
-    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
     from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
-    from libcosimpy.CosimSlave import CosimLocalSlave  # noqa: PLC0415
 
-    log_output_level(CosimLogLevel.WARNING)
-    system = two_area()
-    execution = CosimExecution.from_step_size(round(STEP_SIZE * 1e9))
-    slaves = {
-        name: execution.add_local_slave(CosimLocalSlave(str(plan.description.path), name))
-        for name, plan in system.components.items()
-    }
-    for name, plan in system.components.items():
-        for variable, value in plan.parameters.items():
-            initial = execution.boolean_initial_value if isinstance(value, bool) else execution.real_initial_value
-            if not initial(slaves[name], reference(system, name, variable), value):
-                raise RuntimeError(f"libcosim refuses {name}.{variable} = {value}")
-    for wire in system.connections:
-        ends = [(slaves[e.component], reference(system, e.component, e.variable)) for e in (wire.source, wire.target)]
-        execution.connect_real_variables(*ends[0], *ends[1])
-    slave, omega = slaves[WATCHED[0]], reference(system, *WATCHED)
+    job = job_of_two_area()
+    execution, slaves = drivers.libcosim_execution(job)
+    slave, omega = slaves[WATCHED[0]], job["references"][WATCHED[0]][WATCHED[1]]
     observer = CosimObserver.create_last_value() if observe else None
     if observer is not None:
         execution.add_observer(observer)
@@ -106,59 +84,26 @@ def libcosim(observe: bool) -> tuple[Stepper, Reader]:
 
 
 def ecos(_observe: bool) -> tuple[Stepper, Reader]:
-    with suppress(OSError):  # pip's tbb lies where no loader looks; Debian's is found by itself
-        ctypes.CDLL(str(Path(sysconfig.get_path("data")) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
-    from ecospy import EcosSimulation, EcosSimulationStructure  # noqa: PLC0415
-
-    system, structure = two_area(), EcosSimulationStructure()
-    start: dict[str, Any] = {}
-    for name, plan in system.components.items():
-        structure.add_model(name, str(plan.description.path))
-        start |= {f"{name}::{variable}": value for variable, value in plan.parameters.items()}
-    for wire in system.connections:
-        source, target = (f"{e.component}::{e.variable}" for e in (wire.source, wire.target))
-        structure.make_real_connection(source, target)
-    structure.add_parameter_set("start", start)
-    simulation = EcosSimulation(structure=structure, step_size=STEP_SIZE)
-    simulation.init(parameter_set="start")
+    simulation = drivers.ecos_simulation(job_of_two_area())
     return lambda count: simulation.step(count) and None, lambda: simulation.get_real("::".join(WATCHED))
 
 
 def container(sequential: bool, stretch: int) -> Runner:
     def run(_observe: bool) -> tuple[Stepper, Reader]:
-        from fmu_manipulation_toolbox.assembly import AssemblyNode  # noqa: PLC0415
-
-        system = two_area()
-        folder = Path(tempfile.mkdtemp(prefix="container_"))
+        folder = tempfile.mkdtemp(prefix="container_")
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        node = AssemblyNode(
-            "container.fmu", step_size=STEP_SIZE, sequential=sequential, auto_link=False, auto_output=False
-        )
-        for name, plan in system.components.items():
-            node.add_fmu(f"{name}.fmu", str(plan.description.path))
-            for variable, value in plan.parameters.items():
-                node.add_start_value(f"{name}.fmu", variable, str(value).lower())
-        for target, value in consistent_inputs(system).items():
-            node.add_start_value(f"{target.component}.fmu", target.variable, repr(value))
-        for wire in system.connections:
-            source, target = wire.source, wire.target
-            node.add_link(f"{source.component}.fmu", source.variable, f"{target.component}.fmu", target.variable)
-        node.add_output(f"{WATCHED[0]}.fmu", WATCHED[1], WATCHED[1])
-        node.make_fmu(folder, fmi_version=2)
+        path = drivers.container(job_of_two_area(), folder, sequential)
         outer = System()
-        outer.add("container", read_description(folder / "container.fmu"))
+        outer.add("container", read_description(path))
         master = Master(outer, jacobi(("container",)), stretch * STEP_SIZE)
-        step, read = _stepper(master, ("container", WATCHED[1]))
+        step, read = _stepper(master, ("container", ".".join(("recorded", *WATCHED))))
         return lambda count: step(count // stretch), read
 
     return run
 
 
-def consistent_inputs(system: System) -> dict[Endpoint, float]:
-    """Values of all connected inputs at t = 0: a container does not look for them in a closed loop of FMUs."""
-    with Master(system, jacobi(FLAT), STEP_SIZE) as master:
-        values = dict(zip(master.output_names, master.y.tolist(), strict=True))
-    return {wire.target: values[str(wire.source)] for wire in system.connections}
+def job_of_two_area() -> dict[str, Any]:
+    return job_of(two_area(), STEP_SIZE, STEPS * STEP_SIZE, [".".join(WATCHED)])
 
 
 DEVICES = (("gfor", "sg1", "sg2"), ("grid",))

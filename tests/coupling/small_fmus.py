@@ -50,6 +50,14 @@ def gain() -> Model:
     return m.build()
 
 
+def started_gain() -> Model:
+    """y = u, from an input that starts at 0.5."""
+    m = ModelBuilder("small_started_gain", "Gain with a start value")
+    u = m.input("u", "1", "Input", start=0.5)
+    m.output("y", u, "1", "Output")
+    return m.build()
+
+
 def guarded_gain() -> Model:
     """y = u/K at once, usable where K > 0."""
     m = ModelBuilder("small_guarded_gain", "Gain with a rule")
@@ -83,6 +91,7 @@ MODELS = {
     "integrator": integrator,
     "lag": lag,
     "gain": gain,
+    "started_gain": started_gain,
     "guarded_gain": guarded_gain,
     "blow_up": blow_up,
     "power_source": power_source,

@@ -36,6 +36,7 @@ _DIP = 0.99 * np.exp(0.5j * np.pi / 180)  # small enough to leave the current li
 _BUS = ({"v_re": 1.0, "v_im": 0.0}, {"v_re": float(_DIP.real), "v_im": float(_DIP.imag)})
 _FOLDER = "fmus/synchronous_generator"
 _GENERATOR = ("i_re", "i_im", "omega", "delta", "v_t", "E_fd", "P_m")
+_INFEED = {"i_re": 13.5, "i_im": 0.0}
 REFERENCES = (
     Reference(
         "gfor", "gfor_fmu/reference.csv", {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
@@ -60,6 +61,10 @@ REFERENCES = (
         "two_area_grid", "fmus/grid/reference.csv", {"X_L": 0.1},
         {"sg1.i_re": 27.0, "sg2.i_re": 39.0}, {"sg1.i_re": 26.5, "sg1.i_im": -0.5, "sg2.i_re": 39.0},
         ("bus_2.v_re", "bus_2.v_im", "bus_3.v_re", "bus_3.v_im", "L.p"),
+    ),
+    Reference(
+        "infinite_bus", "fmus/infinite_bus/reference.csv", {"load.P": 600.0},
+        _INFEED, {"i_re": 13.0, "i_im": 0.5}, ("v_re", "v_im", "v", "p", "q"),
     ),
 )  # fmt: skip
 

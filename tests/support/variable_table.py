@@ -19,7 +19,11 @@ LEAFLETS = {
     "synchronous_generator_st1_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st4b_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "two_area_phasor_grid": ROOT / "fmus" / "grid" / "README.md",
+    "synchronous_generator_st4b_pss2a": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "two_area_grid": ROOT / "fmus" / "grid" / "README.md",
+    "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
+    "probe_a": ROOT / "fmus" / "probe" / "README.md",
+    "probe_b": ROOT / "fmus" / "probe" / "README.md",
 }
 KINDS = {
     Input: "input",

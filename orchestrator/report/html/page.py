@@ -1,16 +1,12 @@
 """The page as a whole."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
-from html import escape
-from importlib.metadata import version
 from pathlib import Path
 
 from orchestrator.report.html import sections, studies
+from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures
 from orchestrator.report.html.folder import Results, read_results
-
-_HERE = Path(__file__).parent
 
 
 def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = None) -> Path:
@@ -52,20 +48,5 @@ def page(results: Results) -> str:
         content.append(("Communication step", sections.step_sizes(results)))
     content.append(("Provenance", sections.provenance(results)))
     title = results.case.table.title or results.case.name
-    links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
-    body = "".join(
-        f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>' for k, (name, text) in enumerate(content)
-    )
-    made = f"gfor-cosim {version('gfor-cosim')}, {datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
-    subtitle = f"Small-signal and time-domain study by co-simulation of FMUs · {made}"
-    return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(title)}</title><link rel="icon" href="data:,"><style>{_text("page.css")}</style></head>
-<body><main><header><h1>{escape(title)}</h1><div class="soft">{subtitle}</div></header>
-<nav>{links}</nav>{sections.findings(results)}{body}</main>
-<div id="tooltip" role="status"></div><script>{_text("page.js")}</script></body></html>
-"""
-
-
-def _text(name: str) -> str:
-    return (_HERE / name).read_text(encoding="utf-8")
+    kind = "Small-signal and time-domain study by co-simulation of FMUs"
+    return document(title, kind, sections.findings(results), content)

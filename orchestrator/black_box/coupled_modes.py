@@ -1,0 +1,142 @@
+"""Modes of a coupled system with a black box in it.
+
+The box is measured alone, at an ideal bus that holds the voltage of the operating point, and a model over the
+communication step is fitted to it. All other components are perturbed where they are. The step map is composed as
+always; the box's states in it are those of the fitted model and mean nothing one by one, only together.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.embedded_model import embedded_model
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.state_access import StateAccess, obstacle
+from orchestrator.black_box.fitting import IdentifiedModel, fit
+from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
+from orchestrator.black_box.test_bench import TestBench
+from orchestrator.coupling.master import Master
+from orchestrator.errors import AnalysisError, InputError
+from orchestrator.fmi.component import Component
+
+STEADY = 1e-6
+"""Largest change of a state or of the box's current in one communication step that passes for a steady state."""
+
+
+@dataclass(frozen=True)
+class BoxedSystem:
+    """A coupled system linearised with one component as a black box.
+
+    Attributes
+    ----------
+    component
+        The box.
+    residual
+        Largest change of a known component's state in one communication step, and of the box's current between what
+        it starts with and what it settles to at the ideal bus.
+    """
+
+    component: str
+    response: FrequencyResponse
+    identified: IdentifiedModel
+    model: LinearModel
+    residual: float
+
+    def modes(self, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
+        """Modes of a range of frequencies, least damped first."""
+        return find_spectrum(self.model, lowest_hz, highest_hz).modes
+
+    def participation(self, mode: Mode) -> float:
+        """Participation of the box as a whole; see `component_participation`."""
+        return component_participation(mode, self.component)
+
+
+def is_black_box(component: Component) -> bool:
+    """Whether a component does not show its states, so that it cannot be perturbed like the others."""
+    return obstacle(component) is not None or not (
+        component.description.states_are_settable or embedded_model(component) is not None
+    )
+
+
+def component_participation(mode: Mode, component: str) -> float:
+    """|Σ l*·r| over the states of one component, with lᴴ·r = 1 over all states.
+
+    Unlike the sum of the states' factors it does not depend on which states describe the component, so it is the same
+    for a fitted model as for the device's own equations.
+    """
+    names = [name for name in mode.shape if name.partition(".")[0] == component]
+    return float(abs(sum(mode.left[name].conjugate() * mode.shape[name] for name in names)))
+
+
+def linearize_with_box(
+    master: Master, component: str, excitation: Excitation | None = None, *, restore: bool | None = None
+) -> BoxedSystem:
+    """Identify one component and linearise the coupled system around where the master is.
+
+    Parameters
+    ----------
+    master
+        Initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
+    component
+        The box; only inputs are set and outputs read.
+    restore
+        Whether the box's state may be saved and restored; None for: if its FMU can.
+
+    Raises
+    ------
+    InputError
+        If there is no such component.
+    AnalysisError
+        If the operating point is none, or the box cannot be identified there.
+    """
+    if component not in master.components:
+        raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
+    exchange, plan = master.exchanges[component], master.system.components[component]
+    bench = TestBench(
+        plan.description,
+        plan.parameters,
+        rest=master.y[exchange.sources].copy(),
+        inputs=exchange.inputs.names,
+        outputs=exchange.outputs.names,
+        held=plan.inputs,
+        step_size=master.clock.step_size,
+        restore=restore,
+    )
+    response = measure(bench, excitation or Excitation())
+    moved = float(np.abs(response.operating_point - exchange.outputs.values).max())
+    residual = max(moved, *(_movement(master, name) for name in master.components if name != component))
+    if residual > STEADY:
+        raise AnalysisError(
+            f"no steady state: from the power flow's start, {component!r} alone moves its current by {moved:.3g} pu, "
+            f"and the other components' states move by up to {residual:.3g} in a step; check that {component!r} "
+            "starts at the P_0, Q_0, v_0 and theta_0 that it is given"
+        )
+    identified = fit(response)
+    blocks = Blocks(master, known={component: _as_component(component, identified)})
+    return BoxedSystem(component, response, identified, compose(blocks, master.schedule), residual)
+
+
+def _movement(master: Master, name: str) -> float:
+    """Largest change of a component's states over one step with its inputs as they are; it is put back."""
+    component = master.components[name]
+    access = StateAccess(component)
+    saved = component.save_state()
+    try:
+        before = access.read()
+        component.step(master.time, master.clock.step_size)
+        return float(np.abs(access.read() - before).max(initial=0.0))
+    finally:
+        component.restore_state(saved)
+        component.free_state(saved)
+
+
+def _as_component(name: str, model: IdentifiedModel) -> ComponentLinearization:
+    n = len(model.A)
+    none = np.zeros((0, n)), np.zeros((0, len(model.inputs)))
+    return ComponentLinearization(
+        name, tuple(f"identified.{k + 1}" for k in range(n)), model.inputs, model.outputs, model.A, model.B, model.C,
+        model.D, (), *none, None, None, model.error,
+    )  # fmt: skip

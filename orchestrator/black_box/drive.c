@@ -1,0 +1,29 @@
+/* One FMU behind an ideal voltage: for every communication step set the inputs, step, read the outputs.
+   `test_bench.py` calls it. Returns 0, or the status of the first call that is neither OK nor Warning. */
+#include <stddef.h>
+#include <stdint.h>
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef int (*get_set)(void *, const unsigned *, size_t, double *);
+typedef int (*do_step)(void *, double, double, int);
+
+EXPORT int drive(void *component, get_set set_real, get_set get_real, do_step step, const unsigned *input_references,
+                 int64_t n_inputs, const unsigned *output_references, int64_t n_outputs, double *inputs,
+                 double *outputs, int64_t index, int64_t count, double step_size, int64_t *failed) {
+    for (int64_t k = 0; k < count; ++k) {
+        int status = set_real(component, input_references, (size_t)n_inputs, inputs + k * n_inputs);
+        failed[0] = k, failed[1] = 1;
+        if (status > 1) return status;
+        status = step(component, (double)(index + k) * step_size, step_size, 1);
+        failed[1] = 2;
+        if (status > 1) return status;
+        status = get_real(component, output_references, (size_t)n_outputs, outputs + k * n_outputs);
+        failed[1] = 3;
+        if (status > 1) return status;
+    }
+    return 0;
+}

@@ -1,0 +1,206 @@
+"""Frequency response of a device on the test bench, by multi-sine or by pulses, each value with a bound."""
+
+from dataclasses import dataclass
+from itertools import chain, repeat
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.black_box.excitation import line_response, multisine, odd_lines, pulse_response
+from orchestrator.black_box.test_bench import Runs, TestBench
+from orchestrator.errors import AnalysisError
+
+METHODS = ("multisine", "pulse")
+_MOST_SECONDS = 400.0
+"""After so long a response must have settled [s]."""
+
+_APART = 10.0
+"""Periods are compared over at least so long [s]: neighbours that are short always look alike."""
+
+Numbers = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """How the device is excited.
+
+    Attributes
+    ----------
+    method
+        ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each
+        followed until it has died out.
+    lowest_hz, highest_hz, lines
+        Range of frequencies [Hz], and about how many.
+    amplitude
+        Largest deviation of an input [its unit]; everything is done at half of it as well.
+    settled
+        Periods, or the rest of a pulse response, may still differ by this part of the largest response.
+    """
+
+    method: str = "multisine"
+    lowest_hz: float = 0.05
+    highest_hz: float = 1000.0
+    lines: int = 120
+    amplitude: float = 1e-3
+    settled: float = 1e-5
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise ValueError(f"method {self.method!r}; choose from {', '.join(METHODS)}")
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """A measured response M(e^(jωH)): inputs held over a step, outputs read at its end.
+
+    Attributes
+    ----------
+    frequencies
+        [Hz], shape (f,).
+    values
+        Shape (f, p, m).
+    bounds
+        For every value: how far half the amplitude and the last repetition lead away from it, added up. It is a bound
+        for noise, transients and the leading nonlinearity; shape (f, p, m).
+    feedthrough
+        Direct effect of inputs on outputs, shape (p, m).
+    step_size
+        Communication step [s].
+    operating_point
+        Outputs at rest, shape (p,).
+    seconds
+        Time simulated on the bench.
+    """
+
+    frequencies: Numbers
+    values: Complex
+    bounds: Numbers
+    feedthrough: Numbers
+    operating_point: Numbers
+    step_size: float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    seconds: float
+    method: str
+
+    @property
+    def z(self) -> Complex:
+        return np.asarray(np.exp(2j * np.pi * self.frequencies * self.step_size))
+
+    @property
+    def strictly_proper(self) -> Complex:
+        """C·(z − A)⁻¹·B: what remains of M without the direct feed-through, which is read a step late."""
+        return np.asarray(self.values - self.feedthrough / self.z[:, None, None])
+
+    @property
+    def largest_bound(self) -> float:
+        """Of all frequencies, relative to the response there (2-norms)."""
+        size = np.linalg.norm(self.values, ord=2, axis=(1, 2))
+        return float((np.linalg.norm(self.bounds, ord=2, axis=(1, 2)) / size).max())
+
+    def continuous(self) -> Complex:
+        """The response of the device itself, without the hold: M over (1 − e^(−jωH))/(jωH).
+
+        It leaves out what the hold folds down from above the communication rate, so it is close only well below half
+        of that.
+        """
+        x = 2j * np.pi * self.frequencies * self.step_size
+        return np.asarray(self.values * (x / (1 - np.exp(-x)))[:, None, None])
+
+
+def measure(bench: TestBench, excitation: Excitation) -> FrequencyResponse:
+    """Measure a device.
+
+    Raises
+    ------
+    AnalysisError
+        If it does not come to rest, or its response does not settle.
+    ComponentError
+        If it refuses a call.
+    """
+    lines = odd_lines(excitation.lowest_hz, excitation.highest_hz, excitation.lines)
+    frequencies = lines * excitation.lowest_hz
+    if frequencies[-1] * bench.step_size >= 0.5:
+        raise AnalysisError(
+            f"{frequencies[-1]:g} Hz cannot be seen at communication points {bench.step_size:g} s apart; take a "
+            "shorter step or a lower highest frequency"
+        )
+    values = np.zeros((len(lines), len(bench.outputs), len(bench.inputs)), dtype=complex)
+    bounds = np.zeros(values.shape)
+    seconds = 0.0
+    with bench.runs() as runs:
+        direct, operating_point = runs.feedthrough(excitation.amplitude), runs.operating_point
+        for column in range(len(bench.inputs)):
+            found = []
+            for amplitude in (excitation.amplitude, excitation.amplitude / 2):
+                one = _by_pulses if excitation.method == "pulse" else _by_multisine
+                response, uncertainty, time = one(runs, bench, excitation, lines, column, amplitude)
+                found.append((response, uncertainty))
+                seconds += time
+            (full, at_full), (half, at_half) = found
+            # The error of lowest order grows with the square of the amplitude: from both it can be taken out.
+            values[:, :, column] = half + (half - full) / 3
+            bounds[:, :, column] = np.abs(half - full) + np.maximum(at_full, at_half)
+    names = tuple(bench.inputs), tuple(bench.outputs)
+    measured = np.asarray(frequencies, dtype=float), values, bounds, direct, operating_point
+    return FrequencyResponse(*measured, bench.step_size, *names, seconds, excitation.method)
+
+
+def _by_multisine(
+    runs: Runs, bench: TestBench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
+) -> tuple[Complex, Numbers, float]:
+    """Response at the lines and what two successive periods differ by, each of shape (f, p)."""
+    period = round(1 / (e.lowest_hz * bench.step_size))
+    if abs(period * e.lowest_hz * bench.step_size - 1) > 1e-9:
+        raise AnalysisError(
+            f"a period of {e.lowest_hz:g} Hz is no whole number of steps of {bench.step_size:g} s; choose another"
+        )
+    u = multisine(lines, period, amplitude)
+    deviations = np.zeros((period, len(bench.inputs)))
+    deviations[:, column] = u
+    seconds = period * bench.step_size
+    apart, most = ceil(_APART / seconds), ceil(_MOST_SECONDS / seconds)
+    found: list[Complex] = []
+    for y in runs.respond(repeat(deviations, max(most, 2 * apart))):
+        found.append(line_response(u, y, lines))
+        if len(found) > apart:
+            change = np.abs(found[-1] - found[-1 - apart])
+            if change.max() <= e.settled * np.abs(found[-1]).max():
+                return found[-1], change, len(found) * seconds
+    raise AnalysisError(
+        f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
+        f"response still changes by {change.max() / np.abs(found[-1]).max():.2g} over {apart * seconds:g} s; it is "
+        "unstable at an ideal bus, or slower than that: try --method pulse, or a smaller amplitude"
+    )
+
+
+def _by_pulses(
+    runs: Runs, bench: TestBench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
+) -> tuple[Complex, Numbers, float]:
+    """The same from a pulse up and a pulse down, so that even parts of the device drop out."""
+    part = round(_APART / bench.step_size)
+    silence = np.zeros((part, len(bench.inputs)))
+    frequencies: Numbers = np.asarray(lines * e.lowest_hz, dtype=float)
+    sums, changes, seconds = [], [], 0.0
+    for sign in (1.0, -1.0):
+        pulse = silence.copy()
+        pulse[0, column] = sign * amplitude
+        parts = chain([pulse], repeat(silence, ceil(_MOST_SECONDS / _APART) - 1))
+        total = np.zeros((len(lines), len(bench.outputs)), dtype=complex)
+        turn = np.exp(-2j * np.pi * frequencies * part * bench.step_size)[:, None]
+        for number, y in enumerate(runs.respond(parts)):
+            added = pulse_response(y, frequencies, bench.step_size) * turn**number / (sign * amplitude)
+            total += added
+            if np.abs(added).max() <= e.settled * np.abs(total).max():
+                break
+        else:
+            raise AnalysisError(
+                f"{bench.description.path.name}: its response to a pulse of {bench.inputs[column]} has not died out "
+                f"after {_MOST_SECONDS:g} s; it is unstable at an ideal bus, or its slowest time constant is longer"
+            )
+        seconds += (number + 1) * part * bench.step_size
+        sums.append(total)
+        changes.append(np.abs(added))
+    return np.asarray((sums[0] + sums[1]) / 2), np.maximum(changes[0], changes[1]), seconds

@@ -1,0 +1,56 @@
+"""Passivity of an admittance over frequency.
+
+With currents counted into the device, Y = −i/v, a device is passive at a frequency where Y + Yᴴ has no negative
+eigenvalue: it then takes power from every oscillation there and can drive none. A negative index names the frequencies
+at which it could, together with a grid that lets it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.black_box.frequency_response import FrequencyResponse
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Passivity:
+    """Passivity of a measured admittance.
+
+    Attributes
+    ----------
+    index
+        Smallest eigenvalue of (Y + Yᴴ)/2 [unit of Y], shape (f,).
+    relative
+        The same over the largest singular value of Y: from −1, all it does is deliver, to 1.
+    bounds
+        Of the index, from the bounds of Y.
+    """
+
+    frequencies: Numbers
+    index: Numbers
+    relative: Numbers
+    bounds: Numbers
+
+    def ranges(self) -> list[tuple[float, float]]:
+        """Ranges of measured frequencies [Hz] in which the index is negative beyond its bound."""
+        found: list[tuple[float, float]] = []
+        before = False
+        for f, active in zip(self.frequencies.tolist(), (self.index < -self.bounds).tolist(), strict=True):
+            if active:
+                found = [*found[:-1], (found[-1][0], f)] if before else [*found, (f, f)]
+            before = active
+        return found
+
+
+def passivity(response: FrequencyResponse) -> Passivity:
+    """Passivity of the device itself, without the communication's hold; its response must be a square admittance."""
+    Y = -response.continuous()
+    index = np.linalg.eigvalsh((Y + Y.conj().transpose(0, 2, 1)) / 2)[:, 0]
+    size = np.linalg.norm(Y, ord=2, axis=(1, 2))
+    bounds = np.asarray(np.linalg.norm(response.bounds, axis=(1, 2)), dtype=float)
+    return Passivity(
+        response.frequencies, np.asarray(index, dtype=float), np.asarray(index / size, dtype=float), bounds
+    )

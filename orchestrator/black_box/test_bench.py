@@ -1,0 +1,238 @@
+"""A test bench: one FMU alone at a bus whose voltage we impose, brought to the same operating point for every run.
+
+An FMU that can save its state is put back to it; any other is instantiated anew. Nothing but FMI is used: no states
+are read or set, and parameters only before initialisation.
+"""
+
+import ctypes
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.errors import AnalysisError, InputError
+from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.description import FmuDescription
+
+_SOURCE = Path(__file__).with_name("drive.c")
+_CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
+_STRETCH = 20000
+"""Steps done at a stretch, so that an interrupt from the keyboard is heard."""
+
+STILL = 1e-9
+"""Largest change of an output over a second [pu] at which the device counts as being in steady state."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass
+class TestBench:
+    """How a device is started, and between which variables it is seen.
+
+    Attributes
+    ----------
+    description, parameters
+        The FMU and what it is given before initialisation: rating, power-flow values, its own parameters.
+    inputs, outputs
+        Names, such as ``v_re``, ``v_im`` and ``i_re``, ``i_im``.
+    rest
+        Inputs at the operating point, shape (m,).
+    held
+        Constants for inputs that the bench does not move.
+    step_size
+        Communication step [s].
+    restore
+        Whether the FMU's state may be saved and restored; None for: if the FMU can.
+    longest_wait
+        Time [s] after which a device that does not stand still is given up.
+    """
+
+    description: FmuDescription
+    parameters: Mapping[str, float | bool]
+    rest: Numbers
+    inputs: Sequence[str] = ("v_re", "v_im")
+    outputs: Sequence[str] = ("i_re", "i_im")
+    held: Mapping[str, float] = field(default_factory=dict)
+    step_size: float = 1e-4
+    restore: bool | None = None
+    longest_wait: float = 120.0
+
+    @property
+    def saves_state(self) -> bool:
+        return self.description.can_save_state if self.restore is None else self.restore
+
+    @contextmanager
+    def runs(self) -> Iterator["Runs"]:
+        """Runs from one and the same operating point.
+
+        Raises
+        ------
+        AnalysisError
+            If the device does not come to rest at the ideal bus.
+        """
+        runs = Runs(self)
+        try:
+            yield runs
+        finally:
+            runs.close()
+
+
+class Runs:
+    """Runs on a bench; each begins at the operating point.
+
+    Attributes
+    ----------
+    still_after
+        How long the device needed to come to rest [s].
+    operating_point
+        Outputs there, shape (p,).
+    """
+
+    def __init__(self, bench: TestBench) -> None:
+        self._bench = bench
+        self._component: Component | None = None
+        self._state: Any = None
+        self._index = 0
+        self.still_after = 0.0
+        try:
+            self._start()
+            self.operating_point = self._come_to_rest()
+            if bench.saves_state:
+                self._state = self._running.save_state()
+            self._rest_index = self._index
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def _running(self) -> Component:
+        assert self._component is not None
+        return self._component
+
+    def respond(self, parts: Iterable[Numbers]) -> Iterator[Numbers]:
+        """Outputs after every step while the inputs deviate from rest, part by part as they are asked for.
+
+        Parameters
+        ----------
+        parts
+            Deviations in the order of time, each of shape (n, m); row k holds from point k to point k + 1.
+
+        Yields
+        ------
+        Deviations of the outputs from the operating point, shape (n, p); row k is read at the end of step k, with
+        the inputs of that step still in place.
+        """
+        self._rewind()
+        for deviations in parts:
+            yield self._drive(self._bench.rest + deviations) - self.operating_point
+
+    def feedthrough(self, size: float) -> Numbers:
+        """Direct effect of the inputs on the outputs, shape (p, m): set and read without a step, ± ``size``."""
+        bench = self._bench
+        found = np.zeros((len(bench.outputs), len(bench.inputs)))
+        self._rewind()
+        inputs, outputs = (RealBatch(self._running, names) for names in (bench.inputs, bench.outputs))
+        for k in range(len(bench.inputs)):
+            for sign in (1.0, -1.0):
+                inputs.values[:] = bench.rest
+                inputs.values[k] += sign * size
+                inputs.write()
+                found[:, k] += sign * outputs.read()
+        inputs.values[:] = bench.rest
+        inputs.write()
+        return found / (2 * size)
+
+    def close(self) -> None:
+        """Release the instance."""
+        component, self._component = self._component, None
+        if component is not None:
+            if self._state is not None:
+                component.free_state(self._state)
+                self._state = None
+            component.close()
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _start(self) -> None:
+        bench = self._bench
+        component = self._component = Component("box", bench.description)
+        component.set(bench.parameters)
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        component.set(dict(bench.held) | dict(zip(bench.inputs, bench.rest.tolist(), strict=True)))
+        component.exit_initialization_mode()
+        self._index = 0
+
+    def _rewind(self) -> None:
+        if self._state is not None:
+            self._running.restore_state(self._state)
+            self._index = self._rest_index
+        else:
+            self.close()
+            self._start()
+            self._hold(self._rest_index)
+
+    def _come_to_rest(self) -> Numbers:
+        """Hold the voltage until nothing moves any more; where the power flow's values hold, that is at once."""
+        bench = self._bench
+        second = round(1.0 / bench.step_size)
+        while True:
+            outputs = self._hold(second)
+            movement = np.abs(np.ptp(outputs, axis=0)).max()
+            if movement <= STILL:
+                self.still_after = self._index * bench.step_size - 1.0
+                return np.asarray(outputs[-1])
+            if self._index * bench.step_size >= bench.longest_wait:
+                raise AnalysisError(
+                    f"{bench.description.path.name}: alone at an ideal bus its current still moves by {movement:.3g} "
+                    f"pu in a second after {bench.longest_wait:g} s, so there is no operating point to identify it at; "
+                    "check its start values, or give it more time"
+                )
+
+    def _hold(self, count: int) -> Numbers:
+        return self._drive(np.tile(self._bench.rest, (count, 1)))
+
+    def _drive(self, inputs: Numbers) -> Numbers:
+        """Outputs after each of some steps, shape (n, p)."""
+        outputs = np.empty((len(inputs), len(self._bench.outputs)))
+        for first in range(0, len(inputs), _STRETCH):
+            part = slice(first, min(first + _STRETCH, len(inputs)))
+            self._stretch(np.ascontiguousarray(inputs[part]), outputs[part])
+        return outputs
+
+    def _stretch(self, inputs: Numbers, outputs: Numbers) -> None:
+        component, bench = self._running, self._bench
+        into, out = RealBatch(component, bench.inputs, inputs[0]), RealBatch(component, bench.outputs, outputs[0])
+        failed = (ctypes.c_int64 * 2)()
+        status = _library().drive(
+            component.pointer,
+            *(ctypes.cast(f, ctypes.c_void_p) for f in (component.set_real, component.get_real, component.do_step)),
+            into.arguments[1], len(bench.inputs), out.arguments[1], len(bench.outputs),
+            inputs.ctypes.data, outputs.ctypes.data, self._index, len(inputs), bench.step_size, failed,
+        )  # fmt: skip
+        if status:
+            component.check(status, _CALLS[failed[1]], (self._index + failed[0]) * bench.step_size)
+        self._index += len(inputs)
+        if not np.isfinite(outputs).all():
+            raise AnalysisError(f"{bench.description.path.name}: its current is no longer a finite number")
+
+
+@cache
+def _library() -> Any:
+    platform = host_platform()
+    if platform is None:
+        raise InputError("the test bench is compiled, and there is no compiler for this platform")
+    # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
+    library = ctypes.PyDLL(str(compile_library(_SOURCE.read_text(encoding="utf-8"), platform)))
+    address, integer = ctypes.c_void_p, ctypes.c_int64
+    library.drive.argtypes = [
+        address, address, address, address, address, integer, address, integer, address, address, integer, integer,
+        ctypes.c_double, address,
+    ]  # fmt: skip
+    return library

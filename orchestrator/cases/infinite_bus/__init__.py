@@ -1,0 +1,1 @@
+"""A converter on an infinite bus: voltage dip and load step."""

@@ -1,0 +1,1 @@
+"""Tests that network operators ask for: the damping test of the Norma técnica de supervisión 631."""

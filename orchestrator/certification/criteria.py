@@ -1,0 +1,145 @@
+"""The criteria of the norm on modes: of the linear model, and of a recorded signal."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes
+from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarity
+from orchestrator.errors import AnalysisError
+
+FREQUENCIES = (0.1, 1.5)
+"""Of the modes that are judged [Hz], both ends included."""
+
+LEAST_DAMPING = 0.05
+"""Damping ratio that a judged mode needs."""
+
+LEAST_AMPLITUDE = 0.01
+"""Components of a signal smaller than this part of its largest oscillating one are taken for what fits the rest."""
+
+_STABLE = 1e-3
+"""Real parts up to this [1/s] are the free angle's zero eigenvalue, in its numerical accuracy."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeVerdict:
+    """A mode with the converter, and what it was without.
+
+    Attributes
+    ----------
+    eigenvalue
+        [rad/s]
+    before
+        Eigenvalue of the same mode without the converter; None where the converter introduces the mode.
+    similarity
+        How surely it is the same, from 0 to 1, by the shape over the states that both systems have.
+    components
+        Who takes part most, in words.
+    """
+
+    eigenvalue: complex
+    before: complex | None
+    similarity: float
+    accepted: bool
+    reason: str
+    components: str = ""
+
+    @property
+    def frequency_hz(self) -> float:
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping_percent(self) -> float:
+        return 100 * damping_ratio(self.eigenvalue)
+
+
+@dataclass(frozen=True)
+class ModalTest:
+    """Modes from 0.1 to 1.5 Hz found in a signal, largest first."""
+
+    modes: tuple[IdentifiedMode, ...]
+    accepted: bool
+    reason: str
+
+
+def damping_ratio(eigenvalue: complex) -> float:
+    """−Re λ/|λ|."""
+    return -eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
+
+
+def is_judged(frequency_hz: float) -> bool:
+    """Whether the norm judges a mode of this frequency."""
+    return FREQUENCIES[0] <= frequency_hz <= FREQUENCIES[1]
+
+
+def eigenvalue_test(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
+    """Judge every mode of the system with the converter, least damped first.
+
+    A mode below 5 % is accepted only where the same mode had less than 5 % without the converter already: the norm
+    asks that the converter introduces none and takes none below.
+
+    Parameters
+    ----------
+    having, lacking
+        Modes of the system with and without the converter; those a little outside the judged range are useful,
+        since a mode may enter it.
+    components
+        For each mode of ``having``: who takes part.
+    """
+    alike = similarity(having, lacking) if len(having.eigenvalues) and len(lacking.eigenvalues) else None
+    verdicts = []
+    for k, value in enumerate(having.eigenvalues.tolist()):
+        if not is_judged(value.imag / (2 * np.pi)):
+            continue
+        best = int(np.argmax(alike[k])) if alike is not None else 0
+        known = alike is not None and alike[k, best] >= THRESHOLD
+        before = complex(lacking.eigenvalues[best]) if known else None
+        likeness = float(alike[k, best]) if alike is not None else 0.0
+        accepted, reason = _judge(value, before)
+        verdicts.append(ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else ""))
+    return sorted(verdicts, key=lambda v: v.damping_percent)
+
+
+def _judge(value: complex, before: complex | None) -> tuple[bool, str]:
+    percent = 100 * damping_ratio(value)
+    limit = 100 * LEAST_DAMPING
+    if damping_ratio(value) >= LEAST_DAMPING:
+        return True, f"{percent:.2f} % ≥ {limit:g} %"
+    if before is None:
+        return False, f"the converter introduces a mode with {percent:.2f} % < {limit:g} %"
+    was = 100 * damping_ratio(before)
+    if damping_ratio(before) < LEAST_DAMPING:
+        return True, f"{percent:.2f} %, and already {was:.2f} % < {limit:g} % without the converter"
+    return False, f"the converter takes a mode from {was:.2f} % to {percent:.2f} % < {limit:g} %"
+
+
+def stability_fault(growth_with: float, growth_without: float) -> str | None:
+    """What no range of frequencies excuses: an eigenvalue that grows [1/s] where none grew without the converter."""
+    if growth_with > _STABLE >= growth_without:
+        return f"the converter makes the system unstable: an eigenvalue has a real part of {growth_with:+.3g} 1/s"
+    return None
+
+
+def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: float) -> ModalTest:
+    """Judge the modes that the matrix pencil finds in a signal after ``start`` [s]."""
+    window = times >= start
+    try:
+        with ThreadpoolController().limit(limits=1):  # small matrices: many threads would only wait for each other
+            found = identify_modes(times[window], signal[window])
+    except AnalysisError as error:
+        return ModalTest((), False, str(error))
+    except np.linalg.LinAlgError:
+        return ModalTest((), False, "the signal grows beyond all bounds; no modes can be read from it")
+    oscillating = [m for m in found if m.eigenvalue.imag > 0]
+    largest = max((m.amplitude for m in oscillating), default=0.0)
+    judged = tuple(m for m in oscillating if is_judged(m.frequency_hz) and m.amplitude >= LEAST_AMPLITUDE * largest)
+    bad = [m for m in judged if not m.damping_percent > 100 * LEAST_DAMPING]
+    if bad:
+        worst = min(bad, key=lambda m: m.damping_percent)
+        return ModalTest(judged, False, f"{worst.frequency_hz:.3f} Hz has {worst.damping_percent:.2f} % ≤ 5 %")
+    if not judged:
+        return ModalTest(judged, True, "no oscillation from 0.1 to 1.5 Hz")
+    least = min(judged, key=lambda m: m.damping_percent)
+    return ModalTest(judged, True, f"least {least.damping_percent:.2f} % at {least.frequency_hz:.3f} Hz > 5 %")

@@ -1,0 +1,159 @@
+"""One point of the study: one reactance of the line, with or without the converter. It can run in another process."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
+
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
+from orchestrator.cases.case import load_case
+from orchestrator.cases.schema import Value
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.recorder import Recorder
+from orchestrator.errors import CosimError
+from orchestrator.study.modes import modes_of, running
+
+COMPUTED = (0.05, 2.0)
+"""Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range."""
+
+CONVERTER = "converter"
+POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PointTask:
+    """A scenario of the study's case file at one reactance.
+
+    Attributes
+    ----------
+    case
+        Path of the case file.
+    values
+        Values by ``component.variable``.
+    black_box
+        Identify the converter even if it shows its states.
+    """
+
+    case: str
+    scenario: str
+    X_L: float
+    values: dict[str, Value]
+    black_box: bool = False
+
+
+@dataclass
+class PointResult:
+    """Modes and response.
+
+    Attributes
+    ----------
+    modes
+        From 0.05 to 2 Hz, least damped first.
+    components
+        Who takes part in each of them, in words.
+    growth
+        Largest real part of any eigenvalue [1/s].
+    residual
+        Of the steady state.
+    identified
+        Order of the model that stands for the converter in the modes; None where its own states do.
+    signals
+        By name, each of the shape of ``times``.
+    failure
+        Why there are no modes, or the response is not whole.
+    """
+
+    X_L: float
+    scenario: str
+    modes: ModeSet | None = None
+    components: list[str] = field(default_factory=list)
+    growth: float = float("nan")
+    residual: float = float("nan")
+    identified: int | None = None
+    times: Numbers = field(default_factory=lambda: np.empty(0))
+    signals: dict[str, Numbers] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    failure: str | None = None
+
+
+def compute_point(task: PointTask) -> PointResult:
+    """Steady state, modes and response of one point; what fails becomes part of the result."""
+    result = PointResult(task.X_L, task.scenario)
+    try:
+        with ThreadpoolController().limit(limits=1):
+            _compute(task, result)
+    except CosimError as error:
+        result.failure = str(error)
+    return result
+
+
+def _compute(task: PointTask, result: PointResult) -> None:
+    case = load_case(task.case)
+    (prepared,) = case.prepare([task.scenario], {**task.values, "grid.X_L": task.X_L})
+    recorder = Recorder(prepared.record, prepared.record_every)
+    with running(prepared) as master:
+        converter = master.components.get(CONVERTER)
+        if converter is not None and (task.black_box or is_black_box(converter)):
+            boxed = linearize_with_box(master, CONVERTER)
+            result.residual, result.identified = boxed.residual, len(boxed.identified.A)
+            _keep_modes(result, boxed.model)
+        else:
+            found = modes_of(case, prepared, master, COMPUTED)
+            result.residual, result.warnings = found.operating_point.residual, found.warnings
+            _keep_modes(result, found.model)
+        f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
+        try:
+            master.run(prepared.stop_time, prepared.events, [recorder])
+        finally:
+            _keep_signals(result, recorder, master, f_n)
+
+
+def _keep_modes(result: PointResult, model: LinearModel) -> None:
+    spectrum = find_spectrum(model, *COMPUTED)
+    rows = [[mode.left for mode in spectrum.modes], [mode.shape for mode in spectrum.modes]]
+    left, right = (_matrix(vectors, model.names) for vectors in rows)
+    values = np.array([mode.eigenvalue for mode in spectrum.modes], dtype=complex)
+    result.modes = ModeSet(values, left, right, model.names)
+    result.components = [_in_words(mode) for mode in spectrum.modes]
+    result.growth = spectrum.growth_rate
+
+
+def _matrix(vectors: list[dict[str, complex]], names: tuple[str, ...]) -> NDArray[np.complex128]:
+    return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(len(vectors), len(names))
+
+
+def _in_words(mode: Mode) -> str:
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in mode.by_component.items() if share >= 0.01)
+
+
+def _keep_signals(result: PointResult, recorder: Recorder, master: Master, f_n: float) -> None:
+    recorded = dict(zip(recorder.names, recorder.values.T.copy(), strict=True))
+    result.times = recorder.times.copy()
+    angles = (recorded.pop("grid.bus_2.v_re"), recorded.pop("grid.bus_2.v_im"))
+    if len(result.times) > 1:
+        recorded[FREQUENCY] = bus_frequency(result.times, *angles, f_n)
+    result.signals = recorded
+    for name in recorded:
+        component, _, variable = name.partition(".")
+        known = master.components[component].description.variables if component in master.components else {}
+        result.units[name] = known[variable].unit if variable in known else "Hz"
+
+
+def bus_frequency(times: Numbers, v_re: Numbers, v_im: Numbers, f_n: float) -> Numbers:
+    """Frequency of a voltage [Hz]: the turn of its angle over one period of the grid, around each instant.
+
+    Over a whole period the 50 Hz component of an electromagnetic transient drops out.
+    """
+    angle = np.unwrap(np.angle(v_re + 1j * v_im))
+    half = max(1, round(0.5 / f_n / (times[1] - times[0])))
+    last = len(times) - 1
+    here = np.arange(len(times))
+    before, after = np.maximum(here - half, 0), np.minimum(here + half, last)
+    return np.asarray(f_n + (angle[after] - angle[before]) / (times[after] - times[before]) / (2 * np.pi))

@@ -1,0 +1,38 @@
+"""What the report says of the study and of how the norm was read."""
+
+PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
+
+STUDY = """<p>SG1 (1500 MVA, 1350 MW, ST4B with PSS2A, no governor) and the converter (1500 MVA, 1350 MW) feed bus 2,
+SG2 (5000 MVA, ST1, IEEEG1) feeds bus 3; the line between them has the reactance X_L on 100 MVA and carries 100 MW.
+Loads: 2600 MW at bus 2 (1250 MW without the converter) and 4000 MW at bus 3, active power in proportion to the
+voltage. Both buses are held at 1.0 pu. The network, the machines and the loads are electromagnetic-transient models in
+the frame that turns at rated frequency; all parts are FMUs, coupled every 100 µs. Modes are those of the linearised
+coupled system. After 1 s the voltage reference of SG2 rises by 0.02 pu.</p>"""
+
+_BY_FREQUENCY = "A POD-P is active, so the frequency at bus 2 is watched: the turn of its voltage's angle over 20 ms."
+_BY_POWER = "No POD-P is active, so SG1's active power at bus 2 is watched."
+
+_READING = """<ol>
+<li>Eigenvalue criterion: every mode from 0.1 to 1.5 Hz of the system with the converter has at least 5 % of damping. A
+mode with less is accepted only where the same mode had less than 5 % without the converter already. Modes are matched
+by their left and right eigenvectors over the states that both systems have; a mode whose likeness to all others is
+below 0.5 counts as introduced.</li>
+<li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter.</li>
+<li>{watched}</li>
+<li>Turning points are those from which the signal moves back by more than 0.1 % of its range after the event. The
+first one, towards which the oscillation starts, is left out; the result with it is given as well.</li>
+<li>ΔPkMk is the vertical distance from the minimum Mk to the straight line from maximum Pk to maximum Pk+1. Accepted
+is ΔP5M5 &lt; 0.25·ΔP1M1. Where there is no fifth swing because no turning point follows for 10 s, a period of the
+slowest judged mode, the oscillation has died out, and ΔP5M5 is 0.</li>
+<li>Alternatively all modes from 0.1 to 1.5 Hz that the matrix pencil finds in the signal, from half a second after the
+event on and with an amplitude of at least 1 % of the largest, have more than 5 %. The time-domain criterion is met by
+either way.</li>
+<li>A converter passes that meets the eigenvalue criterion and the time-domain criterion at every X_L.</li>
+<li>Active loads of constant current become so with a lag of 1 ms; within it they are conductances. Without a lag the
+voltage of a bus without capacitance would not be determined. With 5 ms no damping moves by more than 0.2 points.</li>
+</ol>"""
+
+
+def reading(pod: str) -> str:
+    """Rules as they were applied, with what had to be decided."""
+    return _READING.format(watched=_BY_FREQUENCY if "p" in pod.removeprefix("none") else _BY_POWER)

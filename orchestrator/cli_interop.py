@@ -1,0 +1,156 @@
+"""``gfor which-master`` and ``gfor run --like``: other people's masters."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.interop.candidates import Candidate
+from orchestrator.interop.instructions import instructions
+from orchestrator.interop.masters import MASTERS, master_rules
+from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.rules import MasterRules
+from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Verdict, identify
+from orchestrator.report.storage import save_dataset
+from orchestrator.study.like import run_like
+
+_WORDS: dict[str, tuple[str, dict[Any, str]]] = {
+    # property: what it is called, what its values mean
+    "order": ("Components step", {"side by side": "side by side (Jacobi)", "a, then b": "a, then b (Gauss-Seidel)",
+                                  "b, then a": "b, then a (Gauss-Seidel)"}),
+    "first_inputs": ("Inputs of the first step", {"consistent": "outputs, propagated until consistent",
+                                                  "once": "outputs as read after initialisation",
+                                                  "start": "their start values", "zero": "zero"}),
+    "extrapolation": ("Inputs within a step", {0.0: "held", 0.5: "extrapolated to the middle of the step",
+                                               1.0: "extrapolated to the end of the step"}),
+    "wire_by_wire": ("Connections are served", {False: "all at once", True: "one after the other"}),
+    "after_exchange": ("Outputs are recorded", {False: "with the inputs of the step",
+                                                True: "with the inputs of the next step"}),
+    "early_label": ("A row labelled t holds", {0: "what is reached at t", 1: "what is reached one step after t",
+                                               -1: "what was reached one step before t"}),
+}  # fmt: skip
+
+
+def add_like(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor run`` that make it run as another master."""
+    parser.add_argument("--like", metavar="MASTER",
+                        help=f"only trajectories, as another master would give them: {', '.join(MASTERS)}")  # fmt: skip
+    parser.add_argument("--order", metavar="A,B,…",
+                        help="with --like: in which order components step, where they take turns")  # fmt: skip
+
+
+def add_which_master(parser: argparse.ArgumentParser, platforms: Sequence[str]) -> None:
+    """Arguments of ``gfor which-master``."""
+    parser.add_argument("result", type=Path, nargs="?", metavar="RESULT.csv", help="what the tool gave")
+    parser.add_argument("--build", type=Path, metavar="DIR", help="write the probe pair and how to run it")
+    parser.add_argument("--platform", action="append", choices=platforms,
+                        help="with --build: compile for this one (repeatable; default: this machine's)")  # fmt: skip
+    parser.add_argument("--step", type=float, default=STEP_SIZE, metavar="H",
+                        help=f"communication step that the tool had [s] ({STEP_SIZE:g})")  # fmt: skip
+    parser.add_argument("--stop", type=float, default=STOP_TIME, metavar="T", help=f"its duration [s] ({STOP_TIME:g})")
+    parser.add_argument("--column", action="append", default=[], metavar="SIGNAL=HEADING",
+                        help="heading of the column for time, a.y, b.y, … (repeatable)")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+# -- gfor run --like -------------------------------------------------------------------------------
+
+
+def like_of(options: argparse.Namespace) -> MasterRules | None:
+    """The master that a run is to follow; None for our own.
+
+    Raises
+    ------
+    InputError
+        If it is not known, or an order is given without it.
+    """
+    if options.order and not options.like:
+        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+    return master_rules(options.like) if options.like else None
+
+
+def run_like_master(
+    case: Case, scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace
+) -> int:
+    """Run scenarios as another master would; their trajectories are all that is written."""
+    order = options.order.split(",") if options.order else None
+    folder = options.out or Path("results") / f"{case.name}_like_{rules.name}"
+    for prepared in scenarios:
+        dataset = run_like(case, prepared, rules, order)
+        path = folder / prepared.name / "trajectory"
+        save_dataset(dataset, path)
+        print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
+    return 0
+
+
+# -- gfor which-master -----------------------------------------------------------------------------
+
+
+def write_instructions(folder: Path, options: argparse.Namespace, platforms: Sequence[str]) -> Path:
+    """The page beside the probe pair."""
+    path = folder / "INSTRUCTIONS.md"
+    path.write_text(instructions(options.step, options.stop, tuple(platforms)), encoding="utf-8")
+    return path
+
+
+def run_which_master(options: argparse.Namespace, console: Console) -> int:
+    """Tell which schedule gave a result; 0 where one or several do, 1 where none of those known does."""
+    named = dict(_named(text) for text in options.column)
+    verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
+    if options.json:
+        print(json.dumps(_json(verdict), indent=1, ensure_ascii=False))
+    else:
+        _print(verdict, console)
+    return 0 if verdict.fits else 1
+
+
+def _named(text: str) -> tuple[str, str]:
+    signal, equals, heading = text.partition("=")
+    if not equals or not heading:
+        raise InputError(f"--column {text}: write SIGNAL=HEADING, such as a.y=Probe1.Output")
+    return signal.strip(), heading.strip()
+
+
+def _print(verdict: Verdict, console: Console) -> None:
+    compared = f"{verdict.rows} rows compared, largest difference {verdict.difference:.1e}"
+    if not verdict.fits:
+        console.print(f"None of the schedules known here gives these values ({compared}). The nearest is: "
+                      f"{_in_words(verdict.nearest)}.\nCheck connections, start values, --step and --stop; a master "
+                      "that repeats steps or solves for its inputs is not among them.", soft_wrap=True)  # fmt: skip
+        return
+    table = Table(title=f"Schedule ({compared})", title_justify="left", show_header=False)
+    for name, (title, words) in _WORDS.items():
+        told = [words[value] for value in verdict.answers(name)]
+        table.add_row(title, told[0] if len(told) == 1 else "not told: " + " or ".join(told))
+    table.add_row(f"Steps until the last row, {verdict.last_row * verdict.step_size:g} s",
+                  "not told" if verdict.steps is None else f"{verdict.steps} (N = {verdict.intervals})")  # fmt: skip
+    table.add_row("Known masters that do so", ", ".join(verdict.masters) or "none")
+    console.print(table)
+    if len(verdict.fits) > 1:
+        console.print("These schedules give the same values here:", *(f"- {_in_words(f)}" for f in verdict.fits),
+                      sep="\n", soft_wrap=True)  # fmt: skip
+
+
+def _in_words(candidate: Candidate) -> str:
+    return "; ".join(f"{title.lower()} {words[getattr(candidate, name)]}" for name, (title, words) in _WORDS.items())
+
+
+def _json(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "fits": [asdict(fit) for fit in verdict.fits],
+        "told": {name: a[0] if len(a) == 1 else None for name in PROPERTIES for a in [verdict.answers(name)]},
+        "nearest": asdict(verdict.nearest),
+        "difference": verdict.difference,
+        "rows": verdict.rows,
+        "steps": verdict.steps,
+        "intervals": verdict.intervals,
+        "masters": list(verdict.masters),
+    }

@@ -1,0 +1,81 @@
+"""A system run as another master would run it, by our own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.events import Event
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.system import System
+from orchestrator.errors import InputError
+from orchestrator.interop.rules import MasterRules
+
+
+@dataclass(frozen=True)
+class Emulation:
+    """What the other master would have recorded.
+
+    Attributes
+    ----------
+    times
+        Its labels [s], shape (n,).
+    values
+        Shape (n, number of names).
+    names
+        ``component.variable``.
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    names: tuple[str, ...]
+
+
+def emulate(
+    system: System,
+    rules: MasterRules,
+    step_size: float,
+    stop_time: float,
+    record: Sequence[str],
+    every: int = 1,
+    events: Sequence[Event] = (),
+    order: Sequence[str] | None = None,
+    observers: Sequence[Observer] = (),
+) -> Emulation:
+    """Run a system along another master's rules.
+
+    Parameters
+    ----------
+    step_size, stop_time
+        [s]
+    record
+        Names ``component.variable``.
+    every
+        Steps between two rows; the first row is that with label 0.
+    events
+        They happen before the step that starts at their time, as with our own schedules; most masters have none.
+    order
+        In which the components step, for a master that takes them in turn; by default the system's own.
+
+    Raises
+    ------
+    InputError
+        If the stop time is no communication point, or the order does not fit the master or the system.
+    ComponentError
+        If an FMU fails.
+    """
+    clock = Clock(step_size)
+    last = min(clock.index(stop_time, "the stop"), rules.rows(step_size, stop_time) - 1)
+    if last < 0:
+        raise InputError(f"a run of {stop_time:g} s has no row in {rules.title}; give a longer one")
+    recorder = Recorder(record, every, after_exchange=rules.after_exchange)
+    schedule = rules.schedule(tuple(system.components), order)
+    with Master(system, schedule, step_size, stop_time) as master:
+        master.run(clock.time(rules.early_label), events)
+        master.run(clock.time(last + rules.early_label), events, [recorder, *observers])
+    times = np.array([clock.time(row * every) for row in range(len(recorder.times))])
+    return Emulation(times, recorder.values, tuple(record))

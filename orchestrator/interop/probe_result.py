@@ -1,0 +1,125 @@
+"""A foreign tool's output of the probe pair, however it names and separates its columns."""
+
+import csv
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import InputError
+from orchestrator.interop.candidates import SIGNALS
+
+_TIMES = ("time", "t", "zeit", "seconds")
+_NEEDED = ("a.y", "b.y")
+
+
+@dataclass(frozen=True)
+class ProbeResult:
+    """What was recorded.
+
+    Attributes
+    ----------
+    times
+        Labels [s], shape (n,), rising.
+    values
+        Shape (n, number of `SIGNALS`); NaN where a signal was not recorded.
+    columns
+        Signal → heading of the column it was read from.
+    """
+
+    times: NDArray[np.float64]
+    values: NDArray[np.float64]
+    columns: dict[str, str]
+
+
+def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> ProbeResult:
+    """Read a CSV file; columns are told by how their headings end (``a.y``, ``probe_a::y``, ``system/a/y [1]``).
+
+    Parameters
+    ----------
+    path
+        Separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
+    named
+        Heading of the column for ``time`` or a signal, where it is not told by its ending.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, the time or both of a.y and b.y are missing, or an entry is no number.
+    """
+    heads, lines = _table(path)
+    columns = _columns(path, heads, dict(named or {}))
+    picked = np.array(
+        [[_number(path, line, heads, columns[s], row) for s in columns] for row, line in enumerate(lines)]
+    )
+    picked = picked[np.argsort(picked[:, 0], kind="stable")]
+    last = np.append(np.diff(picked[:, 0]) > 0, True)  # of rows with one time, before and after an event, the last
+    times, picked = picked[last, 0], picked[last, 1:]
+    values = np.full((len(times), len(SIGNALS)), np.nan)
+    for index, signal in enumerate(list(columns)[1:]):
+        values[:, SIGNALS.index(signal)] = picked[:, index]
+    return ProbeResult(times, values, {signal: heads[column] for signal, column in columns.items()})
+
+
+def _table(path: Path) -> tuple[list[str], list[list[str]]]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{path}: it cannot be read: {error.strerror}; give the tool's output as CSV") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: it is not text ({error}); give the tool's output as CSV") from error
+    filled = [line for line in text.splitlines() if line.strip()]
+    if len(filled) < 2:
+        raise InputError(f"{path}: it has no heading with rows below it; give the tool's output as CSV")
+    separator = max(",;\t", key=filled[0].count)
+    rows = [[entry.strip() for entry in row] for row in csv.reader(filled, delimiter=separator)]
+    return rows[0], [_with_points(row) if separator != "," else row for row in rows[1:]]
+
+
+def _with_points(row: list[str]) -> list[str]:
+    return [entry.replace(",", ".") if "." not in entry else entry for entry in row]
+
+
+def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, int]:
+    """Signal → index of its column, the time first."""
+    unknown = [signal for signal in named if signal not in ("time", *SIGNALS)]
+    if unknown:
+        raise InputError(f"there is no signal {', '.join(unknown)}; signals: time, {', '.join(SIGNALS)}")
+    found: dict[str, int] = {}
+    for signal in ("time", *SIGNALS):
+        if signal in named and named[signal] not in heads:
+            raise InputError(f"{path}: it has no column {named[signal]!r}; columns: {', '.join(heads)}")
+        fitting = [named[signal]] if signal in named else [head for head in heads if _means(head, signal)]
+        if len(fitting) > 1:
+            raise InputError(f"{path}: {signal} may be any of {', '.join(fitting)}; say which with --column {signal}=…")
+        if fitting:
+            found[signal] = heads.index(fitting[0])
+    if "time" not in found or not any(signal in found for signal in _NEEDED):
+        missing = "time" if "time" not in found else " and ".join(_NEEDED)
+        raise InputError(
+            f"{path}: no column is seen to be {missing}; columns: {', '.join(heads)}; "
+            f"say which with --column {missing.split(' ')[0]}=…"
+        )
+    return found
+
+
+def _means(head: str, signal: str) -> bool:
+    plain = re.sub(r"\[[^\]]*\]\s*$|\([^)]*\)\s*$", "", head).strip().strip("\"'").lower()
+    plain = re.sub(r"[^a-z0-9]+", ".", plain).strip(".")
+    if signal == "time":
+        return plain in _TIMES
+    return f".{plain}".endswith("." + signal.replace("_", "."))
+
+
+def _number(path: Path, line: list[str], heads: list[str], column: int, row: int) -> float:
+    entry = line[column] if column < len(line) else ""
+    try:
+        value = float(entry)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InputError(f"{path}, row {row + 1}, column {heads[column]!r}: {entry!r} is not a finite number")
+    return value

@@ -1,0 +1,93 @@
+"""What tells one master from another: every choice that changes a result to its last digits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from orchestrator.coupling.schedule import FirstInputs, Schedule
+from orchestrator.errors import InputError
+
+Steps = Literal["side by side", "in turn"]
+"""Jacobi: all components step with the outputs of the step before. Gauss-Seidel: each sees those that stepped first."""
+
+LastLabel = Literal["stop", "before stop", "sum below stop", "sum up to stop"]
+"""The label of the last row.
+
+The stop time; a step before it; or, where the time is summed up step by step, so that rounding decides: the last label
+below the stop time, or the last that a step reaches without going beyond it.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class MasterRules:
+    """The schedule of a master.
+
+    Attributes
+    ----------
+    name, title
+        For the command line, and for people; the version that was looked at.
+    steps
+        Jacobi or Gauss-Seidel.
+    first_inputs
+        What connected inputs hold in the first step; see `FirstInputs`.
+    early_label
+        A row labelled t holds what t/H + ``early_label`` steps gave: 1 where the time is noted before the step and the
+        outputs after it.
+    after_exchange
+        Outputs are recorded after the inputs for the next step were handed over; else with the inputs of the step.
+    extrapolation, wire_by_wire, ticks_per_second
+        See `Schedule`.
+    last_label
+        See `LastLabel`.
+    source
+        Where each of these is to be seen.
+    """
+
+    name: str
+    title: str
+    steps: Steps
+    first_inputs: FirstInputs = "consistent"
+    early_label: int = 0
+    after_exchange: bool = False
+    extrapolation: float = 0.0
+    wire_by_wire: bool = False
+    ticks_per_second: int | None = None
+    last_label: LastLabel = "stop"
+    source: str = ""
+
+    def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
+        """The schedule for a system.
+
+        Parameters
+        ----------
+        components
+            All of them, in the order in which the master was given them.
+        order
+            The order in which they step, where that is another; for Gauss-Seidel only.
+
+        Raises
+        ------
+        InputError
+            If an order is given to a master that has none, or does not list every component once.
+        """
+        if self.steps == "side by side":
+            if order is not None:
+                raise InputError(f"{self.title} steps all components side by side, so that they have no order")
+            groups: tuple[tuple[str, ...], ...] = (tuple(components),)
+        else:
+            groups = tuple((name,) for name in (order or components))
+        chosen = Schedule(
+            self.name, groups, self.first_inputs, self.extrapolation, self.wire_by_wire, self.ticks_per_second
+        )
+        chosen.check(set(components))
+        return chosen
+
+    def rows(self, step_size: float, stop_time: float) -> int:
+        """How many rows the master records, one a step, from label 0 on."""
+        if not self.last_label.startswith("sum"):
+            return round(stop_time / step_size) + (self.last_label == "stop")
+        time, steps, ahead = 0.0, 0, step_size if self.last_label == "sum up to stop" else 0.0
+        while time + ahead < stop_time or (ahead and time + ahead == stop_time):
+            time += step_size
+            steps += 1
+        return steps + bool(ahead)

@@ -1,0 +1,51 @@
+"""Modes of the two-area system with the converter as a black box, against those from its states."""
+
+import pytest
+
+from orchestrator.black_box.coupled_modes import component_participation, is_black_box, linearize_with_box
+from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.cases.case import load_case
+from orchestrator.errors import InputError
+from orchestrator.study.modes import modes_of, running
+from tests.black_box import boxes
+
+SHORT = Excitation(lowest_hz=0.5, lines=80, settled=1e-3)
+
+
+def compare(master, case, prepared, excitation, restore, hertz, points):
+    white = modes_of(case, prepared, master, (0.1, 2.0))
+    boxed = linearize_with_box(master, "gfor", excitation, restore=restore)
+    assert boxed.residual < 1e-9
+    found = boxed.modes()
+    oscillating = [m for m in white.modes if m.damping_ratio < 0.5]
+    assert white.electromechanical in oscillating
+    for mode in oscillating:
+        same = min(found, key=lambda m: abs(m.eigenvalue - mode.eigenvalue))
+        assert same.frequency_hz == pytest.approx(mode.frequency_hz, abs=hertz)
+        assert same.damping_percent == pytest.approx(mode.damping_percent, abs=points)
+        assert boxed.participation(same) == pytest.approx(component_participation(mode, "gfor"), abs=0.01)
+
+
+def test_without_its_slow_part_measured_the_mode_is_still_there():
+    case, prepared = load_case("two_area"), boxes.prepared("gfor")
+    with running(prepared) as master:
+        compare(master, case, prepared, SHORT, True, 0.01, 0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["gfor", "pod_p", "pod_q", "pod_pq"])
+def test_all_scenarios_with_and_without_saved_states(scenario):
+    case, prepared = load_case("two_area"), boxes.prepared(scenario)
+    with running(prepared) as master:
+        before = master.y.copy()
+        compare(master, case, prepared, Excitation(), True, 0.001, 0.01)
+        compare(master, case, prepared, Excitation("pulse"), False, 0.001, 0.01)
+        assert (master.y == before).all()
+        assert master.index == 0
+
+
+def test_our_own_fmus_are_no_black_boxes_and_an_unknown_one_is_refused():
+    with running(boxes.prepared("gfor")) as master:
+        assert not is_black_box(master.components["gfor"])
+        with pytest.raises(InputError, match="no component 'vendor'"):
+            linearize_with_box(master, "vendor")

@@ -1,0 +1,94 @@
+"""The norm's criteria on modes, on systems small enough to see the answer."""
+
+import numpy as np
+import pytest
+
+from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.certification.criteria import eigenvalue_test, modal_test, stability_fault
+from orchestrator.certification.point import bus_frequency
+
+
+def mode(frequency, ratio):
+    return 2 * np.pi * frequency / np.sqrt(1 - ratio**2) * complex(-ratio, np.sqrt(1 - ratio**2))
+
+
+def modes(*entries):
+    """A set of modes, each of a frequency, a damping ratio and a state of its own."""
+    states = sorted({name for *_, name in entries} | {"a", "b", "c", "d"})
+    shapes = np.array([[float(name == state) for state in states] for *_, name in entries], dtype=complex)
+    values = np.array([mode(f, ratio) for f, ratio, _ in entries])
+    return ModeSet(values, shapes, shapes, tuple(states))
+
+
+def verdict(having, lacking):
+    (found,) = eigenvalue_test(modes(having), modes(*lacking))
+    return found
+
+
+def test_enough_damping_is_accepted_whatever_was_before():
+    assert verdict((0.5, 0.051, "a"), [(0.5, 0.2, "a")]).accepted
+    assert verdict((0.5, 0.051, "a"), []).accepted
+
+
+def test_a_mode_that_is_introduced_needs_five_percent():
+    found = verdict((0.5, 0.049, "converter"), [(0.5, 0.049, "a")])
+    assert not found.accepted
+    assert found.before is None
+    assert "introduces" in found.reason
+
+
+def test_an_existing_mode_must_not_be_taken_below_five_percent():
+    found = verdict((0.5, 0.049, "a"), [(0.9, 0.03, "b"), (0.55, 0.06, "a")])
+    assert not found.accepted
+    assert found.before == pytest.approx(mode(0.55, 0.06))
+    assert "takes a mode from 6.00 % to 4.90 %" in found.reason
+
+
+def test_a_mode_that_was_below_already_is_not_the_converters_doing():
+    assert verdict((0.5, 0.02, "a"), [(0.55, 0.03, "a")]).accepted
+
+
+@pytest.mark.parametrize(("frequency", "judged"), [(0.099, False), (0.1, True), (1.5, True), (1.501, False)])
+def test_only_modes_from_a_tenth_to_one_and_a_half_hertz_are_judged(frequency, judged):
+    assert bool(eigenvalue_test(modes((frequency, -0.1, "a")), modes((0.5, 0.1, "b")))) == judged
+
+
+def test_growth_is_a_fault_at_any_frequency_unless_it_was_there_before():
+    assert stability_fault(0.5, 1e-6)
+    assert stability_fault(0.5, 0.4) is None
+    assert stability_fault(1e-5, -0.1) is None
+
+
+TIMES = np.arange(0, 40, 0.005)
+
+
+def ring(*parts):
+    return sum(a * np.exp(mode(f, r).real * TIMES) * np.cos(mode(f, r).imag * TIMES) for a, f, r in parts)
+
+
+def test_the_signals_modes_are_judged():
+    good = modal_test(TIMES, ring((1, 0.4, 0.08), (0.5, 1.1, 0.06)), 0.5)
+    assert good.accepted
+    assert sorted(m.damping_percent for m in good.modes) == pytest.approx([6, 8], abs=0.01)
+    bad = modal_test(TIMES, ring((1, 0.4, 0.08), (0.05, 1.1, 0.04)), 0.5)
+    assert not bad.accepted
+    assert "1.100 Hz has 4.00 %" in bad.reason
+
+
+def test_what_lies_outside_the_range_or_is_negligible_is_not_judged():
+    assert modal_test(TIMES, ring((1, 0.4, 0.08), (0.5, 2.0, 0.01)), 0.5).accepted
+    assert modal_test(TIMES, ring((1, 0.4, 0.08), (0.004, 1.1, 0.03)), 0.5).accepted
+    assert modal_test(TIMES, np.exp(-TIMES), 0.5).accepted
+    assert not modal_test(TIMES, np.ones_like(TIMES), 0.5).accepted  # nothing was excited: nothing is shown
+
+
+def test_the_bus_frequency_is_the_turn_of_the_angle_without_the_network_transient():
+    drift, swing = 0.2, 0.01 * np.sin(2 * np.pi * 0.5 * TIMES)
+    angle = 2 * np.pi * (drift * TIMES) + swing
+    transient = 1e-3 * np.exp(-3 * TIMES) * np.exp(-2j * np.pi * 50 * TIMES)  # a direct current, seen from the frame
+    v = np.exp(1j * angle) + transient * np.exp(2j * np.pi * drift * TIMES)
+    found = bus_frequency(TIMES, v.real, v.imag, 50.0)
+    wanted = 50 + drift + np.gradient(swing, TIMES) / (2 * np.pi)
+    decay_in_a_period = 1e-3 * (1 - np.exp(-3 * 0.02)) / (2 * np.pi * 0.02)  # 0.5 mHz; unfiltered it would be 50 mHz
+    assert np.abs(found - wanted)[10:-10].max() < decay_in_a_period
+    assert np.abs(found - wanted)[1000:-10].max() < 1e-5

@@ -1,0 +1,89 @@
+"""The norm's time-domain criterion on signals whose answer is known."""
+
+import numpy as np
+import pytest
+
+from orchestrator.certification.swings import extrema, swing_test
+
+TIMES = np.arange(0, 61, 0.005)
+EVENT = 1.0
+
+
+def damped(ratio, frequency=0.5, sign=1.0, times=TIMES):
+    """A swing around a step, as a well-kept textbook draws it."""
+    omega, after = 2 * np.pi * frequency, np.clip(times - EVENT, 0, None)
+    return 0.9 + sign * 0.02 * (
+        1 - np.exp(-ratio * omega * after) * np.cos(omega * np.sqrt(1 - ratio**2) * after)
+    )  # fmt: skip
+
+
+def ratio_after_four_periods(ratio):
+    return np.exp(-8 * np.pi * ratio / np.sqrt(1 - ratio**2))
+
+
+@pytest.mark.parametrize("ratio", [-0.01, 0.0, 0.02, 0.05, 0.0545, 0.0556, 0.08, 0.12])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("frequency", [0.2, 0.5, 1.4])
+def test_the_ratio_is_that_of_four_periods_and_its_limit_lies_at_five_and_a_half_percent(ratio, sign, frequency):
+    test = swing_test(TIMES, damped(ratio, frequency, sign), EVENT)
+    assert test.ratio == pytest.approx(ratio_after_four_periods(ratio), rel=0.01)
+    assert test.accepted == (ratio > 0.0551)
+
+
+def test_the_distances_can_be_checked_by_hand():
+    """Straight pieces: maxima 10 at 2 s, 8 at 6 s, minimum 1 at 3 s; the line is at 9.5 there."""
+    corners = [(0, 0.0), (1, 0.0), (1.5, -1.0), (2, 10.0), (3, 1.0), (6, 8.0), (8, 2.0), (9, 6.0), (40, 5.0)]
+    times = np.linspace(0, 40, 40001)
+    test = swing_test(times, np.interp(times, *zip(*corners, strict=True)), EVENT)
+    assert (test.dropped.time, test.dropped.value, test.dropped.is_maximum) == (pytest.approx(1.5), -1.0, False)
+    first, second = test.swings
+    assert (first.before.value, first.minimum.value, first.after.value) == pytest.approx((10.0, 1.0, 8.0), abs=1e-3)
+    assert first.line == pytest.approx(9.5, abs=1e-3)
+    assert first.depth == pytest.approx(8.5, abs=2e-3)
+    assert second.depth == pytest.approx(8 - 2 * 2 / 3 - 2, abs=3e-3)  # the line falls from 8 at 6 s to 6 at 9 s
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_first_extremum_is_left_out(sign):
+    signal = damped(0.1, sign=sign)
+    points = extrema(TIMES, signal, EVENT)
+    test, other = swing_test(TIMES, signal, EVENT), swing_test(TIMES, signal, EVENT, drop_first=False)
+    assert test.dropped == points[0]
+    assert points[0].is_maximum == (sign > 0)
+    assert other.dropped is None
+    kept = [p for p in points[1:] if p.is_maximum]
+    assert test.swings[0].before == kept[0]
+    if sign > 0:
+        assert other.swings[0].before == points[0]
+
+
+def test_a_slow_trend_does_not_count_as_a_swing():
+    trend = 0.05 * (1 - np.exp(-(TIMES - EVENT).clip(0) / 15))
+    test = swing_test(TIMES, damped(0.06) + trend, EVENT)
+    assert test.accepted
+    assert test.ratio == pytest.approx(ratio_after_four_periods(0.06), rel=0.05)
+
+
+def test_what_died_out_before_the_fifth_swing_is_accepted():
+    test = swing_test(TIMES, damped(0.3), EVENT)
+    assert test.accepted
+    assert test.ratio == 0.0
+    assert "died out" in test.reason
+
+
+def test_a_record_that_ends_too_early_is_not_accepted():
+    short = TIMES[TIMES < 6]
+    test = swing_test(short, damped(0.02, times=short), EVENT)
+    assert not test.accepted
+    assert test.ratio is None
+    assert "record ends" in test.reason
+
+
+def test_a_signal_that_is_not_finite_is_not_accepted():
+    signal = damped(0.2)
+    signal[-1] = np.nan
+    assert not swing_test(TIMES, signal, EVENT).accepted
+
+
+def test_a_signal_that_does_not_move_is_accepted():
+    assert swing_test(TIMES, np.full_like(TIMES, 0.9), EVENT).accepted
