@@ -207,7 +207,7 @@ def _parser() -> argparse.ArgumentParser:
     admittance = commands.add_parser("admittance", help="measure a device's admittance, and fit a model to it")
     cli_black_box.add_admittance(admittance, _seconds, cli_certify.setting)
     admittance.set_defaults(
-        command=lambda o: cli_black_box.run_admittance(o, _console(stderr=o.json), read_description(o.fmu))
+        command=lambda options: cli_black_box.run_admittance(options, _console(stderr=options.json))
     )
 
     black_box = commands.add_parser("black-box", help="modes of a case with a component known by its port alone")

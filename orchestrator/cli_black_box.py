@@ -30,6 +30,7 @@ from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.study.modes import modes_of, running
+from orchestrator.vendor.binding import bound_fmu
 
 _DEFAULTS = Excitation()
 
@@ -49,7 +50,8 @@ def add_excitation(parser: argparse.ArgumentParser, seconds: Callable[[str], flo
 
 def add_admittance(parser: argparse.ArgumentParser, seconds: Callable[[str], float], assignment: Any) -> None:
     """Arguments of ``gfor admittance``."""
-    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device with our port")
+    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device")
+    parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument("--set", action="append", default=[], type=assignment, metavar="VARIABLE=VALUE",
                         help="a value of the FMU, such as P_0=0.9 or pod_p.enabled=true (repeatable)")  # fmt: skip
     parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step [s] (100 us)")
@@ -64,8 +66,9 @@ def add_black_box(parser: argparse.ArgumentParser) -> None:
     add_excitation(parser, float)
 
 
-def run_admittance(options: argparse.Namespace, console: Console, description: FmuDescription) -> int:
+def run_admittance(options: argparse.Namespace, console: Console) -> int:
     """Measure, fit, write, and say what was found."""
+    description = bound_fmu(options.fmu, options.binding)
     values = _values(description, dict(options.set))
     magnitude, angle = (float(values.get(name, _start(description, name))) for name in ("v_0", "theta_0"))
     rest = cmath.rect(magnitude, angle)
@@ -147,7 +150,7 @@ def _check_port(description: FmuDescription, bench: TestBench) -> None:
     if missing:
         raise InputError(
             f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
-            "a vendor.toml maps another FMU's variables"
+            "a vendor.toml maps another FMU's variables; give it with --binding"
         )
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
-from orchestrator.analysis.embedded_model import embedded_model
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, find_spectrum
@@ -56,9 +55,7 @@ class BoxedSystem:
 
 def is_black_box(component: Component) -> bool:
     """Whether a component does not show its states, so that it cannot be perturbed like the others."""
-    return obstacle(component) is not None or not (
-        component.description.states_are_settable or embedded_model(component) is not None
-    )
+    return obstacle(component) is not None
 
 
 def component_participation(mode: Mode, component: str) -> float:
@@ -104,6 +101,7 @@ def linearize_with_box(
         held=plan.inputs,
         step_size=master.clock.step_size,
         restore=restore,
+        isolated=plan.isolated,
     )
     response = measure(bench, excitation or Excitation())
     moved = float(np.abs(response.operating_point - exchange.outputs.values).max())

@@ -19,6 +19,7 @@ from fmus.toolchain.compiler import compile_library, host_platform
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.instance import open_component
 
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
@@ -49,6 +50,8 @@ class TestBench:
         Communication step [s].
     restore
         Whether the FMU's state may be saved and restored; None for: if the FMU can.
+    isolated
+        As in `open_component`.
     longest_wait
         Time [s] after which a device that does not stand still is given up.
     """
@@ -61,6 +64,7 @@ class TestBench:
     held: Mapping[str, float] = field(default_factory=dict)
     step_size: float = 1e-4
     restore: bool | None = None
+    isolated: bool | None = None
     longest_wait: float = 120.0
 
     @property
@@ -161,7 +165,7 @@ class Runs:
 
     def _start(self) -> None:
         bench = self._bench
-        component = self._component = Component("box", bench.description)
+        component = self._component = open_component("box", bench.description, isolated=bench.isolated)
         component.set(bench.parameters)
         component.setup(0.0, None)
         component.enter_initialization_mode()
