@@ -178,7 +178,7 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
     return FmuDescription(
         path=path,
         guid=md.guid,
-        model_name=md.modelName,
+        model_name=md.modelName or "",
         title=md.description or "",
         model_identifier=md.coSimulation.modelIdentifier,
         generation_tool=md.generationTool or "",
@@ -205,7 +205,11 @@ def _check_names(path: Path, md: ModelDescription) -> None:
         raise FmuFileError(
             f"{path}: modelIdentifier is {identifier[:80]!r}; it must be a C identifier, since it names the binary"
         )
+    if not md.guid:
+        raise FmuFileError(f"{path}: modelDescription.xml has no guid, which the binary is told; export it again")
     for v in md.modelVariables:
+        if not v.name:
+            raise FmuFileError(f"{path}: modelDescription.xml has a variable without a name; export it again")
         if not 0 <= int(v.valueReference) < 2**32:
             raise FmuFileError(
                 f"{path}: {v.name[:80]!r} has valueReference {str(v.valueReference)[:20]}; 0 to 2³²−1 is allowed"

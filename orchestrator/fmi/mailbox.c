@@ -59,7 +59,7 @@ static int is_orphan(int64_t parent) { return (int64_t)getppid() != parent; }
 #endif
 
 enum { MOST = 16384, TEXT = 1 << 20, LOG = 8192 };
-enum { OK = 0, ERROR = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66 };
+enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66 };
 enum { EXCHANGE = 1, TALK = 2 };
 enum { SET = 1, STEP = 2, GET = 4 };
 
@@ -151,7 +151,7 @@ EXPORT int mailbox_talk(struct mailbox *box) {
 
 EXPORT int client_set_real(struct mailbox *box, const unsigned *references, size_t n, const double *values) {
     int status = OK;
-    if (n > MOST) return ERROR;
+    if (n > MOST) return REFUSED;
     if (box->n_set + (int64_t)n > MOST && (status = exchange(box, 0)) > 1) return status;
     memcpy(box->set_references + box->n_set, references, n * sizeof *references);
     memcpy(box->set_values + box->n_set, values, n * sizeof *values);
@@ -162,7 +162,7 @@ EXPORT int client_set_real(struct mailbox *box, const unsigned *references, size
 
 EXPORT int client_get_real(struct mailbox *box, const unsigned *references, size_t n, double *values) {
     int status = OK;
-    if (n > MOST) return ERROR;
+    if (n > MOST) return REFUSED;
     if (!box->fresh || (int64_t)n != box->n_get || memcmp(references, box->get_references, n * sizeof *references)) {
         memcpy(box->get_references, references, n * sizeof *references);
         box->n_get = (int64_t)n;

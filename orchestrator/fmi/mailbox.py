@@ -14,7 +14,7 @@ _SOURCE = Path(__file__).with_name("mailbox.c")
 _MOST = 16384
 _TEXT, _LOG = 1 << 20, 8192
 
-OK, ERROR = 0, 3
+OK = 0
 DIED, HUNG, NOT_A_NUMBER = 64, 65, 66
 """Answers of a mailbox that no FMU gives; those of mailbox.c."""
 

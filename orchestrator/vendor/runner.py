@@ -239,8 +239,6 @@ class _Runner:
         if code < 0 or code > 0x80000000:
             kind = signal.Signals(-code).name if code < 0 else f"code {code:#x}"
             return failed(name, "crash", f"its process died with {kind} in {where}{tail}")
-        if code == 1 and "SystemError" in said:
-            raise InputError(f"{self._report.fmu}: a check could not be made: {said}")
         return failed(name, "exit", f"it ended its process with exit code {code} in {where}{tail}")
 
     def _said(self) -> str:

@@ -90,7 +90,10 @@ def answer(check: Check, subject: Subject, faulty: list[str]) -> Result:
         return failed(check.name, "memory limit", "the process has no memory left")
     except Exception as error:  # a check that fails by itself must not hide the others
         where = traceback.extract_tb(error.__traceback__)[-1]
-        raise SystemError(f"check {check.name}: {error!r} in {where.filename}:{where.lineno}") from error
+        file = Path(where.filename).name
+        return not_applicable(
+            check.name, f"because the check failed by itself: {error!r} in {file}, line {where.lineno}"
+        )
 
 
 if __name__ == "__main__":

@@ -2,10 +2,13 @@
 
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fmus.toolchain.compiler import compile_library
+from orchestrator import fmi
 from orchestrator.coupling.loop import CompiledLoop, PythonLoop
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
@@ -188,3 +191,12 @@ def test_both_loops_step_it(box, monkeypatch):
             master.advance(50)
             ends.append(master.components["box"].get(["i_re", "i_im"]))
     assert ends[0] == ends[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", ["win64", "darwin64"])
+@pytest.mark.parametrize("source", ["mailbox.c", "port_adapter.c"])
+def test_what_is_compiled_can_be_compiled_for_every_platform(source, platform):
+    """Only compiled: it runs on the platforms that the tests run on."""
+    text = Path(fmi.__file__).with_name(source).read_text(encoding="utf-8")
+    assert compile_library(text, platform).stat().st_size > 1000

@@ -62,6 +62,7 @@ def test_the_confusion_table(gallery, fmu_path, tmp_path):
     lines, wrong = [], []
     for (kind, name, fault, *_), report in zip(rows, reports, strict=True):
         caught = (fault in report.faults) if kind == "faulty" else report.trusted
+        assert not [r for r in report.results if "failed by itself" in r.evidence]
         also = [f for f in report.faults if f != fault]
         lines.append(f"| {name} | {fault or '—'} | {'yes' if caught else 'NO'} | {', '.join(also) or '—'} |")
         wrong += [] if caught else [f"{name}: {fault or 'good'}, found {report.faults}: {report.failures}"]

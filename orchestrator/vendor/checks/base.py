@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.vendor.checks.faults import REMEDIES
@@ -46,11 +47,22 @@ class Result:
     figures: dict[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        """As JSON has it, which knows no numbers that are none."""
+        return {**asdict(self), "figures": _plain(self.figures)}
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> "Result":
         return cls(**{**values, "verdict": Verdict(values["verdict"])})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    return float(value) if isfinite(value) else str(value)
 
 
 @dataclass(frozen=True)
