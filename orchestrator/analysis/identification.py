@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from orchestrator.errors import AnalysisError
 
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
+_LARGEST_EXPONENT = 300.0
+"""Of e, within the window: more is no signal, and its square no number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,8 @@ def identify_modes(
     order = min(int((singular > tolerance * singular[0]).sum()), max_order)
     basis = right[:order].T
     multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])
+    if len(y) * np.log(np.abs(multipliers).max(initial=1.0)) > _LARGEST_EXPONENT:
+        raise AnalysisError("no mode can be identified: the signal seems to grow beyond all bounds within the window")
     vandermonde = multipliers[None, :] ** np.arange(len(y))[:, None]
     residues = np.linalg.lstsq(vandermonde, y.astype(complex), rcond=None)[0]
     modes = [

@@ -15,7 +15,7 @@ from orchestrator.certification.criteria import (
     stability_fault,
 )
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult, PointTask, compute_point
-from orchestrator.certification.swings import SwingTest, swing_test
+from orchestrator.certification.swings import SwingTest, slow_part, swing_test
 from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
@@ -226,6 +226,7 @@ def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeV
     y = point.signals.get(signal)
     if y is None or point.failure:
         return None
+    y = slow_part(point.times, y)
     return TimeVerdict(
         signal,
         swing_test(point.times, y, event_time),

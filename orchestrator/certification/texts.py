@@ -19,6 +19,8 @@ by their left and right eigenvectors over the states that both systems have; a m
 below 0.5 counts as introduced.</li>
 <li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter.</li>
 <li>{watched}</li>
+<li>What is faster than 5 Hz is taken out of the signal first (Butterworth of order 4, forth and back): the norm judges
+modes up to 1.5 Hz.</li>
 <li>Turning points are those from which the signal moves back by more than 0.1 % of its range after the event. The
 first one, towards which the oscillation starts, is left out; the result with it is given as well.</li>
 <li>ΔPkMk is the vertical distance from the minimum Mk to the straight line from maximum Pk to maximum Pk+1. Accepted

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.certification.swings import extrema, swing_test
+from orchestrator.certification.swings import extrema, slow_part, swing_test
 
 TIMES = np.arange(0, 61, 0.005)
 EVENT = 1.0
@@ -87,3 +87,15 @@ def test_a_signal_that_is_not_finite_is_not_accepted():
 
 def test_a_signal_that_does_not_move_is_accepted():
     assert swing_test(TIMES, np.full_like(TIMES, 0.9), EVENT).accepted
+
+
+@pytest.mark.parametrize("frequency", [0.2, 0.5, 1.5])
+def test_a_ripple_above_the_judged_modes_is_taken_out_and_the_modes_stay(frequency):
+    clean = damped(0.03, frequency)
+    rippled = clean + 1e-3 * np.sin(2 * np.pi * 46 * TIMES)
+    slow = slow_part(TIMES, rippled)
+    assert np.abs(slow - slow_part(TIMES, clean))[200:-200].max() < 1e-8
+    assert np.abs(slow - clean)[600:-600].max() < 3e-5  # of 0.04 from crest to trough
+    test, wanted = swing_test(TIMES, slow, EVENT), swing_test(TIMES, clean, EVENT)
+    assert test.ratio == pytest.approx(wanted.ratio, rel=0.01)
+    assert swing_test(TIMES, rippled, EVENT).ratio != pytest.approx(wanted.ratio, rel=0.01)
