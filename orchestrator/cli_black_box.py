@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.coupled_modes import (
     BoxedSystem,
     component_participation,
@@ -24,7 +25,6 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.fitting import fit
 from orchestrator.black_box.frequency_response import METHODS, Excitation, measure
 from orchestrator.black_box.passivity import passivity
-from orchestrator.black_box.test_bench import TestBench
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
@@ -72,7 +72,7 @@ def run_admittance(options: argparse.Namespace, console: Console) -> int:
     values = _values(description, dict(options.set))
     magnitude, angle = (float(values.get(name, _start(description, name))) for name in ("v_0", "theta_0"))
     rest = cmath.rect(magnitude, angle)
-    bench = TestBench(
+    bench = Bench(
         description, values, np.array([rest.real, rest.imag]), step_size=options.step,
         restore=False if options.no_state else None,
     )  # fmt: skip
@@ -145,7 +145,7 @@ def _start(description: FmuDescription, name: str) -> float:
     return float(info.start) if info is not None and info.start else (1.0 if name == "v_0" else 0.0)
 
 
-def _check_port(description: FmuDescription, bench: TestBench) -> None:
+def _check_port(description: FmuDescription, bench: Bench) -> None:
     missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
     if missing:
         raise InputError(

@@ -140,7 +140,7 @@ def test_the_orchestrator_imports_downwards_only():
 def test_the_orchestrator_knows_fmus_and_never_equations():
     """Cases and the command line build models and archives; what is compiled here borrows the compiler."""
     borrowers = {
-        "orchestrator.black_box.test_bench",
+        "orchestrator.black_box.bench",
         "orchestrator.coupling.loop",
         "orchestrator.fmi.bound",
         "orchestrator.fmi.mailbox",

@@ -14,9 +14,9 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.state_access import StateAccess, obstacle
+from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.black_box.test_bench import TestBench
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component
@@ -92,7 +92,7 @@ def linearize_with_box(
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
     exchange, plan = master.exchanges[component], master.system.components[component]
-    bench = TestBench(
+    bench = Bench(
         plan.description,
         plan.parameters,
         rest=master.y[exchange.sources].copy(),

@@ -1,5 +1,5 @@
 /* One FMU behind an ideal voltage: for every communication step set the inputs, step, read the outputs.
-   `test_bench.py` calls it. Returns 0, or the status of the first call that is neither OK nor Warning. */
+   `bench.py` calls it. Returns 0, or the status of the first call that is neither OK nor Warning. */
 #include <stddef.h>
 #include <stdint.h>
 #ifdef _WIN32

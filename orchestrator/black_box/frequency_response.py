@@ -7,8 +7,8 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.black_box.bench import Bench, Runs
 from orchestrator.black_box.excitation import line_response, multisine, odd_lines, pulse_response
-from orchestrator.black_box.test_bench import Runs, TestBench
 from orchestrator.errors import AnalysisError
 
 METHODS = ("multisine", "pulse")
@@ -110,7 +110,7 @@ class FrequencyResponse:
         return np.asarray(self.values * (x / (1 - np.exp(-x)))[:, None, None])
 
 
-def measure(bench: TestBench, excitation: Excitation) -> FrequencyResponse:
+def measure(bench: Bench, excitation: Excitation) -> FrequencyResponse:
     """Measure a device.
 
     Raises
@@ -149,7 +149,7 @@ def measure(bench: TestBench, excitation: Excitation) -> FrequencyResponse:
 
 
 def _by_multisine(
-    runs: Runs, bench: TestBench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
+    runs: Runs, bench: Bench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
 ) -> tuple[Complex, Numbers, float]:
     """Response at the lines and what two successive periods differ by, each of shape (f, p)."""
     period = round(1 / (e.lowest_hz * bench.step_size))
@@ -177,7 +177,7 @@ def _by_multisine(
 
 
 def _by_pulses(
-    runs: Runs, bench: TestBench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
+    runs: Runs, bench: Bench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
 ) -> tuple[Complex, Numbers, float]:
     """The same from a pulse up and a pulse down, so that even parts of the device drop out."""
     part = round(_APART / bench.step_size)

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.linalg
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.black_box.test_bench import TestBench
+from orchestrator.black_box.bench import Bench
 from orchestrator.cases.case import load_case
 from orchestrator.fmi.description import read_description
 
@@ -22,7 +22,7 @@ def bench_of(scenario, native=True, **settings):
     start = plan.parameters
     angle = start["theta_0"]
     rest = start["v_0"] * np.array([np.cos(angle), np.sin(angle)])
-    return TestBench(read_description(plan.description.path), start, rest, step_size=H, **settings)
+    return Bench(read_description(plan.description.path), start, rest, step_size=H, **settings)
 
 
 def continuous(scenario):

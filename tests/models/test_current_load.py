@@ -5,6 +5,7 @@ import pytest
 
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
+from fmus.grid.phasor_grid import phasor_grid
 
 
 def network(active, q_mvar=0.0, tau=None, **more):
@@ -77,3 +78,8 @@ def test_what_it_refuses(change, words):
               "ports": (Port("unit", "a"),)}  # fmt: skip
     with pytest.raises(ValueError, match=words):
         Network(**fields | change)
+
+
+def test_the_phasor_grid_refuses_it():
+    with pytest.raises(ValueError, match="load is of constant current, which the phasor grid does not have"):
+        phasor_grid(network("current"))

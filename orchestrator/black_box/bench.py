@@ -33,7 +33,7 @@ Numbers = NDArray[np.float64]
 
 
 @dataclass
-class TestBench:
+class Bench:
     """How a device is started, and between which variables it is seen.
 
     Attributes
@@ -98,7 +98,7 @@ class Runs:
         Outputs there, shape (p,).
     """
 
-    def __init__(self, bench: TestBench) -> None:
+    def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._component: Component | None = None
         self._state: Any = None
