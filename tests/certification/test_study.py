@@ -179,11 +179,7 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     own = {f"converter.{name}": value for name, value in values.items()}
     wanted = {X: is_bad(exact_eigenvalues(model, result.case, own, X)) for X in reactances}
     for verdict in result.verdicts:
-        if wanted[verdict.X_L]:
-            assert not verdict.accepted
-        else:
-            assert all(m.accepted for m in verdict.modes)
-            assert not any("unstable" in fault for fault in verdict.faults)
+        assert verdict.accepted != wanted[verdict.X_L], verdict.faults
     assert any(wanted.values()) == (gain > 1000)
     sentence = certification_json(result)["sentence"]
     for X_L, bad in wanted.items():
