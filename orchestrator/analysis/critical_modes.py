@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel, Vector
 from orchestrator.analysis.modes import Mode, find_modes, least_damped_first, make_mode, to_continuous
+from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
 DENSE = 200
@@ -180,7 +181,8 @@ class _Search:
     def __init__(self, model: LinearModel, centre: complex) -> None:
         self._model, self.centre = model, centre
         self._sigma = np.exp(centre * model.step_size) if model.step_size else centre
-        self._solver = model.shifted(self._sigma)
+        with one_thread():
+            self._solver = model.shifted(self._sigma)
         self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
         self._right = np.zeros((len(model.names), 0), dtype=complex)
 
@@ -223,7 +225,8 @@ class _Search:
         start = np.random.default_rng(0).standard_normal(n).astype(complex)  # the same search gives the same answer
         inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
         try:
-            nu, vectors = spla.eigs(inverse, k=count, ncv=max(40, 2 * count + 10), v0=start)
+            with one_thread():
+                nu, vectors = spla.eigs(inverse, k=count, ncv=max(40, 2 * count + 10), v0=start)
         except spla.ArpackNoConvergence as error:
             raise AnalysisError(
                 f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"

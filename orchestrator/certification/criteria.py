@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarity
+from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
 FREQUENCIES = (0.1, 1.5)
@@ -126,7 +126,7 @@ def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: f
     """Judge the modes that the matrix pencil finds in a signal after ``start`` [s]."""
     window = times >= start
     try:
-        with ThreadpoolController().limit(limits=1):  # small matrices: many threads would only wait for each other
+        with one_thread():
             found = identify_modes(times[window], signal[window])
     except AnalysisError as error:
         return ModalTest((), False, str(error))

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.threads import one_thread
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import load_case
 from orchestrator.cases.schema import Value
@@ -87,7 +87,7 @@ def compute_point(task: PointTask) -> PointResult:
     """Steady state, modes and response of one point; what fails becomes part of the result."""
     result = PointResult(task.X_L, task.scenario)
     try:
-        with ThreadpoolController().limit(limits=1):
+        with one_thread():
             _compute(task, result)
     except CosimError as error:
         result.failure = str(error)

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.analysis.threads import one_thread
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -156,7 +156,8 @@ def compute_point(task: PointTask) -> PointRecord:
         If this worker has another case file or other code than the sweep was started with.
     """
     case = _case(task.case, task.fingerprint)
-    with _one_at_a_time, _blas().limit(limits=1):
+    # One BLAS thread for every worker: several workers do not fight, and rounding is the same everywhere.
+    with _one_at_a_time, one_thread():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size)
             return _record(task.key, compute_modes(case, prepared, task.frequency_range))
@@ -177,12 +178,6 @@ def _case(reference: str, wanted: str) -> Case:
             "was started with; give all machines the same file and version, and restart the workers"
         )
     return case
-
-
-@cache
-def _blas() -> ThreadpoolController:
-    """One BLAS thread for every worker: several workers do not fight, and rounding is the same everywhere."""
-    return ThreadpoolController()
 
 
 def _record(key: str, result: ModesResult) -> PointRecord:
