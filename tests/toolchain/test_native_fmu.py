@@ -326,7 +326,7 @@ def perform(h, call, argument, saved):
     return h.status(getattr(h.fmu, call), *([argument] if call.startswith("get") else []))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(initialised=st.booleans(), calls=st.lists(CALLS, max_size=25))
 def test_any_sequence_of_calls_keeps_to_the_state_machine(open_host, initialised, calls):
     h = open_host("gfor", native=True)
