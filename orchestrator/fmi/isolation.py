@@ -76,7 +76,7 @@ class IsolatedComponent(Component):
         work.mkdir()
         with (work / "output").open("wb") as output:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "orchestrator.fmi.isolation_worker", json.dumps(request)],
+                [sys.executable, "-P", "-m", "orchestrator.fmi.isolation_worker", json.dumps(request)],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
             )  # fmt: skip
         handle = getattr(self._process, "_handle", None)  # Windows

@@ -174,7 +174,7 @@ class _Runner:
         with (self._folder / "output").open("wb") as output, shared.open("r+b") as file:
             progress = progress_in(mmap.mmap(file.fileno(), PROGRESS_BYTES))
             process = subprocess.Popen(
-                [sys.executable, "-m", "orchestrator.vendor.worker", request],
+                [sys.executable, "-P", "-m", "orchestrator.vendor.worker", request],
                 stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
             )  # fmt: skip
             try:

@@ -67,6 +67,13 @@ def test_answers_are_the_same_to_the_last_bit(box):
     np.testing.assert_array_equal(*answers)
 
 
+def test_python_files_of_the_users_folder_are_not_taken_for_the_librarys(box, tmp_path, monkeypatch):
+    (tmp_path / "pathlib.py").write_text("raise RuntimeError('the user's own file')\n")
+    monkeypatch.chdir(tmp_path)
+    with open_component("box", box(), isolated=True) as component:
+        assert len(stepped(initialised(component), 3)) == 3
+
+
 def test_a_python_backed_fmu_can_be_isolated_as_well(fmu_path):
     description, answers = read_description(fmu_path("gfor")), []
     for isolated in (False, True):

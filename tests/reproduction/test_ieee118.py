@@ -96,7 +96,7 @@ def test_twenty_undisturbed_seconds_stay_where_they_began():
 
 @pytest.mark.slow
 def test_sixty_seconds_after_a_load_step_ring_down_with_the_mode():
-    case, ready = prepare("pod_pq", stop_time=60.0)
+    case, ready = prepare("pod_pq", {"*.native": True}, stop_time=60.0)
     result = run_scenario(case, ready)
     mode, seen = result.modes.named["1-2"], result.ring_down
     assert seen.frequency_hz == pytest.approx(mode.frequency_hz, abs=0.005)
