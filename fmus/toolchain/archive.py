@@ -1,5 +1,6 @@
 """The zip archive of an FMU or SSP, the same bytes for the same contents."""
 
+import hashlib
 import uuid
 import zipfile
 from collections.abc import Mapping
@@ -9,6 +10,15 @@ NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
 """Of the guids: each is the uuid5 of everything that the FMU is made from."""
 
 _TIMESTAMP = (2020, 1, 1, 0, 0, 0)
+
+
+def digest_of(*texts: str) -> str:
+    """Hash over everything that an FMU is made from [hex]."""
+    hasher = hashlib.sha256()
+    for text in texts:
+        hasher.update(text.encode())
+        hasher.update(b"\0")
+    return hasher.hexdigest()
 
 
 def guid_of(digest: str) -> str:

@@ -4,18 +4,17 @@ It is made of the same kernel as the Python-backed FMU and gives the same answer
 directional derivatives and may be stepped from many threads, one per instance at a time.
 """
 
-import hashlib
 from collections.abc import Mapping
 from importlib.metadata import version as version_of
 from pathlib import Path
 
-from fmus.toolchain.archive import guid_of, write_archive
+from fmus.toolchain.archive import digest_of, guid_of, write_archive
 from fmus.toolchain.cache import cache_directory
 from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS, compile_for, compile_library, host_platform
 from fmus.toolchain.description import model_description
 from fmus.toolchain.description3 import model_description_3
 from fmus.toolchain.model import Model
-from fmus.toolchain.native_source import FmiVersion, native_source
+from fmus.toolchain.native_source import FmiVersion, identity_source, native_source
 from fmus.toolchain.terminals import has_port, terminals_and_icons
 
 _FOLDERS_3 = {
@@ -60,9 +59,8 @@ def export_native(
     ValueError, RuntimeError
         As `compile_library`.
     """
-    digest = _digest(model, version)
     chosen = tuple(TARGETS) if platforms is None else platforms
-    contents = _contents_2(model, digest, chosen) if version == "2.0" else _contents_3(model, digest, chosen)
+    contents = _Sources(model, version).contents(chosen)
     return write_archive(destination / f"{model.name}.fmu", contents | dict(extra or {}))
 
 
@@ -77,49 +75,41 @@ def cached_native(model: Model) -> Path:
     host = host_platform()
     if host is None:
         raise RuntimeError("native FMUs cannot be compiled for this machine; use the Python-backed ones")
-    folder = cache_directory("fmus") / f"native_{_digest(model, '2.0')[:32]}"
-    target = folder / f"{model.name}.fmu"
-    return target if target.exists() else export_native(model, folder, (host,))
+    sources = _Sources(model, "2.0")
+    target = cache_directory("fmus") / f"native_{sources.digest[:32]}" / f"{model.name}.fmu"
+    return target if target.exists() else write_archive(target, sources.contents((host,)))
 
 
-def _digest(model: Model, version: FmiVersion) -> str:
-    """Hash over everything that the FMU is made from."""
-    texts = [_source(model, version, ""), _description(model, version, "").decode(), *FLAGS]
-    if version == "3.0" and has_port(model):
-        texts.append(terminals_and_icons(model).decode())
-    hasher = hashlib.sha256()
-    for text in texts:
-        hasher.update(text.encode() + b"\0")
-    return hasher.hexdigest()
+class _Sources:
+    """Everything an FMU is made from, with one hash over all of it."""
 
+    def __init__(self, model: Model, version: FmiVersion) -> None:
+        self._model, self._version = model, version
+        self._code = native_source(model, version)
+        self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None
+        icons = [self._icons.decode()] if self._icons else []
+        self.digest = digest_of(self._code, self._description("").decode(), *FLAGS, *icons)
 
-def _source(model: Model, version: FmiVersion, digest: str) -> str:
-    return native_source(model, version, guid_of(digest), digest)
+    def _description(self, guid: str) -> bytes:
+        tool = f"gfor-cosim {version_of('gfor-cosim')}"
+        if self._version == "3.0":
+            return model_description_3(self._model, guid, self._model.name, tool)
+        return model_description(self._model, guid, self._model.name, tool, native=True)
 
-
-def _description(model: Model, version: FmiVersion, digest: str) -> bytes:
-    tool = f"gfor-cosim {version_of('gfor-cosim')}"
-    if version == "3.0":
-        return model_description_3(model, guid_of(digest), model.name, tool)
-    return model_description(model, guid_of(digest), model.name, tool, native=True)
-
-
-def _contents_2(model: Model, digest: str, platforms: tuple[str, ...]) -> dict[str, bytes]:
-    source = _source(model, "2.0", digest)
-    contents = {"modelDescription.xml": _description(model, "2.0", digest)}
-    for platform in platforms:
-        library = compile_library(source, platform)
-        contents[f"binaries/{platform}/{model.name}{ENDINGS[platform]}"] = library.read_bytes()
-    return contents
-
-
-def _contents_3(model: Model, digest: str, platforms: tuple[str, ...]) -> dict[str, bytes]:
-    source = _source(model, "3.0", digest)
-    contents = {"modelDescription.xml": _description(model, "3.0", digest)}
-    if has_port(model):
-        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model)
-    for platform in platforms:
-        for target in TARGETS[platform]:
-            library = compile_for(source, target, ENDINGS[platform])
-            contents[f"binaries/{_FOLDERS_3[target]}/{model.name}{ENDINGS[platform]}"] = library.read_bytes()
-    return contents
+    def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
+        """The archive's members, with a binary for each platform [FMI 2.0 names]."""
+        guid = guid_of(self.digest)
+        code = identity_source(guid, self.digest) + self._code
+        members = {"modelDescription.xml": self._description(guid)}
+        if self._icons:
+            members["terminalsAndIcons/terminalsAndIcons.xml"] = self._icons
+        for platform in platforms:
+            ending = ENDINGS[platform]
+            binaries = (
+                {platform: compile_library(code, platform)}
+                if self._version == "2.0"
+                else {_FOLDERS_3[target]: compile_for(code, target, ending) for target in TARGETS[platform]}
+            )
+            for folder, library in binaries.items():
+                members[f"binaries/{folder}/{self._model.name}{ending}"] = library.read_bytes()
+        return members

@@ -18,18 +18,18 @@ _SHORTEST_TEXT = 640
 """Room for a message [bytes] beside the longest rule or name it may quote."""
 
 
-def native_source(model: Model, version: FmiVersion, guid: str, digest: str) -> str:
-    """Source of the FMU's binary.
+def identity_source(guid: str, digest: str) -> str:
+    """What stands before the source: the FMU's identity. The digest [hex] also marks the states that it saves."""
+    identity = ", ".join(str(b) for b in bytes.fromhex(digest)[:16])
+    return f"static const char GUID[] = {_string(guid)};\nstatic const unsigned char IDENTITY[16] = {{{identity}}};\n"
 
-    Parameters
-    ----------
-    guid, digest
-        The FMU's identity; the digest [hex] also marks the states that it saves.
-    """
+
+def native_source(model: Model, version: FmiVersion) -> str:
+    """Source of the FMU's binary, but for its identity, which follows from this text."""
     parts = [
         "#define KERNEL static",
         c_source(model, derivative_functions(model)),
-        _data(model, guid, digest),
+        _data(model),
         (_C / "instance.c").read_text(encoding="utf-8"),
         (_C / f"fmi{version[0]}.c").read_text(encoding="utf-8"),
     ]
@@ -73,7 +73,7 @@ def _adjoint(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function
     return ca.Function(name, [*known, *seeds], ca.vertsplit(total, edges))
 
 
-def _data(model: Model, guid: str, digest: str) -> str:
+def _data(model: Model) -> str:
     """What the instance knows of its model, as C declarations."""
     parameters, rules = model.parameters, model.requirement_texts
     texts = [*rules, *model.value_references]
@@ -88,8 +88,6 @@ def _data(model: Model, guid: str, digest: str) -> str:
         "enum kind { REAL, INTEGER, BOOLEAN };",
         'static const char *const KIND[] = {"Real", "Integer", "Boolean"};',
         "struct parameter { int kind; double minimum, maximum; int tunable; };",
-        f"static const char GUID[] = {_string(guid)};",
-        f"static const unsigned char IDENTITY[16] = {{{', '.join(str(b) for b in bytes.fromhex(digest)[:16])}}};",
         f"static const char *const NAME[] = {{{', '.join(map(_string, model.value_references))}}};",
         f"static const double START[] = {{{', '.join(map(_number, start))}}};",
         f"static const struct parameter PARAMETER[] = {{{', '.join(rows)}}};",

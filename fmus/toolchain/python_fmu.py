@@ -5,7 +5,6 @@ files, every bundled module needs a name of its own (all Python-backed FMUs of a
 ``sys.modules``), and the model description needs units, bounds and dependencies.
 """
 
-import hashlib
 import json
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pythonfmu
 
-from fmus.toolchain.archive import guid_of, write_archive
+from fmus.toolchain.archive import digest_of, guid_of, write_archive
 from fmus.toolchain.cache import cache_directory
 from fmus.toolchain.compiler import ENDINGS, FLAGS, compile_library, host_platform
 from fmus.toolchain.description import model_description
@@ -79,16 +78,8 @@ class _Sources:
         description = model_description(model, "", model.name, self.tool).decode()
         exporter = Path(__file__).read_text(encoding="utf-8")
         data = json.dumps(_slave_data(model))
-        self.digest = _digest(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
+        self.digest = digest_of(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
         self.guid = guid_of(self.digest)
-
-
-def _digest(*texts: str) -> str:
-    hasher = hashlib.sha256()
-    for text in texts:
-        hasher.update(text.encode())
-        hasher.update(b"\0")
-    return hasher.hexdigest()
 
 
 def _contents(model: Model, platforms: tuple[str, ...]) -> dict[str, bytes]:

@@ -8,11 +8,6 @@ struct callbacks {
     void *environment;
 };
 
-#define NEEDS(s) \
-    if (!(s)) return ERROR
-
-static const char *const CATEGORY[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
-
 /* The logger takes a printf format, in which FMI also gives '#' a meaning: both are doubled. */
 static void deliver(struct instance *s, int status, const char *text) {
     char format[2 * TEXT];
@@ -30,12 +25,7 @@ EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
 EXPORT int fmi2SetDebugLogging(struct instance *s, int on, size_t n, const char *const categories[]) {
     NEEDS(s);
-    int wanted = n == 0;
-    for (size_t i = 0; i < n; ++i)
-        wanted |= !strcmp(categories[i], "logAll") || !strcmp(categories[i], "logStatusWarning") ||
-                  !strcmp(categories[i], "logStatusDiscard");
-    s->quiet = !(on && wanted);
-    return OK;
+    return set_logging(s, on, n, categories);
 }
 
 EXPORT struct instance *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
@@ -61,12 +51,7 @@ EXPORT int fmi2SetupExperiment(struct instance *s, int tolerance_defined, double
                                double stop) {
     NEEDS(s);
     (void)tolerance_defined, (void)tolerance;
-    const int status = allowed(s, "fmi2SetupExperiment", INSTANTIATED);
-    if (status) return status;
-    if (!isfinite(start) || (stop_defined && !(stop > start)))
-        return say(s, ERROR, "the experiment from %g s to %g s: it must end after it starts", start, stop);
-    s->time = start;
-    return OK;
+    return set_experiment(s, "fmi2SetupExperiment", start, stop_defined, stop);
 }
 
 EXPORT int fmi2EnterInitializationMode(struct instance *s) {
@@ -78,21 +63,17 @@ EXPORT int fmi2EnterInitializationMode(struct instance *s) {
 
 EXPORT int fmi2ExitInitializationMode(struct instance *s) {
     NEEDS(s);
-    const int status = allowed(s, "fmi2ExitInitializationMode", INITIALISING);
-    return status ? status : end_initialisation(s);
+    return end_initialisation(s, "fmi2ExitInitializationMode");
 }
 
 EXPORT int fmi2Terminate(struct instance *s) {
     NEEDS(s);
-    const int status = allowed(s, "fmi2Terminate", STEPPING);
-    if (!status) s->phase = TERMINATED;
-    return status;
+    return terminate(s, "fmi2Terminate");
 }
 
 EXPORT int fmi2Reset(struct instance *s) {
     NEEDS(s);
-    set_to_start(s);
-    return OK;
+    return reset(s);
 }
 
 EXPORT int fmi2DoStep(struct instance *s, double time, double step_size, int no_return) {
@@ -127,7 +108,7 @@ static int get_whole(struct instance *s, const unsigned *references, size_t n, i
 
 static int set_whole(struct instance *s, const unsigned *references, size_t n, const int *values, int kind) {
     NEEDS(s);
-    if (s->phase == TERMINATED) return say(s, ERROR, "after termination nothing can be set");
+    if (s->phase == TERMINATED) return after_termination(s);
     int worst = OK;
     for (size_t i = 0; i < n; ++i) {
         const int status = set_value(s, references[i], kind == BOOLEAN ? values[i] != 0 : values[i], kind);
@@ -167,50 +148,32 @@ EXPORT int fmi2SetString(struct instance *s, const unsigned *r, size_t n, const 
 
 EXPORT int fmi2GetFMUstate(struct instance *s, struct snapshot **copy) {
     NEEDS(s);
-    if (!copy) return say(s, ERROR, "fmi2GetFMUstate needs the address of a pointer");
-    if (!*copy) *copy = malloc(sizeof **copy);
-    if (!*copy) return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", sizeof **copy);
-    take(s, *copy);
-    return OK;
+    return save(s, copy, "fmi2GetFMUstate");
 }
 
 EXPORT int fmi2SetFMUstate(struct instance *s, const struct snapshot *copy) {
     NEEDS(s);
-    return copy ? restore(s, copy) : say(s, ERROR, "fmi2SetFMUstate needs a state that was saved before");
+    return restore_saved(s, copy, "fmi2SetFMUstate");
 }
 
 EXPORT int fmi2FreeFMUstate(struct instance *s, struct snapshot **copy) {
     NEEDS(s);
-    if (copy) {
-        free(*copy);
-        *copy = NULL;
-    }
-    return OK;
+    return release(copy);
 }
 
 EXPORT int fmi2SerializedFMUstateSize(struct instance *s, const struct snapshot *copy, size_t *size) {
     NEEDS(s);
-    if (!copy || !size) return say(s, ERROR, "fmi2SerializedFMUstateSize needs a saved state and a place for its size");
-    *size = sizeof *copy;
-    return OK;
+    return serialised_size(s, copy, size, "fmi2SerializedFMUstateSize");
 }
 
 EXPORT int fmi2SerializeFMUstate(struct instance *s, const struct snapshot *copy, char *bytes, size_t size) {
     NEEDS(s);
-    if (!copy || !bytes || size < sizeof *copy)
-        return say(s, ERROR, "a saved state takes %zu bytes; %zu were given", sizeof *copy, size);
-    memcpy(bytes, copy, sizeof *copy);
-    return OK;
+    return serialise(s, copy, bytes, size);
 }
 
 EXPORT int fmi2DeSerializeFMUstate(struct instance *s, const char *bytes, size_t size, struct snapshot **copy) {
     NEEDS(s);
-    if (!bytes || !copy || size != sizeof **copy)
-        return say(s, ERROR, "a saved state has %zu bytes; %zu were given", sizeof **copy, size);
-    if (!*copy) *copy = malloc(sizeof **copy);
-    if (!*copy) return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", size);
-    memcpy(*copy, bytes, size);
-    return OK;
+    return deserialise(s, bytes, size, copy);
 }
 
 /* -- derivatives and status -------------------------------------------------------------------- */

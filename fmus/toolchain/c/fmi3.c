@@ -5,11 +5,6 @@ typedef void (*fmi3_logger)(void *, int, const char *, const char *);
 
 enum { TIME = NV }; /* value reference of the independent variable */
 
-#define NEEDS(s) \
-    if (!(s)) return ERROR
-
-static const char *const CATEGORY[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
-
 static void deliver(struct instance *s, int status, const char *text) {
     ((fmi3_logger)s->logger)(s->environment, status, CATEGORY[status], text);
 }
@@ -18,12 +13,7 @@ EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 EXPORT int fmi3SetDebugLogging(struct instance *s, bool on, size_t n, const char *const categories[]) {
     NEEDS(s);
-    int wanted = n == 0;
-    for (size_t i = 0; i < n; ++i)
-        wanted |= !strcmp(categories[i], "logAll") || !strcmp(categories[i], "logStatusWarning") ||
-                  !strcmp(categories[i], "logStatusDiscard");
-    s->quiet = !(on && wanted);
-    return OK;
+    return set_logging(s, on, n, categories);
 }
 
 EXPORT struct instance *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible,
@@ -66,32 +56,24 @@ EXPORT int fmi3EnterInitializationMode(struct instance *s, bool tolerance_define
                                        bool stop_defined, double stop) {
     NEEDS(s);
     (void)tolerance_defined, (void)tolerance;
-    const int status = allowed(s, "fmi3EnterInitializationMode", INSTANTIATED);
-    if (status) return status;
-    if (!isfinite(start) || (stop_defined && !(stop > start)))
-        return say(s, ERROR, "the experiment from %g s to %g s: it must end after it starts", start, stop);
-    s->time = start;
-    s->phase = INITIALISING;
-    return OK;
+    const int status = set_experiment(s, "fmi3EnterInitializationMode", start, stop_defined, stop);
+    if (!status) s->phase = INITIALISING;
+    return status;
 }
 
 EXPORT int fmi3ExitInitializationMode(struct instance *s) {
     NEEDS(s);
-    const int status = allowed(s, "fmi3ExitInitializationMode", INITIALISING);
-    return status ? status : end_initialisation(s);
+    return end_initialisation(s, "fmi3ExitInitializationMode");
 }
 
 EXPORT int fmi3Terminate(struct instance *s) {
     NEEDS(s);
-    const int status = allowed(s, "fmi3Terminate", STEPPING);
-    if (!status) s->phase = TERMINATED;
-    return status;
+    return terminate(s, "fmi3Terminate");
 }
 
 EXPORT int fmi3Reset(struct instance *s) {
     NEEDS(s);
-    set_to_start(s);
-    return OK;
+    return reset(s);
 }
 
 EXPORT int fmi3DoStep(struct instance *s, double time, double step_size, bool no_return, bool *event_needed,
@@ -157,7 +139,7 @@ EXPORT int fmi3GetBoolean(struct instance *s, const unsigned *references, size_t
 EXPORT int fmi3SetInt32(struct instance *s, const unsigned *references, size_t n, const int32_t *values, size_t n_values) {
     NEEDS(s);
     int worst = sizes_differ(s, n, n_values);
-    if (!worst && s->phase == TERMINATED) return say(s, ERROR, "after termination nothing can be set");
+    if (!worst && s->phase == TERMINATED) return after_termination(s);
     for (size_t i = 0; i < n && worst < ERROR; ++i) {
         const int status = set_value(s, references[i], values[i], INTEGER);
         worst = status > worst ? status : worst;
@@ -168,7 +150,7 @@ EXPORT int fmi3SetInt32(struct instance *s, const unsigned *references, size_t n
 EXPORT int fmi3SetBoolean(struct instance *s, const unsigned *references, size_t n, const bool *values, size_t n_values) {
     NEEDS(s);
     int worst = sizes_differ(s, n, n_values);
-    if (!worst && s->phase == TERMINATED) return say(s, ERROR, "after termination nothing can be set");
+    if (!worst && s->phase == TERMINATED) return after_termination(s);
     for (size_t i = 0; i < n && worst < ERROR; ++i) {
         const int status = set_value(s, references[i], values[i], BOOLEAN);
         worst = status > worst ? status : worst;
@@ -228,50 +210,32 @@ EXPORT int fmi3SetClock(struct instance *s, const unsigned *r, size_t n, const b
 
 EXPORT int fmi3GetFMUState(struct instance *s, struct snapshot **copy) {
     NEEDS(s);
-    if (!copy) return say(s, ERROR, "fmi3GetFMUState needs the address of a pointer");
-    if (!*copy) *copy = malloc(sizeof **copy);
-    if (!*copy) return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", sizeof **copy);
-    take(s, *copy);
-    return OK;
+    return save(s, copy, "fmi3GetFMUState");
 }
 
 EXPORT int fmi3SetFMUState(struct instance *s, const struct snapshot *copy) {
     NEEDS(s);
-    return copy ? restore(s, copy) : say(s, ERROR, "fmi3SetFMUState needs a state that was saved before");
+    return restore_saved(s, copy, "fmi3SetFMUState");
 }
 
 EXPORT int fmi3FreeFMUState(struct instance *s, struct snapshot **copy) {
     NEEDS(s);
-    if (copy) {
-        free(*copy);
-        *copy = NULL;
-    }
-    return OK;
+    return release(copy);
 }
 
 EXPORT int fmi3SerializedFMUStateSize(struct instance *s, const struct snapshot *copy, size_t *size) {
     NEEDS(s);
-    if (!copy || !size) return say(s, ERROR, "fmi3SerializedFMUStateSize needs a saved state and a place for its size");
-    *size = sizeof *copy;
-    return OK;
+    return serialised_size(s, copy, size, "fmi3SerializedFMUStateSize");
 }
 
 EXPORT int fmi3SerializeFMUState(struct instance *s, const struct snapshot *copy, uint8_t *bytes, size_t size) {
     NEEDS(s);
-    if (!copy || !bytes || size < sizeof *copy)
-        return say(s, ERROR, "a saved state takes %zu bytes; %zu were given", sizeof *copy, size);
-    memcpy(bytes, copy, sizeof *copy);
-    return OK;
+    return serialise(s, copy, bytes, size);
 }
 
 EXPORT int fmi3DeserializeFMUState(struct instance *s, const uint8_t *bytes, size_t size, struct snapshot **copy) {
     NEEDS(s);
-    if (!bytes || !copy || size != sizeof **copy)
-        return say(s, ERROR, "a saved state has %zu bytes; %zu were given", sizeof **copy, size);
-    if (!*copy) *copy = malloc(sizeof **copy);
-    if (!*copy) return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", size);
-    memcpy(*copy, bytes, size);
-    return OK;
+    return deserialise(s, bytes, size, copy);
 }
 
 /* -- derivatives ------------------------------------------------------------------------------- */

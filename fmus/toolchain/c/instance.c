@@ -33,6 +33,13 @@ struct snapshot {
     double time, z[NV];
 };
 
+/* A call without an instance is refused; there is nobody to log to. */
+#define NEEDS(s) \
+    if (!(s)) return ERROR
+
+/* Of a message, by its status. */
+static const char *const CATEGORY[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
+
 static void deliver(struct instance *s, int status, const char *text); /* each version of FMI has its own logger */
 
 /* Log a message and return its status. */
@@ -46,6 +53,16 @@ static int say(struct instance *s, int status, const char *format, ...) {
     if (status >= ERROR) s->failed = 1;
     if (s->logger && (status >= ERROR || !s->quiet)) deliver(s, status, text);
     return status;
+}
+
+/* Which messages below an error are wanted; none named means all. */
+static int set_logging(struct instance *s, int on, size_t n, const char *const categories[]) {
+    int wanted = n == 0;
+    for (size_t i = 0; i < n; ++i)
+        wanted |= !strcmp(categories[i], CATEGORY[OK]) || !strcmp(categories[i], CATEGORY[WARNING]) ||
+                  !strcmp(categories[i], CATEGORY[DISCARD]);
+    s->quiet = !(on && wanted);
+    return OK;
 }
 
 static void set_to_start(struct instance *s) {
@@ -164,8 +181,10 @@ static int set_value(struct instance *s, unsigned reference, double value, int k
     return OK;
 }
 
+static int after_termination(struct instance *s) { return say(s, ERROR, "after termination nothing can be set"); }
+
 static int set_values(struct instance *s, const unsigned *references, size_t n, const double *values) {
-    if (s->phase == TERMINATED) return say(s, ERROR, "after termination nothing can be set");
+    if (s->phase == TERMINATED) return after_termination(s);
     int worst = OK;
     for (size_t i = 0; i < n; ++i) {
         const int status = set_value(s, references[i], values[i], REAL);
@@ -184,8 +203,31 @@ static int allowed(struct instance *s, const char *call, int phase) {
     return OK;
 }
 
-static int end_initialisation(struct instance *s) {
-    int status = s->stale || s->changed ? refresh(s) : OK;
+/* The times of the experiment, before initialisation. */
+static int set_experiment(struct instance *s, const char *call, double start, int stop_defined, double stop) {
+    const int status = allowed(s, call, INSTANTIATED);
+    if (status) return status;
+    if (!isfinite(start) || (stop_defined && !(stop > start)))
+        return say(s, ERROR, "the experiment from %g s to %g s: it must end after it starts", start, stop);
+    s->time = start;
+    return OK;
+}
+
+static int terminate(struct instance *s, const char *call) {
+    const int status = allowed(s, call, STEPPING);
+    if (!status) s->phase = TERMINATED;
+    return status;
+}
+
+static int reset(struct instance *s) {
+    set_to_start(s);
+    return OK;
+}
+
+static int end_initialisation(struct instance *s, const char *call) {
+    int status = allowed(s, call, INITIALISING);
+    if (status) return status;
+    status = s->stale || s->changed ? refresh(s) : OK;
     status = check_rules(s, status);
     for (int i = 0; i < DX; ++i)
         if (!isfinite(s->z[i])) {
@@ -254,6 +296,53 @@ static int restore(struct instance *s, const struct snapshot *copy) {
     s->stale = 1;
     s->failed = 0;
     s->step_size = 0;
+    return OK;
+}
+
+static int no_memory(struct instance *s) {
+    return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", sizeof(struct snapshot));
+}
+
+/* The functions on saved states, of both versions of FMI; `call` is the name that the version gives them. */
+static int save(struct instance *s, struct snapshot **copy, const char *call) {
+    if (!copy) return say(s, ERROR, "%s needs the address of a pointer", call);
+    if (!*copy) *copy = malloc(sizeof **copy);
+    if (!*copy) return no_memory(s);
+    take(s, *copy);
+    return OK;
+}
+
+static int restore_saved(struct instance *s, const struct snapshot *copy, const char *call) {
+    return copy ? restore(s, copy) : say(s, ERROR, "%s needs a state that was saved before", call);
+}
+
+static int release(struct snapshot **copy) {
+    if (copy) {
+        free(*copy);
+        *copy = NULL;
+    }
+    return OK;
+}
+
+static int serialised_size(struct instance *s, const struct snapshot *copy, size_t *size, const char *call) {
+    if (!copy || !size) return say(s, ERROR, "%s needs a saved state and a place for its size", call);
+    *size = sizeof *copy;
+    return OK;
+}
+
+static int serialise(struct instance *s, const struct snapshot *copy, void *bytes, size_t size) {
+    if (!copy || !bytes || size < sizeof *copy)
+        return say(s, ERROR, "a saved state takes %zu bytes; %zu were given", sizeof *copy, size);
+    memcpy(bytes, copy, sizeof *copy);
+    return OK;
+}
+
+static int deserialise(struct instance *s, const void *bytes, size_t size, struct snapshot **copy) {
+    if (!bytes || !copy || size != sizeof **copy)
+        return say(s, ERROR, "a saved state has %zu bytes; %zu were given", sizeof **copy, size);
+    if (!*copy) *copy = malloc(sizeof **copy);
+    if (!*copy) return no_memory(s);
+    memcpy(*copy, bytes, size);
     return OK;
 }
 
