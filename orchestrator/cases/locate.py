@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*=")
@@ -18,7 +19,8 @@ def line_of(text: str, path: Sequence[str | int]) -> int | None:
     return best
 
 
-def _keys(text: str) -> list[tuple[int, tuple[str, ...]]]:
+@lru_cache(maxsize=8)
+def _keys(text: str) -> tuple[tuple[int, tuple[str, ...]], ...]:
     found: list[tuple[int, tuple[str, ...]]] = []
     table: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
@@ -32,7 +34,7 @@ def _keys(text: str) -> list[tuple[int, tuple[str, ...]]]:
             found.append((number, table))
         elif key := _KEY.match(line):
             found.append((number, (*table, *_parts(key.group(1)))))
-    return found
+    return tuple(found)
 
 
 def _parts(key: str) -> tuple[str, ...]:
