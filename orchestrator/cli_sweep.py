@@ -34,7 +34,7 @@ def choose_executor(workers: int | None, scheduler: str | None) -> Executor:
             raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
         return DaskCluster(scheduler)
     workers = workers or number_of_cores()
-    return Processes(workers) if workers > 1 else Serial()
+    return Processes(workers, ["orchestrator.study.point_worker"]) if workers > 1 else Serial()
 
 
 def run(plan: SweepPlan, executor: Executor, folder: Path, report: Callable[[int, int], None]) -> SweepResult | None:

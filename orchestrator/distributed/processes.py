@@ -3,11 +3,14 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import forkserver
+from multiprocessing.context import BaseContext
 from typing import Any
 
 from orchestrator.distributed.executor import ATTEMPTS, Result, Task, WorkerLostError
@@ -16,17 +19,28 @@ _QUEUE_PER_WORKER = 2
 """Tasks under way for each worker; the second one waits there so that no worker does."""
 
 
+_SAFE_PATH = "PYTHONSAFEPATH"
+
+
 def number_of_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Processes:
-    """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die."""
+    """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die.
 
-    def __init__(self, workers: int) -> None:
+    Parameters
+    ----------
+    imports
+        Modules that the tasks need. Where the system allows, they are imported once for all workers, from now on and
+        in the background: importing takes seconds, in which the caller can prepare the tasks.
+    """
+
+    def __init__(self, workers: int, imports: Sequence[str] = ()) -> None:
         self.workers = workers
-        self._pool: ProcessPoolExecutor | None = None  # starting a worker takes seconds
+        self._context = _context(imports)
+        self._pool: ProcessPoolExecutor | None = None  # starting a worker takes time
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
@@ -75,8 +89,11 @@ class Processes:
 
     def _running_pool(self) -> ProcessPoolExecutor:
         if self._pool is None:
-            self._pool = _pool(self.workers)
+            self._pool = self._new_pool(self.workers)
         return self._pool
+
+    def _new_pool(self, workers: int) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(workers, mp_context=self._context, initializer=_start_worker)
 
     def close(self) -> None:
         """See `Executor.close`."""
@@ -86,7 +103,7 @@ class Processes:
 
     def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
         for _ in range(ATTEMPTS - 1):
-            pool = _pool(1)
+            pool = self._new_pool(1)
             try:
                 return pool.submit(function, task).result()
             except BrokenProcessPool:
@@ -99,10 +116,27 @@ class Processes:
         )
 
 
-def _pool(workers: int) -> ProcessPoolExecutor:
-    # Spawned and not forked: a copy of a process that has loaded FMUs and BLAS threads is not safe to use.
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
+def _context(imports: Sequence[str]) -> BaseContext:
+    """How workers start; on Linux as copies of a process that has done the imports and nothing else.
+
+    A copy of this process itself would not be safe to use: it may have loaded FMUs and started threads. Elsewhere
+    system libraries object to copies, and every worker does its imports itself.
+    """
+    if sys.platform != "linux":
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(imports))
+    # The user's folder is not on that process's path: a random.py there would be imported instead of Python's.
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        forkserver.ensure_running()
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
+    return context
 
 
 def _start_worker() -> None:

@@ -110,7 +110,6 @@ def make_task(
     fmus = {name: plan.description.guid for name, plan in prepared.system.components.items()}
     content = {
         "format": _FORMAT,
-        "version": version("gfor-cosim"),
         "fingerprint": fingerprint(case),
         "scenario": prepared.name,
         "fmus": fmus,
@@ -132,8 +131,8 @@ def fingerprint(case: Case) -> str:
 
 @cache
 def _code() -> str:
-    """Hash of the modules that a point's result depends on."""
-    hasher = hashlib.sha256()
+    """Hash of the version and of the modules that a point's result depends on."""
+    hasher = hashlib.sha256(version("gfor-cosim").encode())
     root = Path(__file__).parents[1]
     files = [f for part in ("fmi", "coupling", "analysis", "cases") for f in (root / part).rglob("*.py")]
     for file in sorted([*files, root / "study" / "modes.py", Path(__file__)]):
