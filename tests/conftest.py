@@ -7,9 +7,25 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
+from orchestrator.cli import main
 
 
 @pytest.fixture(scope="session")
 def fmu_path():
     """Name of a catalogue model → its built .fmu, Python-backed or native."""
     return cache(lambda name, native=False: (cached_native if native else cached)(build_model(name)))
+
+
+@pytest.fixture
+def gfor(capsys):
+    """Run the command; returns exit code, standard output and standard error."""
+
+    def run(*arguments):
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as stop:  # argparse's way out
+            code = stop.code
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run

@@ -20,22 +20,9 @@ FLOORS = (
     ("orchestrator.study",),
     ("orchestrator.black_box",),
     ("orchestrator.certification",),
-    ("orchestrator.cli_sweep",),
-    (
-        "orchestrator.cli_black_box",
-        "orchestrator.cli_certify",
-        "orchestrator.cli_compare",
-        "orchestrator.cli_design",
-        "orchestrator.cli_interop",
-        "orchestrator.cli_linear_model",
-        "orchestrator.cli_ssp",
-        "orchestrator.cli_vendor",
-    ),
     ("orchestrator.cli",),
 )
 """Lowest first; those on one floor do not know each other."""
-
-COMMANDS = FLOORS[-3] + FLOORS[-2] + FLOORS[-1]
 
 
 def modules():
@@ -145,7 +132,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         "orchestrator.fmi.bound",
         "orchestrator.fmi.mailbox",
     }
-    importers = {"orchestrator.cases", "orchestrator.cli", "orchestrator.cli_ssp"}
+    importers = {"orchestrator.cases", "orchestrator.cli"}
 
     def allowed(a, b):
         if not within(a, "orchestrator") or within(b, "orchestrator"):
@@ -162,9 +149,8 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
 def test_reports_know_studies_for_type_checkers_only():
     everything = imports()
     knowing = {name for name, targets in everything.items() if any(within(t, "orchestrator.study") for t in targets)}
-    knowing = {
-        name for name in knowing if not within(name, *COMMANDS, "orchestrator.certification", "orchestrator.study")
-    }
+    above = ("orchestrator.cli", "orchestrator.certification", "orchestrator.study")
+    knowing = {name for name in knowing if not within(name, *above)}
     assert knowing
     assert all(within(name, "orchestrator.report") for name in knowing)
 
@@ -194,7 +180,6 @@ def test_there_is_no_cycle():
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),
         ("pint", {"orchestrator.units"}),
-        ("argparse", set(COMMANDS) - {"orchestrator.cli_sweep"}),
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
@@ -202,6 +187,12 @@ def test_a_library_is_used_in_one_place(library, users):
         name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree, typing=True))
     }
     assert found == users
+
+
+def test_only_the_command_line_reads_options():
+    using = {name for name, tree in MODULES.items() if "argparse" in imported_names(tree, typing=True)}
+    assert using
+    assert all(within(name, "orchestrator.cli") for name in using)
 
 
 def test_equations_are_written_in_models_only():

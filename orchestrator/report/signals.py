@@ -1,9 +1,13 @@
 """Signals named in a case file: a recorded variable, or the difference of two."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from orchestrator.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def variables_of(expression: str) -> list[str]:
@@ -22,7 +26,7 @@ def variables_of(expression: str) -> list[str]:
     return names
 
 
-def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
+def signal(dataset: "xr.Dataset", expression: str) -> "xr.DataArray | None":
     """``"a.b"`` or ``"a.b - c.d"`` from a recorded dataset; None if a variable was not recorded.
 
     Raises
@@ -37,7 +41,7 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     return first if len(names) == 1 else first - dataset[names[1]]
 
 
-def relative_difference(simulated: xr.DataArray, linear: xr.DataArray) -> float:
+def relative_difference(simulated: "xr.DataArray", linear: "xr.DataArray") -> float:
     """Largest difference of two responses at the same times, as a share of the first one's largest deviation."""
     deviation = float(np.abs(simulated.values - simulated.values[0]).max())
     both = min(len(simulated), len(linear))  # a run that failed is shorter

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from orchestrator.cases.case import Case
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.signals import relative_difference, signal
 
 if TYPE_CHECKING:
+    from orchestrator.cases.case import Case
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
 
@@ -132,7 +132,7 @@ def ring_downs(results: Sequence["RunResult"]) -> Table:
     return table
 
 
-def linear_differences(case: Case, results: Sequence["RunResult"]) -> Table:
+def linear_differences(case: "Case", results: Sequence["RunResult"]) -> Table:
     """Largest difference between the linear model's response and the simulated one, signal by signal."""
     signals = dict.fromkeys(panel.signal for plot in case.table.plots for panel in plot.panels)
     table = _table("Linear model against the simulation: largest difference, of the largest deviation",

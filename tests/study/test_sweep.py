@@ -3,13 +3,13 @@
 import csv
 import json
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.cli import main
 from orchestrator.distributed.dask_cluster import DaskCluster
 from orchestrator.distributed.processes import Processes
 from orchestrator.distributed.serial import Serial
@@ -24,18 +24,9 @@ FULL_TURN = 2 * np.pi
 
 
 @pytest.fixture
-def gfor(capsys):
-    """Run ``gfor sweep``; returns exit code, standard output and standard error."""
-
-    def run(*arguments):
-        try:
-            code = main(["sweep", *map(str, arguments)])
-        except SystemExit as stop:
-            code = stop.code
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
+def gfor(gfor):
+    """Run ``gfor sweep``."""
+    return partial(gfor, "sweep")
 
 
 @pytest.fixture

@@ -1,8 +1,7 @@
-"""``gfor which-master`` and ``gfor run --like``: other people's masters."""
+"""``gfor which-master``: which schedule another tool runs."""
 
 import argparse
 import json
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,17 +9,15 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.compiler import TARGETS, host_platform
+from fmus.toolchain.native_fmu import export_native
+from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
-from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.probe_result import read_probe_result
-from orchestrator.interop.rules import MasterRules
 from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Verdict, identify
-from orchestrator.report.storage import save_dataset
-from orchestrator.study.like import run_like
 
 _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
     # property: what it is called, what its values mean
@@ -39,19 +36,11 @@ _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
 }  # fmt: skip
 
 
-def add_like(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor run`` that make it run as another master."""
-    parser.add_argument("--like", metavar="MASTER",
-                        help=f"only trajectories, as another master would give them: {', '.join(MASTERS)}")  # fmt: skip
-    parser.add_argument("--order", metavar="A,B,…",
-                        help="with --like: in which order components step, where they take turns")  # fmt: skip
-
-
-def add_which_master(parser: argparse.ArgumentParser, platforms: Sequence[str]) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor which-master``."""
     parser.add_argument("result", type=Path, nargs="?", metavar="RESULT.csv", help="what the tool gave")
     parser.add_argument("--build", type=Path, metavar="DIR", help="write the probe pair and how to run it")
-    parser.add_argument("--platform", action="append", choices=platforms,
+    parser.add_argument("--platform", action="append", choices=sorted(TARGETS),
                         help="with --build: compile for this one (repeatable; default: this machine's)")  # fmt: skip
     parser.add_argument("--step", type=float, default=STEP_SIZE, metavar="H",
                         help=f"communication step that the tool had [s] ({STEP_SIZE:g})")  # fmt: skip
@@ -61,55 +50,30 @@ def add_which_master(parser: argparse.ArgumentParser, platforms: Sequence[str]) 
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
-# -- gfor run --like -------------------------------------------------------------------------------
-
-
-def like_of(options: argparse.Namespace) -> MasterRules | None:
-    """The master that a run is to follow; None for our own.
-
-    Raises
-    ------
-    InputError
-        If it is not known, or an order is given without it.
-    """
-    if options.order and not options.like:
-        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
-    return master_rules(options.like) if options.like else None
-
-
-def run_like_master(
-    case: Case, scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace
-) -> int:
-    """Run scenarios as another master would; their trajectories are all that is written."""
-    order = options.order.split(",") if options.order else None
-    folder = options.out or Path("results") / f"{case.name}_like_{rules.name}"
-    for prepared in scenarios:
-        dataset = run_like(case, prepared, rules, order)
-        path = folder / prepared.name / "trajectory"
-        save_dataset(dataset, path)
-        print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
-    return 0
-
-
-# -- gfor which-master -----------------------------------------------------------------------------
-
-
-def write_instructions(folder: Path, options: argparse.Namespace, platforms: Sequence[str]) -> Path:
-    """The page beside the probe pair."""
-    path = folder / "INSTRUCTIONS.md"
-    path.write_text(instructions(options.step, options.stop, tuple(platforms)), encoding="utf-8")
-    return path
-
-
-def run_which_master(options: argparse.Namespace, console: Console) -> int:
-    """Tell which schedule gave a result; 0 where one or several do, 1 where none of those known does."""
+def run(options: argparse.Namespace) -> int:
+    """Write the probe pair, or tell which schedule gave a result: 1 where none of those known does."""
+    if (options.build is None) == (options.result is None):
+        raise InputError("give either the tool's RESULT.csv, or --build DIR for the probe pair")
+    if options.build is not None:
+        return _build(options)
     named = dict(_named(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
         print(json.dumps(_json(verdict), indent=1, ensure_ascii=False))
     else:
-        _print(verdict, console)
+        _print(verdict, make_console())
     return 0 if verdict.fits else 1
+
+
+def _build(options: argparse.Namespace) -> int:
+    folder, host = made_folder(options.build, "--build"), host_platform()
+    platforms = tuple(options.platform or ([host] if host else []))
+    for name in ("probe_a", "probe_b"):
+        print(export_native(build_model(name), folder, platforms))
+    path = folder / "INSTRUCTIONS.md"
+    path.write_text(instructions(options.step, options.stop, platforms), encoding="utf-8")
+    print(path)
+    return 0
 
 
 def _named(text: str) -> tuple[str, str]:

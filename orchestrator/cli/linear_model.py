@@ -5,7 +5,7 @@ import argparse
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.fmi.linear_model import EmbeddedModel, linear_model_members
+from orchestrator.fmi.linear_model import linear_model_members
 from orchestrator.study.component_model import component_model
 
 OPTION = "--with-linear-model"
@@ -68,10 +68,3 @@ def _one(option: str, what: str, wanted: str | None, known: list[str], where: st
         asked = f"there is no {what} {wanted!r}" if wanted else f"there are several {what}s"
         raise InputError(f"{OPTION}: {asked} in {where}; choose with {option} from: {', '.join(known)}")
     return wanted
-
-
-def in_words(model: EmbeddedModel) -> str:
-    """One line for ``gfor info``."""
-    size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
-    origin = ", ".join(f"{key} {model.origin[key]}" for key in ("case", "scenario", "component") if key in model.origin)
-    return f"linear model inside: {size}" + (f", at the operating point of {origin}" if origin else "")

@@ -1,13 +1,14 @@
-"""The command ``gfor export-ssp``: scenarios of a case as SSP archives."""
+"""``gfor export-ssp``: scenarios of a case as SSP archives."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.archive import write_archive
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli.arguments import seconds
+from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import InputError
 from orchestrator.ssp.study import study_of
 from orchestrator.ssp.writing import ssp_members
@@ -23,7 +24,9 @@ _TABLES: dict[str, Any] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options beside those that every command with a case has."""
+    """Arguments of ``gfor export-ssp``."""
+    add_case_arguments(parser)
+    parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s] (default: the case's)")
     parser.add_argument(
         "--out",
         type=Path,
@@ -32,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_export(case: Case, scenarios: Sequence[PreparedScenario], out: Path | None) -> int:
+def run(options: argparse.Namespace) -> int:
     """Write every scenario to an archive of its own and print their paths.
 
     Raises
@@ -40,6 +43,8 @@ def run_export(case: Case, scenarios: Sequence[PreparedScenario], out: Path | No
     InputError
         If several scenarios are to go into one file, or it cannot be written.
     """
+    out: Path | None = options.out
+    case, scenarios = prepare(options)
     single = out is not None and out.suffix.lower() == ".ssp"
     if single and len(scenarios) > 1:
         names = ", ".join(s.name for s in scenarios)

@@ -8,25 +8,11 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases import two_area
-from orchestrator.cli import main
 from orchestrator.vendor.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.vendor.checks.base import CHECKS as ENTERED
 from tests.vendor.gallery.hostile import entities
 
 FAST = ("--only", "power_balance", "--time-limit", "10")
-
-
-@pytest.fixture
-def gfor(capsys):
-    def run(*arguments):
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            code = stop.code
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture

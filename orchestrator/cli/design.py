@@ -1,16 +1,16 @@
-"""The subcommand ``gfor design``."""
+"""``gfor design``: a POD controller by eigenvalue sensitivity."""
 
 import argparse
 import json
 import math
 import shlex
 from pathlib import Path
-from typing import Any
 
-from rich.console import Console
-
-from orchestrator.cases.case import Case
+from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.cli.arguments import positive
+from orchestrator.cli.case_arguments import add_case_arguments, parameters
+from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError
 from orchestrator.report.design_files import design_json, parameters_of, provenance
 from orchestrator.report.design_sheet import sheet
@@ -19,7 +19,8 @@ from orchestrator.study.design_target import CONTROLLERS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """All arguments but those that every command on a case has."""
+    """Arguments of ``gfor design``."""
+    add_case_arguments(parser)
     defaults = DesignRequest(controller="")
     parser.add_argument("--controller", required=True, choices=CONTROLLERS, help="the controller to design")
     parser.add_argument(
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--delta-gain",
-        type=_positive,
+        type=positive,
         default=defaults.delta_gain,
         metavar="DK",
         help=f"gain of the finite-difference sensitivity [pu] (default: {defaults.delta_gain:g})",
@@ -71,14 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_design(options: argparse.Namespace, case: Case, console: Console, arguments: dict[str, Any]) -> int:
-    """Design, print, and write the parameter file.
-
-    Parameters
-    ----------
-    arguments
-        What every command on a case has: overrides, parameters, step_size.
-    """
+def run(options: argparse.Namespace) -> int:
+    """Design, print, and write the parameter file."""
+    files, case, console = parameters(options), load_case(options.case), make_console(stderr=options.json)
     if len(options.scenario) > 1:
         raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
     if options.damping is not None and options.damping_increment is not None:
@@ -98,12 +94,14 @@ def run_design(options: argparse.Namespace, case: Case, console: Console, argume
         least_damping=options.min_damping,
         refine=options.refine,
         margins=not options.no_margins,
+        overrides=dict(options.set),
+        parameters=files,
+        step_size=options.step,
         **wanted,
-        **arguments,
     )
     with console.status("starting") as status:
         design = design_pod(case, request, status.update)
-    text = parameter_file_text(parameters_of(design), provenance(design, command_line(options)))
+    text = parameter_file_text(parameters_of(design), provenance(design, _command_line(options)))
     path.write_text(text, encoding="utf-8")
     content = json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False)
     path.with_suffix(".json").write_text(content + "\n", encoding="utf-8")  # for `gfor report`
@@ -112,14 +110,14 @@ def run_design(options: argparse.Namespace, case: Case, console: Console, argume
         return 0
     for part in sheet(design):
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)
-    console.print(f"Parameter file {path}; use it with: gfor modes {case_argument(options)} --scenario "
+    console.print(f"Parameter file {path}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}", soft_wrap=True, highlight=False)  # fmt: skip
     return 0
 
 
-def command_line(options: argparse.Namespace) -> str:
+def _command_line(options: argparse.Namespace) -> str:
     """The command that was given, with all that is not left to its default."""
-    words = ["gfor", "design", case_argument(options), "--controller", options.controller]
+    words = ["gfor", "design", str(options.case), "--controller", options.controller]
     single = {"--component": options.component, "--mode": options.mode, "--damping": options.damping,
               "--damping-increment": options.damping_increment, "--stages": options.stages,
               "--step": options.step}  # fmt: skip
@@ -135,11 +133,6 @@ def command_line(options: argparse.Namespace) -> str:
         words += ["--parameters", str(file)]
     words += ["--refine"] if options.refine else []
     return " ".join(shlex.quote(word) for word in words)
-
-
-def case_argument(options: argparse.Namespace) -> str:
-    """The case as it was given."""
-    return str(options.case)
 
 
 def _writable(path: Path) -> Path:
@@ -165,16 +158,6 @@ def _ratio(text: str) -> float:
         value = math.nan
     if not 0 < value < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a damping ratio between 0 and 1, such as 0.1 or 10%")
-    return value
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (value > 0 and math.isfinite(value)):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a gain above 0, such as 50")
     return value
 
 

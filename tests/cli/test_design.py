@@ -7,23 +7,11 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
-from orchestrator.cli import main
 
 
-@pytest.fixture
-def gfor(capsys, tmp_path, monkeypatch):
-    """Run the command in an empty folder; returns exit code, standard output and standard error."""
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as stop:
-            code = stop.code
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
 
 
 @pytest.fixture
@@ -120,7 +108,7 @@ def test_no_stages_leave_the_lead_lag_out(design):
         (["--damping", "0.2", "--damping-increment", "0.1"], "both say what is required; give one of them"),
         (["--gain-bounds", "400:200"], "'400:200' are no bounds; write MIN:MAX in pu"),
         (["--gain-bounds", "0:1e6"], "--gain-bounds: 1e+06 is out of range: gfor.pod_p.K takes from 0 to 100000"),
-        (["--delta-gain", "0"], "'0' is not a gain above 0"),
+        (["--delta-gain", "0"], "'0' must be a number above 0"),
         (["--stages", "4"], "--stages: 4 is out of range: gfor.pod_p.N_S takes from 0 to 3"),
         (["--set", "gfor.pod_p.T_X=1"], "--set gfor.pod_p.T_X: component 'gfor' has no variable 'pod_p.T_X'"),
         (["--parameters", "none.toml"], "none.toml: the parameter file cannot be read"),

@@ -2,21 +2,20 @@
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.certification.files import certification_json, save
 from orchestrator.certification.study import PODS, REACTANCES, Certification, CertificationRequest, certify
-from orchestrator.cli_sweep import choose_executor
-from orchestrator.errors import InputError
+from orchestrator.cli.arguments import setting
+from orchestrator.cli.executors import add_executor_arguments, choose_executor
+from orchestrator.cli.terminal import made_folder, make_console, progress_bar
 
 
-def add_arguments(parser: argparse.ArgumentParser, workers: Callable[[str], int]) -> None:
-    """Arguments of ``gfor certify``; ``workers`` reads a number of processes."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor certify``."""
     parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="the converter")
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument(
@@ -33,8 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser, workers: Callable[[str], int]
     )  # fmt: skip
     parser.add_argument("--black-box", action="store_true",
                         help="do not use the converter's states for the modes, even if it shows them")  # fmt: skip
-    parser.add_argument("--workers", type=workers, metavar="N", help="processes to compute in (default: one a core)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
+    add_executor_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/certify_<file>)")
     parser.add_argument(
         "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
@@ -42,25 +40,24 @@ def add_arguments(parser: argparse.ArgumentParser, workers: Callable[[str], int]
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
 
 
-def run_certify(
-    options: argparse.Namespace, console: Console, report: Callable[[int, int], None] = lambda done, total: None
-) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run the test, write its report and print the verdict; returns 1 where the converter does not pass."""
-    folder = options.out or Path("results") / f"certify_{options.fmu.stem}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {folder}: results cannot be written there: {error.strerror}") from error
+    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
+    console = make_console(stderr=options.json)
     study = {name: value for name, value in options.set if name.split(".")[0] in ("sg1", "sg2", "grid")}
     own = {name: value for name, value in options.set if name not in study}
     request = CertificationRequest(
         options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
     )
-    executor = choose_executor(options.workers, options.scheduler)
-    try:
-        result = certify(request, executor, folder, report)
-    finally:
-        executor.close()
+    executor = choose_executor(options.workers, options.scheduler, ["orchestrator.certification.point"])
+    with progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+        try:
+            result = certify(
+                request, executor, folder, lambda done, total: bar.update(task, completed=done, total=total)
+            )
+        finally:
+            executor.close()
     files = save(result, folder, pdf=options.pdf)
     if options.json:
         print(json.dumps(certification_json(result), indent=1, ensure_ascii=False))
@@ -98,19 +95,6 @@ def _table(result: Certification) -> Table:
             "accepted" if v.accepted else "[red]not accepted[/]",
         )
     return table
-
-
-def setting(text: str) -> tuple[str, bool | float | str]:
-    """``variable=value`` of one FMU."""
-    name, equals, value = text.partition("=")
-    if not equals or not name or not value:
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")
-    if value.lower() in ("true", "false"):
-        return name.strip(), value.lower() == "true"
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        return name.strip(), value.strip()
 
 
 def _reactances(text: str) -> tuple[float, ...]:

@@ -1,0 +1,92 @@
+"""The command ``gfor``. Each subcommand is a module of this package, imported only where it is called."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.errors import CosimError
+
+COMMANDS = {
+    "run": "steady state, modes and time response of a case's scenarios",
+    "modes": "steady state and eigenvalues of a case's scenarios",
+    "linearize": "write a scenario's linear model A, B, C, D for other tools",
+    "export-ssp": "write a case's scenarios as SSP archives for other tools",
+    "sweep": "modes over a grid of parameters, followed from point to point",
+    "compare": "two recorded runs: differences, and what each rings with",
+    "identify": "the modes in a recorded signal (matrix pencil)",
+    "report": "one self-contained HTML page from the folder of a run",
+    "design": "design a POD controller by eigenvalue sensitivity",
+    "admittance": "measure a device's admittance, and fit a model to it",
+    "black-box": "modes of a case with a component known by its port alone",
+    "certify": "the grid code's damping test on a converter FMU",
+    "build": "build FMUs of the catalogue's models",
+    "which-master": "which schedule another tool runs, told by a pair of probe FMUs",
+    "bind": "draft a binding: what a foreign FMU's variables mean at our port",
+    "check": "acceptance tests of an FMU: can it be trusted in a co-simulation?",
+    "info": "show what an FMU declares",
+}
+"""Subcommands, each with a module of its name."""
+
+EXAMPLES = """\
+examples:
+  gfor run two_area                              the paper's first case study, into results/two_area
+  gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
+  gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
+  gfor modes my_case.toml --json                 a case file of your own, for a program to read
+  gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
+  gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
+  gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
+  gfor design two_area --controller pod_p        POD-P for its electromechanical mode
+  gfor compare results/two_area/gfor results/two_area/pod_p
+  gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
+  gfor which-master --build probes               two FMUs that tell which schedule a tool runs
+  gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor black-box two_area --scenario gfor --component gfor
+  gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
+  gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
+  gfor info fmus/gfor.fmu                        what an FMU declares
+  gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
+  gfor check vendor.fmu --binding vendor.toml    whether it can be trusted in a co-simulation
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    options = _parser(next((word for word in words if not word.startswith("-")), None)).parse_args(words)
+    errors = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
+    try:
+        return int(options.command(options))
+    except CosimError as error:
+        errors.print(f"[bold red]error:[/bold red] {escape(str(error))}")
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    except KeyboardInterrupt:
+        errors.print("interrupted")
+        return 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose help opens with the examples."""
+
+    def format_help(self) -> str:
+        return f"{EXAMPLES}\n{super().format_help()}"
+
+
+def _parser(chosen: str | None) -> argparse.ArgumentParser:
+    """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
+    parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=argparse.ArgumentParser)
+    for name, words in COMMANDS.items():
+        command = commands.add_parser(name, help=words)
+        if name == chosen:
+            module = import_module(f"orchestrator.cli.{name.replace('-', '_')}")
+            module.add_arguments(command)
+            command.set_defaults(command=module.run)
+    return parser

@@ -1,0 +1,108 @@
+"""``gfor admittance``: a device known only through FMI, measured at its port."""
+
+import argparse
+import cmath
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+
+from orchestrator.black_box.bench import Bench
+from orchestrator.black_box.files import identification_json, save_identification
+from orchestrator.black_box.fitting import fit
+from orchestrator.black_box.frequency_response import measure
+from orchestrator.black_box.passivity import passivity
+from orchestrator.cases.values import convert
+from orchestrator.cli.arguments import seconds, setting
+from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
+from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.vendor.binding import bound_fmu
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor admittance``."""
+    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device")
+    parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
+    parser.add_argument("--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
+                        help="a value of the FMU, such as P_0=0.9 or pod_p.enabled=true (repeatable)")  # fmt: skip
+    parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step [s] (100 us)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/admittance_<file>)")
+    add_excitation_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, fit, write, and say what was found."""
+    console = make_console(stderr=options.json)
+    description = bound_fmu(options.fmu, options.binding)
+    values = _values(description, dict(options.set))
+    magnitude, angle = (float(values.get(name, _start(description, name))) for name in ("v_0", "theta_0"))
+    rest = cmath.rect(magnitude, angle)
+    bench = Bench(
+        description, values, np.array([rest.real, rest.imag]), step_size=options.step,
+        restore=False if options.no_state else None,
+    )  # fmt: skip
+    _check_port(description, bench)
+    with console.status("measuring"):
+        response = measure(bench, excitation_of(options))
+        model, passive = fit(response), passivity(response)
+    folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}")
+    files = save_identification(response, model, passive, folder)
+    content = identification_json(response, model, passive)
+    if options.json:
+        print(json.dumps(content, indent=1))
+        return 0
+    console.print(_summary(content))
+    active = ", ".join(f"{low:g}–{high:g} Hz" for low, high in passive.ranges()) or "nowhere in the measured range"
+    console.print(f"Not passive: {active}; least relative index {passive.relative.min():.3f}", highlight=False)
+    console.print(f"Results in {folder}: {', '.join(f.name for f in files)}", soft_wrap=True, highlight=False)
+    return 0
+
+
+def _values(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, float | bool]:
+    values = {}
+    for name, value in given.items():
+        info = description.variables.get(name)
+        if info is None:
+            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
+        try:
+            values[name] = convert(info, value)
+        except ValueError as error:
+            raise InputError(f"--set {name}: {error}") from error
+    return values
+
+
+def _start(description: FmuDescription, name: str) -> float:
+    info = description.variables.get(name)
+    return float(info.start) if info is not None and info.start else (1.0 if name == "v_0" else 0.0)
+
+
+def _check_port(description: FmuDescription, bench: Bench) -> None:
+    missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
+    if missing:
+        raise InputError(
+            f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
+            "a vendor.toml maps another FMU's variables; give it with --binding"
+        )
+
+
+def _summary(content: dict[str, Any]) -> Group:
+    heading = (f"Admittance by {content['method']}: {content['lines']} lines from {content['range_hz'][0]:g} to "
+             f"{content['range_hz'][1]:g} Hz, largest bound {content['largest_relative_bound']:.1e}; model of order "
+             f"{content['model']['order']}, error {content['model']['error']:.1e}")  # fmt: skip
+    table = Table(title="Poles of the fitted model", title_justify="left", header_style="bold")
+    for column in ("Pole [rad/s]", "f [Hz]", "Damping [%]"):
+        table.add_column(column, justify="right")
+    for pole in content["model"]["poles"]:
+        size = math.hypot(pole["real"], pole["imag"])
+        value = f"{pole['real']:.4g}" + (f" ± j{pole['imag']:.4g}" if pole["imag"] else "")
+        damping = f"{-100 * pole['real'] / size:.2f}" if size else "–"
+        table.add_row(value, f"{pole['imag'] / (2 * math.pi):.4g}", damping)
+    return Group(heading, table)

@@ -1,0 +1,82 @@
+"""What the words behind options mean; argparse prints what is wrong with one."""
+
+import argparse
+import math
+
+from orchestrator.units import to_unit
+
+
+def value(text: str) -> bool | float | str:
+    """A truth value, a number, or text such as ``500 ms``."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def assignment(text: str) -> tuple[str, bool | float | str]:
+    """``component.parameter=value`` of a case."""
+    key, equals, given = text.partition("=")
+    if not equals or "." not in key or not given:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
+    return key.strip(), value(given.strip())
+
+
+def setting(text: str) -> tuple[str, bool | float | str]:
+    """``variable=value`` of one FMU."""
+    name, equals, given = text.partition("=")
+    if not equals or not name or not given:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")
+    return name.strip(), value(given.strip())
+
+
+def seconds(text: str) -> float:
+    """A time above 0 [s], as a number or with a unit."""
+    try:
+        time = to_unit(value(text), "s")
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if not (time > 0 and math.isfinite(time)):
+        raise argparse.ArgumentTypeError(f"{text!r} must exceed 0 and be finite")
+    return time
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    number = _number(text)
+    if not (number > 0 and math.isfinite(number)):
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number above 0")
+    return number
+
+
+def count(text: str) -> int:
+    """A whole number from 1 to 1000."""
+    if not text.isdigit() or not 1 <= int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1000")
+    return int(text)
+
+
+def percent(text: str) -> float:
+    """Damping [%] as a ratio."""
+    number = _number(text.removesuffix("%"))
+    if not 0 < number <= 90:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a damping in percent between 0 and 90, such as 20")
+    return number / 100
+
+
+def frequency_range(text: str) -> tuple[float, float]:
+    """``LO:HI`` [Hz]."""
+    low, colon, high = text.partition(":")
+    limits = _number(low), _number(high)
+    if not colon or not 0 <= limits[0] < limits[1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
+    return limits
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,34 @@
+"""``gfor bind``: a draft of what a foreign FMU's variables mean at our port."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import read_description
+from orchestrator.vendor.draft import draft_binding
+from orchestrator.vendor.tables import REQUIRED
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor bind``."""
+    parser.add_argument("file", type=Path, metavar="FILE.fmu")
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="binding file (default: FILE.toml, here)")
+    parser.add_argument("--force", action="store_true", help="write over a file that is there")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write a draft and say what is left to fill in."""
+    description = read_description(options.file)
+    out = options.out or Path(f"{options.file.stem}.toml")
+    if out.exists() and not options.force:
+        raise InputError(f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force")
+    text = draft_binding(description, out.parent)
+    try:
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--out {out}: cannot be written: {error.strerror}; choose another file") from error
+    marked = [line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")]
+    print(f"{out}: confirm what is marked GUESS")
+    for line in marked:
+        print(f"  to be filled in: {line}")
+    return 0

@@ -1,0 +1,97 @@
+"""``gfor black-box``: modes of a system with a device that is known only through FMI."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.black_box.coupled_modes import (
+    BoxedSystem,
+    component_participation,
+    is_black_box,
+    linearize_with_box,
+)
+from orchestrator.black_box.files import identification_json, save_identification
+from orchestrator.black_box.passivity import passivity
+from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
+from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.errors import InputError
+from orchestrator.study.modes import modes_of, running
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor black-box``."""
+    add_case_arguments(parser)
+    parser.add_argument("--component", required=True, metavar="NAME", help="the component to take for a black box")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_black_box)")
+    add_excitation_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Modes of a case's scenarios with one component identified, beside those from its states where it shows them."""
+    case, scenarios = prepare(options)
+    console = make_console(stderr=options.json)
+    folder = made_folder(options.out or Path("results") / f"{case.name}_black_box")
+    output = []
+    for prepared in scenarios:
+        with running(prepared) as master, console.status(f"{prepared.name}: measuring {options.component}"):
+            if options.component not in master.components:
+                known = ", ".join(master.components)
+                raise InputError(
+                    f"--component: scenario {prepared.name!r} has no {options.component!r}; it has: {known}"
+                )
+            restore = False if options.no_state else None
+            system = linearize_with_box(master, options.component, excitation_of(options), restore=restore)
+            box = is_black_box(master.components[options.component])
+            white = [] if box else modes_of(case, prepared, master, (0.1, 2.0)).modes
+        passive = passivity(system.response)
+        save_identification(system.response, system.identified, passive, folder / prepared.name)
+        if options.json:
+            output.append(_system_json(prepared.name, system, passive, white))
+        else:
+            console.print(_modes_table(prepared.title, system, white), "")
+    if options.json:
+        print(json.dumps(output, indent=1))
+    else:
+        console.print(f"Admittances and models in {folder}", soft_wrap=True, highlight=False)
+    return 0
+
+
+def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
+    return min(others, key=lambda m: abs(m.eigenvalue - mode.eigenvalue), default=None)
+
+
+def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
+    fitted = f"order {len(system.identified.A)}, fit {system.identified.error:.1e}"
+    name = f"{title}: {system.component} as a black box, {fitted}"
+    table = Table(title=name, title_justify="left", header_style="bold")
+    columns = ["f [Hz]", "Damping [%]", "the box takes part [%]"]
+    columns += ["with its states: f [Hz]", "Damping [%]", "takes part [%]"] if white else []
+    for column in columns:
+        table.add_column(escape(column), justify="right")
+    for mode in system.modes():
+        row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * system.participation(mode):.2f}"]
+        other = _nearest(mode, white)
+        if other is not None:
+            share = component_participation(other, system.component)
+            row += [f"{other.frequency_hz:.4f}", f"{other.damping_percent:.3f}", f"{100 * share:.2f}"]
+        table.add_row(*row)
+    return table
+
+
+def _system_json(name: str, system: BoxedSystem, passive: Any, white: list[Mode]) -> dict[str, Any]:
+    def figures(mode: Mode) -> dict[str, float]:
+        return {"real": mode.eigenvalue.real, "imag": mode.eigenvalue.imag, "frequency_hz": mode.frequency_hz,
+                "damping_percent": mode.damping_percent,
+                "participation": component_participation(mode, system.component)}  # fmt: skip
+
+    growth = find_spectrum(system.model, 0.1, 2.0).growth_rate
+    return {"scenario": name, "component": system.component, "residual": system.residual, "growth": growth,
+            "identification": identification_json(system.response, system.identified, passive),
+            "modes": [figures(m) for m in system.modes()], "white_box_modes": [figures(m) for m in white]}  # fmt: skip

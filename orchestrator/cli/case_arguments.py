@@ -1,0 +1,55 @@
+"""The arguments of every command on a case."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli.arguments import assignment, seconds
+
+
+def add_case_arguments(parser: argparse.ArgumentParser) -> None:
+    """The case and what is changed of it."""
+    parser.add_argument(
+        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+    )
+    parser.add_argument(
+        "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        type=assignment,
+        metavar="COMPONENT.PARAMETER=VALUE",
+        help="override a value (repeatable)",
+    )
+    parser.add_argument(
+        "--parameters",
+        action="append",
+        default=[],
+        type=Path,
+        metavar="FILE",
+        help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
+    )
+    parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    parser.add_argument(
+        "--native",
+        dest="set",
+        action="append_const",
+        const=("*.native", True),
+        help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
+    )
+
+
+def prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
+    """The case with its scenarios, as the options have them."""
+    case = load_case(options.case)
+    stop = getattr(options, "stop", None)
+    return case, case.prepare(options.scenario, dict(options.set), options.step, stop, parameters(options))
+
+
+def parameters(options: argparse.Namespace) -> list[ParameterFile]:
+    """The parameter files that are given."""
+    return [read_parameter_file(path) for path in options.parameters]

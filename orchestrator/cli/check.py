@@ -1,0 +1,59 @@
+"""``gfor check``: acceptance tests of an FMU."""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.cli.arguments import positive
+from orchestrator.fmi.limits import Limits
+from orchestrator.vendor.checks.base import Verdict
+from orchestrator.vendor.junit import write_junit
+from orchestrator.vendor.runner import Report, check_fmu
+
+_COLOURS = {Verdict.PASS: "green", Verdict.REMARK: "yellow", Verdict.FAIL: "bold red", Verdict.NOT_APPLICABLE: "dim"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor check``."""
+    parser.add_argument("file", type=Path, metavar="FILE.fmu")
+    parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what its variables mean (`gfor bind`)")
+    parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
+    parser.add_argument("--time-limit", type=positive, default=30.0, metavar="S", help="for one call [s] (default: 30)")
+    parser.add_argument(
+        "--memory-limit", type=positive, default=4096.0, metavar="MB", help="of the FMU's process [MB] (default: 4096)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Check, print, and write what is asked for; 1 if a check failed."""
+    limits = Limits(seconds=options.time_limit, memory=int(options.memory_limit * 1024**2))
+    report = check_fmu(options.file, options.binding, limits, tuple(options.only))
+    if options.junit:
+        write_junit(report, options.junit)
+    if options.json:
+        print(json.dumps(report.as_dict(), indent=1, ensure_ascii=False))
+    else:
+        _print(report)
+    return 0 if report.trusted else 1
+
+
+def _print(report: Report) -> None:
+    console = Console(soft_wrap=True, highlight=False, emoji=False)
+    for result in report.results:
+        mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
+        fault = f"[bold]{result.fault}:[/] " if result.fault else ""
+        console.print(f"{mark} {result.check:<22} {fault}{escape(result.evidence)}")
+        if result.remedy:
+            console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
+    console.print("")
+    if report.unlimited:
+        console.print(f"This system could not limit: {', '.join(report.unlimited)}.")
+    if report.trusted:
+        console.print(f"{report.fmu.name}: no check failed.")
+    else:
+        console.print(f"[bold red]{report.fmu.name}: do not use it as it is: {', '.join(report.faults)}[/]")

@@ -1,0 +1,38 @@
+"""Where points are computed: the options ``--workers`` and ``--scheduler``."""
+
+import argparse
+from collections.abc import Sequence
+
+from orchestrator.cli.arguments import count
+from orchestrator.distributed.dask_cluster import DaskCluster
+from orchestrator.distributed.executor import Executor
+from orchestrator.distributed.processes import Processes, number_of_cores
+from orchestrator.distributed.serial import Serial
+from orchestrator.errors import InputError
+
+
+def add_executor_arguments(parser: argparse.ArgumentParser) -> None:
+    """Both options."""
+    parser.add_argument("--workers", type=count, metavar="N", help="processes to compute in (default: one a core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
+
+
+def choose_executor(workers: int | None, scheduler: str | None, imports: Sequence[str]) -> Executor:
+    """Where the points are computed.
+
+    Parameters
+    ----------
+    imports
+        As `Processes` takes them.
+
+    Raises
+    ------
+    InputError
+        If both a number of workers and a scheduler are given.
+    """
+    if scheduler is not None:
+        if workers is not None:
+            raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
+        return DaskCluster(scheduler)
+    workers = workers or number_of_cores()
+    return Processes(workers, imports) if workers > 1 else Serial()

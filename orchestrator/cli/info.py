@@ -1,0 +1,46 @@
+"""``gfor info``: what an FMU declares."""
+
+import argparse
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.cli.terminal import make_console
+from orchestrator.fmi.description import read_description
+from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
+from orchestrator.report.tables import fmu_variables
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor info``."""
+    parser.add_argument("file", type=Path, metavar="FILE.fmu")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print what the FMU is, what it can do, and its variables."""
+    description = read_description(options.file)
+    console = make_console()
+    console.print(f"[bold]{escape(description.model_name)}[/bold]: {escape(description.title)}")
+    console.print(
+        f"FMI 2.0 co-simulation, guid {escape(description.guid)}, "
+        f"made by {escape(description.generation_tool or 'an unnamed tool')}",
+        highlight=False,
+    )
+    settable = "settable by a master" if description.states_are_settable else "not settable"
+    console.print(
+        f"platforms: {', '.join(description.platforms)}; continuous states: {len(description.states)} ({settable}); "
+        f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
+        highlight=False,
+    )
+    embedded = read_embedded_model(options.file)
+    if embedded is not None:
+        console.print(escape(_in_words(embedded)), highlight=False)
+    for table in fmu_variables(description):
+        console.print("", table)
+    return 0
+
+
+def _in_words(model: EmbeddedModel) -> str:
+    size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+    origin = ", ".join(f"{key} {model.origin[key]}" for key in ("case", "scenario", "component") if key in model.origin)
+    return f"linear model inside: {size}" + (f", at the operating point of {origin}" if origin else "")

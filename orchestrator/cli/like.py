@@ -1,0 +1,46 @@
+"""``gfor run --like``: as another master would give it."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.interop.masters import MASTERS, master_rules
+from orchestrator.interop.rules import MasterRules
+from orchestrator.report.storage import save_dataset
+from orchestrator.study.like import run_like
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor run`` that make it run as another master."""
+    parser.add_argument("--like", metavar="MASTER",
+                        help=f"only trajectories, as another master would give them: {', '.join(MASTERS)}")  # fmt: skip
+    parser.add_argument("--order", metavar="A,B,…",
+                        help="with --like: in which order components step, where they take turns")  # fmt: skip
+
+
+def rules_of(options: argparse.Namespace) -> MasterRules | None:
+    """The master that a run is to follow; None for our own.
+
+    Raises
+    ------
+    InputError
+        If it is not known, or an order is given without it.
+    """
+    if options.order and not options.like:
+        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+    return master_rules(options.like) if options.like else None
+
+
+def run(case: Case, scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace) -> int:
+    """Run scenarios as another master would; their trajectories are all that is written."""
+    order = options.order.split(",") if options.order else None
+    folder = options.out or Path("results") / f"{case.name}_like_{rules.name}"
+    for prepared in scenarios:
+        dataset = run_like(case, prepared, rules, order)
+        path = folder / prepared.name / "trajectory"
+        save_dataset(dataset, path)
+        print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
+    return 0

@@ -1,0 +1,68 @@
+"""``gfor modes``: steady state and eigenvalues of a case's scenarios."""
+
+import argparse
+import json
+from pathlib import Path
+
+from orchestrator.cli.arguments import frequency_range, percent
+from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_warnings
+from orchestrator.errors import InputError
+from orchestrator.report import tables
+from orchestrator.study.modes import compute_modes, modes_json
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor modes``."""
+    add_case_arguments(parser)
+    parser.add_argument(
+        "--range",
+        type=frequency_range,
+        default=(0.1, 2.0),
+        metavar="LO:HI",
+        help="frequencies shown [Hz] (default: 0.1:2)",
+    )
+    parser.add_argument(
+        "--critical",
+        type=percent,
+        nargs="?",
+        const=0.2,
+        metavar="PERCENT",
+        help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
+    )
+    parser.add_argument(
+        "--directional",
+        action="store_true",
+        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute, print, and write what is asked for."""
+    case, scenarios = prepare(options)
+    if options.critical is not None and not options.range[0] > 0:
+        raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
+    folder = made_folder(options.out) if options.out else None
+    results = [
+        compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+        for prepared in scenarios
+    ]
+    written = []
+    if folder:
+        from orchestrator.report.study_files import save_modes  # noqa: PLC0415 - plots: a second to import
+
+        written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
+        written += [path.name for path in save_modes(case, results, folder)]
+    if options.json:
+        print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
+        return 0
+    console = make_console()
+    for result in results:
+        console.print(tables.all_modes(result), "")
+    print_named_modes(console, case, results)
+    if folder:
+        console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
+    print_warnings(results)
+    return 0

@@ -1,0 +1,82 @@
+"""``gfor run``: steady state, modes and time response of a case's scenarios."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.cases.case import Case
+from orchestrator.cli import like
+from orchestrator.cli.arguments import seconds
+from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_warnings, progress_bar
+from orchestrator.coupling.progress import Progress
+from orchestrator.report import tables
+from orchestrator.report.study_files import save_run, save_study, summary_of
+from orchestrator.study.run import RunResult, run_scenario
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor run``."""
+    add_case_arguments(parser)
+    parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
+    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    like.add_arguments(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the scenarios one after the other; each is written as soon as it is done."""
+    rules = like.rules_of(options)
+    case, scenarios = prepare(options)
+    if rules is not None:
+        return like.run(case, scenarios, rules, options)
+    folder = made_folder(options.out or Path("results") / case.name)
+    console = make_console(stderr=options.json)
+    results: list[RunResult] = []
+    with progress_bar(console) as bar:
+        for prepared in scenarios:
+            task = bar.add_task(prepared.title, total=None)
+
+            def report(done: int, total: int, task: Any = task) -> None:
+                bar.update(task, completed=done, total=total)
+
+            result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
+            results.append(result)
+            save_run(result, folder)
+            print_warnings([result.modes])
+            if result.failure:
+                break
+    plots = save_study(case, results, folder)
+    if options.json:
+        print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
+    else:
+        _print(console, case, results)
+        console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
+                      f"step_size.csv, summary.json, "
+                      f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
+    if results and results[-1].failure:
+        Console(stderr=True, soft_wrap=True, highlight=False).print(
+            f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: "
+            f"{escape(str(results[-1].failure))}\nWhat was computed until then is in {folder}"
+        )
+        return 1
+    return 0
+
+
+def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
+    modes = [r.modes for r in results]
+    console.print(tables.steady_states(modes), "")
+    print_named_modes(console, case, modes)
+    if any(r.ring_down for r in results):
+        console.print("", tables.ring_downs(results))
+    if any(r.shifts for r in results):
+        console.print("", tables.mode_shifts(results))
+    if any(r.linear is not None for r in results):
+        console.print("", tables.linear_differences(case, results))
+    console.print("", tables.run_statistics(results), "")

@@ -1,0 +1,64 @@
+"""What all commands print, and where to."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as ProgressBar
+
+from orchestrator.errors import InputError
+from orchestrator.report import tables
+
+if TYPE_CHECKING:
+    from orchestrator.cases.case import Case
+    from orchestrator.study.modes import ModesResult
+
+
+def make_console(*, stderr: bool = False) -> Console:
+    """A terminal's own width; elsewhere one that lets no table wrap."""
+    console = Console(stderr=stderr)
+    return console if console.is_terminal else Console(stderr=stderr, width=160)
+
+
+def progress_bar(console: Console) -> ProgressBar:
+    """A bar on a terminal; elsewhere nothing."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
+
+
+def print_named_modes(console: Console, case: "Case", results: "Sequence[ModesResult]") -> None:
+    """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
+    if any(r.electromechanical for r in results):
+        title = case.table.reference.title if case.table.reference else None
+        console.print(tables.named_modes(results, title))
+        if case.table.reference and any(r.references for r in results):
+            console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
+    if any(r.swing and (r.named or r.modes) for r in results):
+        console.print("", tables.mode_shapes(results), "")
+
+
+def print_warnings(results: "Sequence[ModesResult]") -> None:
+    """Say on standard error what is to be borne in mind of results."""
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    for result in results:
+        for text in result.warnings:
+            console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")
+
+
+def made_folder(path: Path, option: str = "--out") -> Path:
+    """The folder for results, made before anything is computed."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{option} {path}: results cannot be written there: {error.strerror}; choose another folder"
+        ) from error
+    return path
