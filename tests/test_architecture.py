@@ -174,7 +174,7 @@ def test_there_is_no_cycle():
 @pytest.mark.parametrize(
     ("library", "users"),
     [
-        ("pythonfmu", {"fmus.toolchain.python_fmu", "fmus.toolchain.slave"}),
+        ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
         ("fmpy", {f"orchestrator.fmi.{name}" for name in ("component", "description", "validation")}),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),

@@ -19,8 +19,9 @@ from fmus.toolchain.description import model_description
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.python_kernel import python_source
+from fmus.toolchain.wrapper import wrapper_binaries
 
-_SLAVE = Path(__file__).with_name("slave.py")
+_SLAVE, _WRAPPER = (Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py"))
 
 
 def export(
@@ -76,7 +77,7 @@ class _Sources:
         self.slave = _SLAVE.read_text(encoding="utf-8")
         self.tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
         description = model_description(model, "", model.name, self.tool).decode()
-        exporter = Path(__file__).read_text(encoding="utf-8")
+        exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
         self.digest = digest_of(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
         self.guid = guid_of(self.digest)
@@ -102,8 +103,8 @@ def _contents(model: Model, platforms: tuple[str, ...]) -> dict[str, bytes]:
     package = Path(pythonfmu.__file__).parent
     for file in sorted(package.glob("*.py")):
         contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
-    for binary in sorted((package / "resources" / "binaries").rglob("*.*")):
-        contents[f"binaries/{binary.parent.name}/{model.name}{binary.suffix}"] = binary.read_bytes()
+    for file, binary in wrapper_binaries().items():
+        contents[f"binaries/{file.parent.name}/{model.name}{file.suffix}"] = binary
     return contents
 
 
