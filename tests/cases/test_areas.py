@@ -1,5 +1,7 @@
 """Components belong to the area that names them or their bus."""
 
+import pytest
+
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.case import load_case
 
@@ -14,6 +16,7 @@ def test_areas_by_component_and_by_bus():
     assert areas_of({}, ready.system) == {}
 
 
+@pytest.mark.slow
 def test_every_unit_of_the_118_bus_case_has_its_zone():
     case = load_case("ieee118")
     (ready,) = case.prepare(["gfor"])

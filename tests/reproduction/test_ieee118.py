@@ -47,6 +47,7 @@ def test_the_three_critical_modes_are_the_papers(scenario):
         assert nearest < 2e-3
 
 
+@pytest.mark.slow
 def test_the_power_flow_gives_the_published_reactive_powers():
     _, ready = prepare("base")
     path = Path(load_case("ieee118").path).with_name("units.csv")
