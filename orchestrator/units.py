@@ -19,6 +19,16 @@ def _registry() -> Any:
     return registry
 
 
+def read_value(text: str) -> bool | float | str:
+    """A truth value, a number, or text such as ``500 ms``, as options and ranges give it."""
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 def to_unit(value: float | int | str, unit: str) -> float:
     """Convert a value to the unit that is declared for it.
 

@@ -8,11 +8,13 @@ a half means: most of mode a is in mode b.
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+
+from orchestrator.analysis.modes import Mode
 
 THRESHOLD = 0.5
 """Least similarity at which two modes are taken for the same."""
@@ -48,6 +50,16 @@ class ModeSet:
     left: Complex
     right: Complex
     names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, modes: Sequence[Mode], names: tuple[str, ...]) -> Self:
+        """The set of some modes of a model with these states."""
+
+        def rows(vectors: Iterable[Mapping[str, complex]]) -> Complex:
+            return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(len(modes), len(names))
+
+        values = np.array([mode.eigenvalue for mode in modes], dtype=complex)
+        return cls(values, rows(m.left for m in modes), rows(m.shape for m in modes), names)
 
     @property
     def frequencies(self) -> NDArray[np.float64]:

@@ -117,16 +117,9 @@ def _compute(task: PointTask, result: PointResult) -> None:
 
 def _keep_modes(result: PointResult, model: LinearModel) -> None:
     spectrum = find_spectrum(model, *COMPUTED)
-    rows = [[mode.left for mode in spectrum.modes], [mode.shape for mode in spectrum.modes]]
-    left, right = (_matrix(vectors, model.names) for vectors in rows)
-    values = np.array([mode.eigenvalue for mode in spectrum.modes], dtype=complex)
-    result.modes = ModeSet(values, left, right, model.names)
+    result.modes = ModeSet.of(spectrum.modes, model.names)
     result.components = [_in_words(mode) for mode in spectrum.modes]
     result.growth = spectrum.growth_rate
-
-
-def _matrix(vectors: list[dict[str, complex]], names: tuple[str, ...]) -> NDArray[np.complex128]:
-    return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(len(vectors), len(names))
 
 
 def _in_words(mode: Mode) -> str:

@@ -3,17 +3,7 @@
 import argparse
 import math
 
-from orchestrator.units import to_unit
-
-
-def value(text: str) -> bool | float | str:
-    """A truth value, a number, or text such as ``500 ms``."""
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    try:
-        return float(text)
-    except ValueError:
-        return text
+from orchestrator.units import read_value, to_unit
 
 
 def assignment(text: str) -> tuple[str, bool | float | str]:
@@ -21,7 +11,7 @@ def assignment(text: str) -> tuple[str, bool | float | str]:
     key, equals, given = text.partition("=")
     if not equals or "." not in key or not given:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
-    return key.strip(), value(given.strip())
+    return key.strip(), read_value(given.strip())
 
 
 def setting(text: str) -> tuple[str, bool | float | str]:
@@ -29,13 +19,13 @@ def setting(text: str) -> tuple[str, bool | float | str]:
     name, equals, given = text.partition("=")
     if not equals or not name or not given:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")
-    return name.strip(), value(given.strip())
+    return name.strip(), read_value(given.strip())
 
 
 def seconds(text: str) -> float:
     """A time above 0 [s], as a number or with a unit."""
     try:
-        time = to_unit(value(text), "s")
+        time = to_unit(read_value(text), "s")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     if not (time > 0 and math.isfinite(time)):

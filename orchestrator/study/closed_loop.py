@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from orchestrator.analysis.component_linearization import linearize_component
+from orchestrator.analysis.continuation import Eigenpair, follow
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.pod_design import LeadLag, damping_ratio
-from orchestrator.analysis.tracking import Eigenpair, follow
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription

@@ -6,6 +6,7 @@ The sensitivities are finite differences between two real linearisations, and th
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from orchestrator.analysis.continuation import pair_at
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.pod_design import (
@@ -20,7 +21,6 @@ from orchestrator.analysis.pod_design import (
     sensitivity,
 )
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.analysis.tracking import pair_at
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario

@@ -14,7 +14,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import VariableInfo
-from orchestrator.units import to_unit
+from orchestrator.units import read_value, to_unit
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 _MOST = 100_000
@@ -78,7 +78,7 @@ def parse_vary(text: str) -> Vary:
     if not equals or not re.fullmatch(r"[^.\s]+\.\S+", key) or not given:
         raise ValueError(f"{text!r} is not of the form component.parameter={_FORMS}")
     if ":" not in given:
-        values = tuple(_value(part.strip()) for part in given.split(","))
+        values = tuple(read_value(part.strip()) for part in given.split(","))
         if any(value == "" for value in values):
             raise ValueError(f"{text!r}: a value of the list is missing; write it like 0.1,0.2,0.5")
         return Vary(key, None, len(values), False, values)
@@ -89,16 +89,7 @@ def parse_vary(text: str) -> Vary:
         raise ValueError(f"{text!r}: {given!r} is not of the form {_FORMS}")
     if not re.fullmatch(r"\d+", parts[2]) or not 2 <= int(parts[2]) <= _MOST:
         raise ValueError(f"{text!r}: COUNT = {parts[2]!r}; it must be a whole number from 2 to {_MOST}")
-    return Vary(key, (_value(parts[0]), _value(parts[1])), int(parts[2]), logarithmic, ())
-
-
-def _value(text: str) -> Value:
-    if text.lower() in ("true", "false"):
-        return text.lower() == "true"
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return Vary(key, (read_value(parts[0]), read_value(parts[1])), int(parts[2]), logarithmic, ())
 
 
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:

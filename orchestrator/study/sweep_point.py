@@ -180,23 +180,14 @@ def _case(reference: str, wanted: str) -> Case:
 
 
 def _record(key: str, result: ModesResult) -> PointRecord:
-    modes, names = result.modes, result.model.names
+    modes = result.modes
     return PointRecord(
         key,
-        ModeSet(
-            np.array([mode.eigenvalue for mode in modes], dtype=complex),
-            _rows([mode.left for mode in modes], names),
-            _rows([mode.shape for mode in modes], names),
-            names,
-        ),
+        ModeSet.of(modes, result.model.names),
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
         residual=result.operating_point.residual,
         warnings=result.warnings,
     )
-
-
-def _rows(vectors: list[dict[str, complex]], names: tuple[str, ...]) -> Any:
-    return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(len(vectors), len(names))
 
 
 # -- keeping -----------------------------------------------------------------------------------------

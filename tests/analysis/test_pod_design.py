@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.analysis.continuation import follow, pair_at, pairs_near
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.pod_design import (
     LeadLag,
@@ -21,7 +22,6 @@ from orchestrator.analysis.pod_design import (
     required_gain,
     sensitivity,
 )
-from orchestrator.analysis.tracking import follow, pair_at, pairs_near
 from orchestrator.errors import AnalysisError
 
 angles = st.floats(-179.9, 180)
