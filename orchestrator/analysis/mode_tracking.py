@@ -56,7 +56,9 @@ class ModeSet:
         """The set of some modes of a model with these states."""
 
         def rows(vectors: Iterable[Mapping[str, complex]]) -> Complex:
-            return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(len(modes), len(names))
+            return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(
+                len(modes), len(names)
+            )
 
         values = np.array([mode.eigenvalue for mode in modes], dtype=complex)
         return cls(values, rows(m.left for m in modes), rows(m.shape for m in modes), names)

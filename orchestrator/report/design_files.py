@@ -109,6 +109,12 @@ def _margins_json(m: "Margins") -> dict[str, Any]:
         "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
         "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
         "largest_factor_tried": m.reach,
+        "phase_margin_deg": m.loop.phase_deg if m.loop else None,
+        "phase_margin_hz": m.loop.phase_hz if m.loop else None,
+        "delay_margin_s": m.loop.delay if m.loop else None,
+        "delay_margin_hz": m.loop.delay_hz if m.loop else None,
+        "sensitivity_peak": m.loop.peak if m.loop else None,
+        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None,
         "damping_ratio_with": m.variations,
     }
 

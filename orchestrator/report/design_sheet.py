@@ -124,9 +124,25 @@ def _margins(m: "Margins", d: "PodDesign") -> Table:
         down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
     table.add_row(f"Gain up, {lost}", up)
     table.add_row("Gain down, the same", down)
+    for name, value in loop_rows(m):
+        table.add_row(name, value)
     for name, damping in m.variations.items():
         table.add_row(f"Damping of the target with {name}, the rest as it is", percent(damping))
     return table
+
+
+def loop_rows(m: "Margins") -> Iterable[tuple[str, str]]:
+    """Names and values of the loop's margins."""
+    if m.loop is None:
+        yield "Phase and delay margin", f"not known: {m.no_loop}"
+        return
+    never = "no limit: the gain around the loop is 1 at no frequency"
+    for name, size, hertz in (
+        ("Phase margin, the loop broken at K", m.loop.phase_deg and f"{m.loop.phase_deg:.1f}°", m.loop.phase_hz),
+        ("Delay margin", m.loop.delay and f"{1e3 * m.loop.delay:.1f} ms", m.loop.delay_hz),
+        ("Largest sensitivity 1/|1 + L|", f"{m.loop.peak:.2f}", m.loop.peak_hz),
+    ):
+        yield name, f"{size} at {hertz:.3g} Hz" if size else never
 
 
 def _notes(d: "PodDesign") -> Iterable[str]:

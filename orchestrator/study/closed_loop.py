@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 from orchestrator.analysis.component_linearization import linearize_component
 from orchestrator.analysis.continuation import Eigenpair, follow
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.pod_design import LeadLag, damping_ratio
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 
@@ -79,6 +80,18 @@ class PodLoop:
             exchange = self._master.exchanges[name]
             self._blocks.components[name] = linearize_component(exchange, self._master.time, self._blocks.step_size)
         return compose(self._blocks, self._master.schedule)
+
+    def continuous_model(self, setting: PodSetting) -> LinearModel:
+        """The same without any communication step.
+
+        Raises
+        ------
+        AnalysisError
+            If a component does not give its derivatives.
+        """
+        self._apply(setting)
+        with as_if_told(self._master, 0.0):
+            return continuous(Blocks(self._master, derivatives=True))
 
     def place(self, start: Placed, gain: float, filters: LeadLag | None = None) -> Placed:
         """Follow the target mode to another gain.

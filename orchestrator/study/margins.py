@@ -1,9 +1,11 @@
-"""How far a POD setting is from trouble: margins of the gain, and what small errors of its values do to the target."""
+"""How far a POD setting is from trouble: margins of its loop, and what small errors of its values do to the target."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from orchestrator.analysis.loop_margins import LoopMargins, loop_margins
 from orchestrator.analysis.pod_design import LeadLag, damping_ratio
+from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.study.guard import GROWTH, extremes
 
@@ -17,7 +19,7 @@ VARIATION = 0.2
 
 @dataclass(frozen=True)
 class Margins:
-    """Gain margins and variations.
+    """Margins of gain, phase and delay, and variations.
 
     Attributes
     ----------
@@ -28,6 +30,8 @@ class Margins:
     up, down
         Factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that
         happens neither up to ``reach`` (up) nor down to a gain of 0 (down).
+    loop
+        Of the loop that is broken where the gain acts, in all components at once; None where ``no_loop`` says why.
     variations
         Damping ratio of the target by name of the variation, such as ``T_S1 +20 %``; None where it cannot be followed.
     """
@@ -37,6 +41,8 @@ class Margins:
     down: float | None
     lost_up: complex | None
     lost_down: complex | None
+    loop: LoopMargins | None
+    no_loop: str
     variations: dict[str, float]
     reach: float = _REACH
 
@@ -64,7 +70,16 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
         return weakest if damping_ratio(weakest) < limit - 1e-9 else None
 
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
-    return Margins(limit, up, down, lost_up, lost_down, _variations(loop, off, nominal.setting))
+    found, why = _of_loop(loop, nominal.setting)
+    return Margins(limit, up, down, lost_up, lost_down, found, why, _variations(loop, off, nominal.setting))
+
+
+def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:
+    try:
+        half, full = (loop.continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
+        return loop_margins(half, full), ""
+    except AnalysisError as error:
+        return None, str(error)
 
 
 def _edge(lost: Callable[[float], complex | None], stride: float) -> tuple[float | None, complex | None]:

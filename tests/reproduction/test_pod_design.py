@@ -1,12 +1,14 @@
 """The paper's POD design, and designs elsewhere, from coupled FMUs."""
 
+import numpy as np
 import pytest
 
 from orchestrator.analysis.pod_design import angle_deg
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
+from orchestrator.study.closed_loop import PodLoop, PodSetting
 from orchestrator.study.design import DesignRequest, design_pod
-from orchestrator.study.modes import compute_modes
+from orchestrator.study.modes import compute_modes, running
 
 pytestmark = pytest.mark.reproduction
 
@@ -136,6 +138,36 @@ def test_margins_say_where_a_mode_is_lost():
         (ready,) = case.prepare(["gfor"], overrides | gain)
         modes = compute_modes(case, ready, (0.1, 100.0)).modes
         assert all(m.eigenvalue.real < 0 for m in modes) == stable
+
+
+@pytest.mark.parametrize("controller", PAPER)
+def test_the_delay_margin_is_the_delay_at_which_the_system_turns_unstable(controller):
+    """The same linear system with what the gain sees delayed: its history is a polynomial in 30 Chebyshev points."""
+    d = design(controller, margins=True)
+    (ready,) = load_case("two_area").prepare([d.target.scenario], {f"gfor.{controller}.N_S": d.target.stages})
+    with running(ready) as master:
+        loop = PodLoop(master, ["gfor"], controller)
+        half, full = (loop.continuous_model(PodSetting(d.gain * share, d.filters)).A for share in (0.5, 1.0))
+    left, sizes, right = np.linalg.svd(2 * (full - half))
+    assert sizes[1] < 1e-6 * sizes[0]  # one gain, in one place
+    u, v = sizes[0] * left[:, :1], right[:1]
+
+    def growth(delay):
+        D = differentiation(30) * 2 / delay  # of y(t + θ) over θ, from 0, where y = v·x, to −delay
+        whole = np.block([[full - u @ v, np.zeros((len(u), 29)), u], [D[1:, :1] @ v, D[1:, 1:]]])
+        return np.linalg.eigvals(whole).real.max()
+
+    assert growth(0.2 * d.margins.loop.delay) < 1e-4
+    assert growth(0.97 * d.margins.loop.delay) < 1e-4
+    assert growth(1.03 * d.margins.loop.delay) > 5e-3
+
+
+def differentiation(n):
+    """Matrix that differentiates a polynomial, given at the n + 1 Chebyshev points from 1 to −1."""
+    x = np.cos(np.pi * np.arange(n + 1) / n)
+    c = np.r_[2, np.ones(n - 1), 2] * (-1) ** np.arange(n + 1)
+    D = np.outer(c, 1 / c) / (x[:, None] - x + np.eye(n + 1))
+    return D - np.diag(D.sum(axis=1))
 
 
 def test_a_second_controller_is_designed_with_the_first_in_place():

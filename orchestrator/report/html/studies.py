@@ -177,4 +177,17 @@ def design(sheet: dict[str, Any]) -> str:
         f"{number(sensitivity['phase_deg'], 1)}°: a {kind} is needed.</p>"
         + table("Setting", ["Parameter", "Value"], settings)
         + table("Modes", ["Mode", "λ [rad/s]", "f [Hz]", "Damping [%]"], rows)
+        + _margins(sheet.get("margins") or {})
     )
+
+
+def _margins(margins: dict[str, Any]) -> str:
+    """What the design can bear."""
+    known = {
+        "Gain, upwards": ("gain_up", "×"),
+        "Gain, downwards": ("gain_down", "×"),
+        "Phase": ("phase_margin_deg", "°"),
+        "Delay": ("delay_margin_s", "s"),
+    }
+    rows = [[name, f"{margins[key]:.3g} {unit}"] for name, (key, unit) in known.items() if margins.get(key) is not None]
+    return table("Margins", ["Of the POD loop", "until it is lost"], rows) if rows else ""
