@@ -1,4 +1,4 @@
-"""The zip archive around an FMU, opened as if a stranger had packed it.
+"""The zip archive around an FMU or SSP, opened as if a stranger had packed it.
 
 An archive may name files outside its folder, unpack to more than a disk holds, or hide a document whose entities grow
 without end. Nothing here trusts what it declares: names are checked before the first byte is written, bytes are counted
@@ -74,30 +74,35 @@ def read_model_description_text(path: Path) -> bytes:
     return text
 
 
-def read_member(path: Path, name: str) -> bytes | None:
-    """The bytes of another file in an FMU's archive; None where there is no such file.
+def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
+    """The bytes of another file in an archive; None where there is no such file.
+
+    Parameters
+    ----------
+    kind
+        What the archive should be.
 
     Raises
     ------
     FmuFileError
         As `extract`.
     """
-    with _opened(path) as archive:
+    with _opened(path, kind) as archive:
         if name not in archive.namelist():
             return None
         with archive.open(name) as content:
             return content.read(MOST_BYTES)
 
 
-def names_in(path: Path) -> tuple[str, ...]:
-    """Names of all files in an FMU's archive, once they were found harmless.
+def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
+    """Names of all files in an archive, once they were found harmless.
 
     Raises
     ------
     FmuFileError
         As `extract`.
     """
-    with _opened(path) as archive:
+    with _opened(path, kind) as archive:
         return tuple(entry.filename for entry in archive.infolist())
 
 
@@ -164,14 +169,15 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
     """The archive, with harmless names and sizes; whatever zipfile raises becomes one error."""
+    ending = f".{kind.lower()}"
     if not path.is_file():
-        raise FmuFileError(f"{path}: there is no such file; give the path of an .fmu")
+        raise FmuFileError(f"{path}: there is no such file; give the path of an {ending}")
     try:
         if not zipfile.is_zipfile(path):
             raise FmuFileError(
-                f"{path}: it is not an FMU: an .fmu is a zip archive and this file is not; export it again"
+                f"{path}: it is not an {kind}: an {ending} is a zip archive and this file is not; export it again"
             )
         with zipfile.ZipFile(path) as archive:
             _check_entries(path, archive.infolist())

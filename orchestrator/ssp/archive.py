@@ -3,15 +3,16 @@
 import hashlib
 import posixpath
 import uuid
-import zipfile
-import zlib
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
+from orchestrator.fmi.archive import check_xml, names_in, read_member
 from orchestrator.ssp.names import SYSTEM_FILE
+
+_KIND = "SSP"
 
 
 class SspArchive:
@@ -30,15 +31,8 @@ class SspArchive:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if not path.is_file():
-            raise InputError(f"{path}: there is no such file; give the path of an .ssp")
-        if not zipfile.is_zipfile(path):
-            raise InputError(
-                f"{path}: it is not an SSP: an .ssp is a zip archive and this file is not; export it again"
-            )
+        self._members = set(names_in(path, _KIND))
         self.digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        with zipfile.ZipFile(path) as archive:
-            self._members = set(archive.namelist())
         if SYSTEM_FILE not in self._members:
             raise InputError(f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again")
 
@@ -74,11 +68,10 @@ class SspArchive:
         InputError
             If the archive is damaged.
         """
-        try:
-            with zipfile.ZipFile(self.path) as archive:
-                return archive.read(member)
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-            raise InputError(f"{self.path}: the archive is damaged ({error}); export it again") from error
+        content = read_member(self.path, member, _KIND)
+        if content is None:
+            raise InputError(f"{self.path}: the archive has no {member!r}; export it again with all its resources")
+        return content
 
     def xml(self, member: str) -> Element:
         """Root element of a member.
@@ -86,12 +79,11 @@ class SspArchive:
         Raises
         ------
         InputError
-            If it is not XML.
+            If it is not XML, or XML that a stranger wrote to do harm.
         """
-        try:
-            return ElementTree.fromstring(self.read(member))
-        except ElementTree.ParseError as error:
-            raise InputError(f"{self.path}: {member} is not XML: {error}; export it again") from error
+        text = self.read(member)
+        check_xml(self.path, member, text)
+        return ElementTree.fromstring(text)
 
     def unpack(self, member: str, folder: Path) -> Path:
         """Copy a member into a folder, under its own path there; what is there already stays."""

@@ -355,3 +355,21 @@ def test_files_that_are_no_ssp(tmp_path):
             load_case(path)
     with pytest.raises(CosimError, match="there is no such file"):
         SspArchive(tmp_path / "none.ssp")
+
+
+@pytest.mark.parametrize(
+    ("member", "content", "word"),
+    [
+        ("../outside.txt", "x", "out of the archive's own folder"),
+        ("resources/zeros.bin", bytes(200 * 1024**2), "more than 100 times as much"),
+        ("SystemStructure.ssd", '<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>', "defines a document type"),
+    ],
+)
+def test_files_that_would_do_harm(tmp_path, member, content, word):
+    with zipfile.ZipFile(tmp_path / "h.ssp", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(member, content)
+        if member != "SystemStructure.ssd":
+            archive.writestr("SystemStructure.ssd", "<SystemStructureDescription/>")
+    with pytest.raises(CosimError, match=word) as caught:
+        load_case(tmp_path / "h.ssp")
+    assert caught.value.exit_code == 2
