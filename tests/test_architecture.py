@@ -130,6 +130,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         "orchestrator.black_box.bench",
         "orchestrator.coupling.loop",
         "orchestrator.fmi.bound",
+        "orchestrator.fmi.fmi3",
         "orchestrator.fmi.mailbox",
     }
     importers = {"orchestrator.cases", "orchestrator.cli"}
@@ -175,7 +176,7 @@ def test_there_is_no_cycle():
     ("library", "users"),
     [
         ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
-        ("fmpy", {f"orchestrator.fmi.{name}" for name in ("component", "description", "validation")}),
+        ("fmpy", {f"orchestrator.fmi.{name}" for name in ("component", "description", "fmi3", "validation")}),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     console = make_console()
     console.print(f"[bold]{escape(description.model_name)}[/bold]: {escape(description.title)}")
     console.print(
-        f"FMI 2.0 co-simulation, guid {escape(description.guid)}, "
+        f"FMI {description.fmi_version} co-simulation, guid {escape(description.guid)}, "
         f"made by {escape(description.generation_tool or 'an unnamed tool')}",
         highlight=False,
     )

@@ -1,4 +1,4 @@
-"""One running FMU: FMI 2.0 calls on preallocated arguments, with the FMU's own words in every error."""
+"""One running FMU: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
 import itertools
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 _ERROR = 3
@@ -173,25 +174,36 @@ class Component:
         self._fmu: Any = None
         self._initialised = False
         try:
-            self._compare_guid(Path(directory or self._own_directory or ""))
-            self._fmu = FMU2Slave(
-                guid=description.guid,
-                unzipDirectory=str(directory or self._own_directory),
-                modelIdentifier=description.model_identifier,
-                instanceName=name,
-            )
+            self._fmu = self._loaded(Path(directory or self._own_directory or ""))
             self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:  # fmpy raises a bare Exception here
             said = "; ".join(self._texts()) or str(error)
             self.close()
-            raise ComponentError(name, "fmi2Instantiate", "no instance", said) from error
+            raise ComponentError(name, self._in_its_words("fmi2Instantiate"), "no instance", said) from error
         self.pointer = self._fmu.component
         self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
         self._bind_functions()
 
+    def _loaded(self, directory: Path) -> Any:
+        """Load the binary; that of an FMU of FMI 3.0 goes behind an adapter."""
+        self._compare_guid(directory)
+        newer = self.description.fmi_version == "3.0"
+        fmu = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=str(directory),
+            modelIdentifier=self.description.model_identifier,
+            instanceName=self.name,
+            libraryPath=str(adapter_path()) if newer else None,
+        )
+        if newer:
+            self._behind = Fmi3Library(self.description, directory)
+            self._behind.prepare(fmu.dll)
+        return fmu
+
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
-        if self.description.guid not in (ElementTree.parse(directory / MODEL_DESCRIPTION).getroot().get("guid") or ""):
+        root = ElementTree.parse(directory / MODEL_DESCRIPTION).getroot()
+        if self.description.guid not in (root.get("guid") or root.get("instantiationToken") or ""):
             raise InputError(f"the guid {self.description.guid} is not that of the FMU; read its description again")
 
     def _bind_functions(self) -> None:
@@ -213,7 +225,12 @@ class Component:
         """Raise unless a call's status is OK or Warning."""
         if status > 1:
             name = STATUS[status] if status < len(STATUS) else f"status {status}"
-            raise ComponentError(self.name, call, name, "; ".join(self._texts(1) or self._texts()), time)
+            said = "; ".join(self._texts(1) or self._texts())
+            raise ComponentError(self.name, self._in_its_words(call), self._in_its_words(name), said, time)
+
+    def _in_its_words(self, text: str) -> str:
+        """A call or status by the name that the FMU's own version of FMI has for it."""
+        return in_words_of_3(text) if self.description.fmi_version == "3.0" else text
 
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
         """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""

@@ -20,10 +20,24 @@ VENDOR = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
 """Begins the names of what is ours inside other people's formats."""
 
+VERSIONS = ("2.0", "3.0")
+"""Of FMI that can be run."""
+
+_INTEGERS = (f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
+_TYPES_OF_3 = {"Float64": "Real", "Float32": "Real", **dict.fromkeys(_INTEGERS, "Integer")}
+
 
 @dataclass(frozen=True, slots=True)
 class VariableInfo:
-    """One scalar variable of a modelDescription."""
+    """One variable of a modelDescription.
+
+    Attributes
+    ----------
+    type
+        By FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``.
+    declared_type
+        As the file has it, such as ``Float64``.
+    """
 
     name: str
     reference: int
@@ -35,11 +49,12 @@ class VariableInfo:
     minimum: float | None
     maximum: float | None
     description: str
+    declared_type: str = ""
 
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """An FMI 2.0 co-simulation FMU on disk.
+    """A co-simulation FMU on disk. An FMU of FMI 3.0 is described in the words of FMI 2.0.
 
     Attributes
     ----------
@@ -58,6 +73,8 @@ class FmuDescription:
         ``canBeInstantiatedOnlyOncePerProcess``, ``needsExecutionTool``.
     stop_time
         Of ``DefaultExperiment`` [s]; None where it does not say.
+    fmi_version
+        ``2.0`` or ``3.0``.
     gives_directional_derivatives
         ``providesDirectionalDerivative``.
     units
@@ -85,6 +102,7 @@ class FmuDescription:
     one_instance: bool = False
     needs_tool: bool = False
     stop_time: float | None = None
+    fmi_version: str = "2.0"
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -119,9 +137,10 @@ def read_description(path: Path | str) -> FmuDescription:
     path = Path(path)
     text = read_model_description_text(path)
     version = _fmi_version(path, text)
-    if version != "2.0":
+    if version not in VERSIONS:
         raise FmuFileError(
-            f"{path}: it is an FMU of FMI {version[:20]}; this master runs FMI 2.0 co-simulation, ask for that export"
+            f"{path}: it is an FMU of FMI {version[:20]}; this master runs co-simulation of FMI 2.0 and 3.0, ask for "
+            "one of these"
         )
     try:
         description = fmpy.read_model_description(_only(text), validate=False)
@@ -136,7 +155,7 @@ def read_description(path: Path | str) -> FmuDescription:
         ) from error
     if described is None:
         raise FmuFileError(
-            f"{path}: it is an FMU for Model Exchange only; this master needs FMI 2.0 co-simulation, "
+            f"{path}: it is not an FMU for co-simulation (for Model Exchange only, mostly), which this master needs; "
             "ask for that export"
         )
     if fmpy.platform not in platforms:
@@ -161,16 +180,17 @@ def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:
 
 def _fmi_version(path: Path, text: bytes) -> str:
     try:
-        return ElementTree.fromstring(text).get("fmiVersion", "unknown")
+        version = ElementTree.fromstring(text).get("fmiVersion", "unknown")
     except ElementTree.ParseError as error:
         raise FmuFileError(f"{path}: modelDescription.xml is not XML: {error}; export it again") from error
+    return "3.0" if re.fullmatch(r"3\.0(\.\d+)?", version) else version
 
 
 def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...]) -> FmuDescription:
     variables = {v.name: _variable(v) for v in md.modelVariables}
     _check_names(path, md)
     root = ElementTree.fromstring(text)
-    tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    newer = root.get("fmiVersion", "").startswith("3")
     dependencies = {
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
@@ -184,9 +204,9 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         generation_tool=md.generationTool or "",
         variables=variables,
         states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
-        states_are_settable=tool is not None and tool.get("settable") == "true",
+        states_are_settable=_settable(root, newer),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
-        gives_directional_derivatives=bool(md.coSimulation.providesDirectionalDerivative),
+        gives_directional_derivatives=_gives_directional_derivatives(root),
         output_dependencies=dependencies,
         platforms=platforms,
         can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
@@ -195,7 +215,22 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         default_step_size=_positive(md.defaultExperiment.stepSize) if md.defaultExperiment else None,
         units=_units(root),
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
+        fmi_version="3.0" if newer else "2.0",
     )
+
+
+def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
+    interface = root.find("CoSimulation")
+    names = ("providesDirectionalDerivative", "providesDirectionalDerivatives")  # FMI 2.0, FMI 3.0
+    return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
+
+
+def _settable(root: ElementTree.Element, newer: bool) -> bool:
+    if newer:
+        annotation = root.find(f"Annotations/Annotation[@type='{VENDOR}.ContinuousStates']")
+        return annotation is not None and (annotation.text or "").strip() == "settable"
+    tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    return tool is not None and tool.get("settable") == "true"
 
 
 def _check_names(path: Path, md: ModelDescription) -> None:
@@ -231,7 +266,7 @@ def _variable(v: Any) -> VariableInfo:
     return VariableInfo(
         name=v.name,
         reference=v.valueReference,
-        type=v.type,
+        type="Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type),
         causality=v.causality or "local",
         variability=v.variability or "continuous",
         unit=unit,
@@ -239,4 +274,5 @@ def _variable(v: Any) -> VariableInfo:
         minimum=None if v.min is None else float(v.min),
         maximum=None if v.max is None else float(v.max),
         description=v.description or "",
+        declared_type="" if v.dimensions else "Int64" if v.type == "Enumeration" else v.type,
     )

@@ -7,6 +7,7 @@ from fmus.toolchain.cache import cache_directory
 from orchestrator.fmi.bound import BoundComponent
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.port import BoundDescription
 
@@ -43,9 +44,13 @@ def open_component(
     ------
     ComponentError
         If the FMU gives no instance.
+    FmuFileError
+        If it is one of FMI 3.0 and the adapter for these cannot be compiled.
     """
     if isinstance(description, BoundDescription):
         return BoundComponent(open_component(name, description.native, directory, isolated=isolated), description)
+    if description.fmi_version == "3.0":
+        adapter_path()  # here, as a process with limits may not compile
     if isolated or (isolated is None and not is_ours(description.path)):
         return IsolatedComponent(name, description, directory)
     return Component(name, description, directory)

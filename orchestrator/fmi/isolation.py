@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
-from orchestrator.fmi.component import FLOODED, STATUS, Component, RealBatch
+from orchestrator.fmi.component import FLOODED, Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, NOT_A_NUMBER, Mailbox
@@ -95,8 +95,7 @@ class IsolatedComponent(Component):
             raise ComponentError(self.name, call, "not a number", said, time)
         if status in (DIED, HUNG):
             raise ComponentError(self.name, call, self._how_it_ended(status), self._last_words(), time)
-        name = STATUS[status] if status < len(STATUS) else f"status {status}"
-        raise ComponentError(self.name, call, name, "; ".join(self._texts(1) or self._texts()), time)
+        super().check(status, call, time)
 
     def _texts(self, least: int = 0) -> list[str]:
         return list(dict.fromkeys(text for status, text in self._box.read_log() if status >= least))

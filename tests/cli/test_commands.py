@@ -245,13 +245,13 @@ def test_info_on_an_archive_without_a_model_description(refused, damaged):
 
 def test_info_on_another_fmi_version(refused, damaged):
     path = damaged(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"'))
-    assert "it is an FMU of FMI 1.0; this master runs FMI 2.0 co-simulation" in refused("info", path)
+    assert "it is an FMU of FMI 1.0; this master runs co-simulation of FMI 2.0 and 3.0" in refused("info", path)
 
 
 def test_info_on_model_exchange_only(refused, damaged):
     exchange = '<ModelExchange modelIdentifier="small_gain" />'
     path = damaged(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
-    assert "for Model Exchange only; this master needs FMI 2.0 co-simulation" in refused("info", path)
+    assert "it is not an FMU for co-simulation (for Model Exchange only, mostly)" in refused("info", path)
 
 
 def test_info_on_an_fmu_for_other_platforms(refused, damaged):

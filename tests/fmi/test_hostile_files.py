@@ -9,6 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.compiler import host_platform
+from fmus.toolchain.native_fmu import export_native
 from orchestrator.errors import FmuFileError, HostileFmuError
 from orchestrator.fmi import archive
 from orchestrator.fmi.archive import extract
@@ -87,6 +90,15 @@ def test_mutated_files_are_read_or_refused(plain, tmp_path):
     found = _fuzz(0, 300, tmp_path, [plain])
     assert found["accepted"] + found["refused"] == 300
     assert min(found.values()) > 30  # the mutations are neither harmless nor hopeless
+
+
+def test_mutated_files_of_fmi_3_are_read_or_refused(tmp_path):
+    source = export_native(build_model("infinite_bus"), tmp_path, (host_platform(),), "3.0")
+    folder = tmp_path / "mutated"
+    folder.mkdir()
+    found = _fuzz(1, 300, folder, [source])
+    assert found["accepted"] + found["refused"] == 300
+    assert min(found.values()) > 30
 
 
 @pytest.mark.slow
