@@ -21,7 +21,6 @@ _FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "Ent
               *(f"Get{kind}" for kind in _KINDS), *(f"Set{kind}" for kind in _KINDS))  # fmt: skip
 """In the order of the adapter's table."""
 
-
 _NAMES = {
     "fmi2Instantiate": "fmi3InstantiateCoSimulation",
     "fmi2": "fmi3",
@@ -30,6 +29,7 @@ _NAMES = {
     "FMUstate": "FMUState",
     "DeSerialize": "Deserialize",
 }
+"""Parts of a function's name in FMI 2.0, and what they are in FMI 3.0; the first that fits goes first."""
 
 
 def in_words_of_3(call: str) -> str:

@@ -226,9 +226,9 @@ EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
 EXPORT struct instance *fmi2Instantiate(const char *name, int type, const char *token, const char *resources,
                                         const struct callbacks *callbacks, int visible, int logging) {
-    struct instance *s = calloc(1, sizeof *s);
+    struct instance *s = next ? calloc(1, sizeof *s) : NULL;
     (void)type, (void)resources;
-    if (!s || !next) return NULL;
+    if (!s) return NULL;
     s->fmu = *next, s->callbacks = callbacks;
     s->name = calloc(1, strlen(name) + 1);
     if (s->name) strcpy(s->name, name);
