@@ -29,7 +29,7 @@ _NAMES = {
     "FMUstate": "FMUState",
     "DeSerialize": "Deserialize",
 }
-"""Parts of a function's name in FMI 2.0, and what they are in FMI 3.0; the first that fits goes first."""
+"""Parts of names in FMI 2.0, and what they are in FMI 3.0; replaced in this order."""
 
 
 def in_words_of_3(call: str) -> str:
