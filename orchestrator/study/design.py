@@ -252,7 +252,9 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
     refinement = None
     if request.refine:
         report("refinement")
-        refinement = refine(loop, off, filters, required, request.gain_bounds, judge)
+        refinement = refine(
+            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others]
+        )
         final = refinement.chosen or designed
     after = around(final)
     margins = None

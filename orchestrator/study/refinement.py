@@ -2,17 +2,19 @@
 
 The paper's design stops at a prediction from the sensitivity at a small gain. Here the gain is searched with the mode
 itself, and where the gain alone does not do, the lead/lag is centred anew on the mode where it is, with the
-sensitivity that it has there.
+sensitivity that it has there. Where that does not do either, all settings are surveyed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
 from orchestrator.analysis.pod_design import LeadLag, angle_deg, compensation_deg, lead_lag, local_non_compensated
 from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import Placed, PodLoop
+from orchestrator.study.survey import CENTRES, MOST_STATES, survey
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,7 @@ def refine(
     required: float,
     bounds: tuple[float, float],
     judge: Judge,
+    others: Sequence[complex],
 ) -> Refinement:
     """Search gain and lead/lag on the closed loop.
 
@@ -110,11 +113,14 @@ def refine(
         Of the gain [pu].
     judge
         Looks at all modes with a setting.
+    others
+        The other modes without the controller [rad/s].
     """
     result = Refinement()
-    for why, candidate in _candidates(loop, result, filters):
+    near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
+    for why, candidate, gain in chain(near, _surveyed(loop, result, off, others, filters.N_S, bounds)):
         try:
-            found = sweep(loop, off, candidate, required, bounds, why)
+            found = sweep(loop, off, candidate, required, bounds, why, gain)
         except AnalysisError as error:
             result.notes.append(f"{why}: {error}")
             continue
@@ -137,12 +143,24 @@ def refine(
 
 
 def sweep(
-    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], why: str
+    loop: PodLoop,
+    off: Placed,
+    filters: LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    why: str,
+    special: float | None = None,
 ) -> Sweep:
-    """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it."""
+    """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
+
+    Parameters
+    ----------
+    special
+        A gain in the bounds that is looked at in any case [pu].
+    """
     points: list[Placed] = []
     here = off
-    for gain in np.linspace(*bounds, _GAINS).tolist():
+    for gain in sorted({*np.linspace(*bounds, _GAINS).tolist(), *([] if special is None else [special])}):
         try:
             here = loop.place(here, gain, filters)
         except AnalysisError:
@@ -177,7 +195,7 @@ def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
     if len(points) == 1:
         return points[0]
     k = max(range(len(points)), key=lambda i: points[i].damping_ratio)
-    best, step = points[k], points[1].setting.gain - points[0].setting.gain
+    best, step = points[k], (points[-1].setting.gain - points[0].setting.gain) / (_GAINS - 1)
     low, high = points[0].setting.gain, points[-1].setting.gain
     for _ in range(3):
         step /= 2
@@ -212,6 +230,30 @@ def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[t
             if result.score < reached + _WORTH:
                 break
             turn, reached = turn + direction * _TURN, result.score
+
+
+def _surveyed(
+    loop: PodLoop, result: Refinement, off: Placed, others: Sequence[complex], stages: int, bounds: tuple[float, float]
+) -> Iterator[tuple[str, LeadLag, float | None]]:
+    """The best settings of all; looked for where nothing else has met the requirement."""
+    states = len(loop.model(off.setting).names)
+    if stages == 0 or bounds[1] <= 0:
+        return
+    if states > MOST_STATES:
+        result.notes.append(f"not all settings were surveyed: the system has {states} states, more than {MOST_STATES}")
+        return
+    try:
+        found = survey(loop, off.eigenvalue, others, stages, bounds)
+    except AnalysisError as error:
+        result.notes.append(f"survey: {error}")
+        return
+    result.notes.append(
+        f"surveyed {found.settings} settings, of every turn of the lead/lag, centred from {CENTRES[0]:g} to "
+        f"{CENTRES[1]:g} times the mode's frequency, with every gain in the bounds: the best leaves no mode that it "
+        f"moves below {100 * found.damping:.2f} %"
+    )
+    for number, setting in enumerate(found.best, start=1):
+        yield f"surveyed, {number}", setting.filters, setting.gain
 
 
 def _turned(base: Placed, turn: float) -> LeadLag | None:

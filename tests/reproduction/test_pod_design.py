@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.analysis.pod_design import angle_deg
+from orchestrator.analysis.pod_design import angle_deg, damping_ratio
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.study.closed_loop import PodLoop, PodSetting
@@ -93,6 +93,7 @@ def test_the_refined_gain_is_the_smallest_that_does():
     assert plain.gain < refined.final.setting.gain < 100
 
 
+@pytest.mark.slow
 def test_a_requirement_out_of_reach_is_said_to_be():
     overrides = {"grid.X_L": 0.01}
     plain = design("pod_p", overrides=overrides)
@@ -104,8 +105,22 @@ def test_a_requirement_out_of_reach_is_said_to_be():
     assert plain.achieved_damping < d.achieved_damping < d.required_damping
     highest = max(p.damping_ratio for s in d.refinement.sweeps for p in s.points)
     assert highest < d.required_damping
+    assert "surveyed" in d.refinement.notes[-1]
 
 
+@pytest.mark.slow
+def test_a_survey_finds_what_the_search_from_the_design_does_not():
+    """The search ends at 15.0 %; far from the design there is a setting with the 15.9 % that are asked for."""
+    overrides = {"grid.X_L": 0.01}
+    d = design("pod_p", overrides=overrides, refine=True, gain_bounds=(0, 400))
+    assert d.met
+    near = [s for s in d.refinement.sweeps if not s.why.startswith("surveyed")]
+    assert max(s.chosen.damping_ratio for s in near) < d.required_damping - 0.005
+    assert d.refinement.sweeps[-1].why == "surveyed, 1"
+    assert closed_loop(d, overrides).damping_ratio >= d.required_damping - 1e-3
+
+
+@pytest.mark.slow
 def test_no_other_mode_is_made_unstable_for_the_targets_sake():
     overrides = {"grid.X_L": 0.01}
     plain = design("pod_q", overrides=overrides, gain_bounds=(200, 5000))
@@ -113,10 +128,10 @@ def test_no_other_mode_is_made_unstable_for_the_targets_sake():
     refined = design("pod_q", overrides=overrides, gain_bounds=(200, 5000), refine=True)
     assert refined.broken is None
     assert refined.after.growth < 1e-3
-    assert refined.final.setting.gain < plain.gain
+    assert refined.achieved_damping > damping_ratio(refined.initial)
 
 
-@pytest.mark.parametrize("gains", [(200, 200), (0, 1)])
+@pytest.mark.parametrize("gains", [(200, 200), pytest.param((0, 1), marks=pytest.mark.slow)])
 def test_narrow_bounds_are_swept_as_well(gains):
     d = design("pod_p", gain_bounds=gains, refine=True)
     assert gains[0] <= d.final.setting.gain <= gains[1]
