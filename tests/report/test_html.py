@@ -1,6 +1,5 @@
 """The report as a page: what it holds, and what a browser makes of it."""
 
-import json
 import shutil
 
 import numpy as np
@@ -28,13 +27,8 @@ def page(tmp_path_factory):
         main(["sweep", "two_area", *chosen, "--vary", "grid.X_L=0.05:0.3:4", "--workers", "1", "--out", str(sweep)])
         == 0
     )
-    sheet = {
-        "controller": "pod_p", "target_mode": {"real": -0.389, "imag": 3.655},
-        "sensitivity": {"magnitude": 0.01, "phase_deg": -120.0}, "T_S1": 0.203, "T_S2": 0.37, "N_S": 2, "K": 200.0,
-        "K_unbounded": 18.7, "predicted_mode": {"real": -0.75, "imag": 3.655},
-        "achieved_mode": {"real": -1.1, "imag": 4.8},
-    }  # fmt: skip
-    (folder / "design_pod_p.json").write_text(json.dumps(sheet), encoding="utf-8")
+    assert main(["design", "two_area", "--controller", "pod_p", "--out", str(folder / "pod_p.toml")]) == 0
+    (folder / "somebody_elses.json").write_text("no JSON", encoding="utf-8")
     assert main(["report", str(folder), str(sweep)]) == 0
     return folder / "report.html"
 
@@ -48,7 +42,9 @@ def test_the_page_needs_nothing_but_itself(page):
                     "Time responses", "Communication step", "Provenance"):  # fmt: skip
         assert f"<h2>{heading}</h2>" in text
     assert "−0.90" in text  # the unstable base case, with its sign
-    assert "0.2030" in text
+    assert "0.2020" in text  # T_S1
+    for margin in ("Gain, upwards", "Phase", "Delay"):
+        assert f">{margin}</" in text
     assert 'name = "two_area"' in text.replace("&quot;", '"')
 
 

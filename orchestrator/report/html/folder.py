@@ -77,15 +77,21 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
         )
         for place in (folder, *others):
             results.sweeps += [_load(path) for path in _files(place, "sweep.nc")]
-            results.designs += [json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "design_*.json")]
+            results.designs += _designs(place)
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
     return results
 
 
 def _designs(place: Path) -> list[dict[str, Any]]:
-    """The calculation sheets among the JSON files of a folder."""
-    contents = [json.loads(path.read_text(encoding="utf-8")) for path in _files(place, "*.json")]
+    """The calculation sheet in a file, or those among the JSON files of a folder, which may hold other people's too."""
+    contents = []
+    for path in _files(place, "*.json"):
+        try:
+            contents.append(json.loads(path.read_text(encoding="utf-8")))
+        except ValueError:
+            if path == place:
+                raise
     return [c for c in contents if isinstance(c, dict) and {"controller", "target_mode", "T_S1"} <= c.keys()]
 
 

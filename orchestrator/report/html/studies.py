@@ -182,12 +182,15 @@ def design(sheet: dict[str, Any]) -> str:
 
 
 def _margins(margins: dict[str, Any]) -> str:
-    """What the design can bear."""
-    known = {
-        "Gain, upwards": ("gain_up", "×"),
-        "Gain, downwards": ("gain_down", "×"),
-        "Phase": ("phase_margin_deg", "°"),
-        "Delay": ("delay_margin_s", "s"),
-    }
-    rows = [[name, f"{margins[key]:.3g} {unit}"] for name, (key, unit) in known.items() if margins.get(key) is not None]
-    return table("Margins", ["Of the POD loop", "until it is lost"], rows) if rows else ""
+    """What the POD loop can bear."""
+    if not margins:
+        return ""
+    up, down = margins["gain_up"], margins["gain_down"]
+    rows = [
+        ["Gain, upwards", f"more than × {margins['largest_factor_tried']:g}" if up is None else f"× {up:.3g}"],
+        ["Gain, downwards", "down to 0" if down is None else f"× {down:.3g}"],
+    ]
+    for name, key, unit in (("Phase", "phase_margin_deg", "°"), ("Delay", "delay_margin_s", "s")):
+        if margins.get(key) is not None:
+            rows.append([name, f"{margins[key]:.3g} {unit}"])
+    return table("Margins", ["Of the POD loop", "until a mode is lost"], rows)
