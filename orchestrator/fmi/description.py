@@ -23,8 +23,9 @@ REVERSE_DOMAIN = "org.gfor-cosim"
 VERSIONS = ("2.0", "3.0")
 """Of FMI that can be run."""
 
-_INTEGERS = (f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
-_TYPES_OF_3 = {"Float64": "Real", "Float32": "Real", **dict.fromkeys(_INTEGERS, "Integer")}
+_TYPES_OF_3 = {"Float64": "Real", "Float32": "Real"} | {
+    f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ def read_description(path: Path | str) -> FmuDescription:
         description = fmpy.read_model_description(_only(text), validate=False)
         exchange_only = description.coSimulation is None
         platforms = tuple(fmpy.supported_platforms(_only(text, names_in(path))))
-        described = None if exchange_only else _describe(path, description, text, platforms)
+        described = None if exchange_only else _describe(path, description, text, platforms, version)
     except FmuFileError:
         raise
     except Exception as error:  # fmpy raises whatever its parsers raise
@@ -186,11 +187,12 @@ def _fmi_version(path: Path, text: bytes) -> str:
     return "3.0" if re.fullmatch(r"3\.0(\.\d+)?", version) else version
 
 
-def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...]) -> FmuDescription:
+def _describe(
+    path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...], version: str
+) -> FmuDescription:
     variables = {v.name: _variable(v) for v in md.modelVariables}
     _check_names(path, md)
     root = ElementTree.fromstring(text)
-    newer = root.get("fmiVersion", "").startswith("3")
     dependencies = {
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
@@ -204,7 +206,7 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         generation_tool=md.generationTool or "",
         variables=variables,
         states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
-        states_are_settable=_settable(root, newer),
+        states_are_settable=_settable(root, version),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
         gives_directional_derivatives=_gives_directional_derivatives(root),
         output_dependencies=dependencies,
@@ -215,7 +217,7 @@ def _describe(path: Path, md: ModelDescription, text: bytes, platforms: tuple[st
         default_step_size=_positive(md.defaultExperiment.stepSize) if md.defaultExperiment else None,
         units=_units(root),
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
-        fmi_version="3.0" if newer else "2.0",
+        fmi_version=version,
     )
 
 
@@ -225,8 +227,8 @@ def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
     return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
 
 
-def _settable(root: ElementTree.Element, newer: bool) -> bool:
-    if newer:
+def _settable(root: ElementTree.Element, version: str) -> bool:
+    if version == "3.0":
         annotation = root.find(f"Annotations/Annotation[@type='{VENDOR}.ContinuousStates']")
         return annotation is not None and (annotation.text or "").strip() == "settable"
     tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
@@ -274,5 +276,5 @@ def _variable(v: Any) -> VariableInfo:
         minimum=None if v.min is None else float(v.min),
         maximum=None if v.max is None else float(v.max),
         description=v.description or "",
-        declared_type="" if v.dimensions else "Int64" if v.type == "Enumeration" else v.type,
+        declared_type=v.type,
     )

@@ -15,6 +15,9 @@ from orchestrator.fmi.description import FmuDescription
 _SOURCE = Path(__file__).with_name("fmi3_as_fmi2.c")
 
 _KINDS = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
+_ALIKE = {"Enumeration": "Int64"}
+"""A type that goes through the functions of another."""
+
 _FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "EnterInitializationMode",
               "ExitInitializationMode", "Terminate", "Reset", "DoStep", "GetFMUState", "SetFMUState", "FreeFMUState",
               "SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState", "GetDirectionalDerivative",
@@ -74,9 +77,9 @@ class Fmi3Library:
     def __init__(self, description: FmuDescription, directory: Path) -> None:
         self._library = _loaded(description, directory)
         known = sorted(
-            (v.reference, _KINDS.index(v.declared_type))
+            (v.reference, _KINDS.index(kind))
             for v in description.variables.values()
-            if v.declared_type in _KINDS
+            if v.type != "Array" and (kind := _ALIKE.get(v.declared_type, v.declared_type)) in _KINDS
         )
         self._references = (ctypes.c_uint * len(known))(*(reference for reference, _ in known))
         self._kinds = (ctypes.c_ubyte * len(known))(*(kind for _, kind in known))
