@@ -13,6 +13,9 @@ from orchestrator.errors import AnalysisError
 LARGEST_STAGE_ANGLE = 60.0
 """What one lead/lag stage is customarily asked for at most [°]; beyond it a_j grows out of proportion."""
 
+LARGEST_TURN = 85.0
+"""What one lead/lag stage is asked for at all [°], to either side."""
+
 
 @dataclass(frozen=True)
 class LeadLag:
@@ -125,6 +128,11 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     a = (1 - sine) / (1 + sine)
     T_S1 = 1 / (centre * math.sqrt(a))
     return LeadLag(T_S1, a * T_S1, stages)
+
+
+def lead_lag_turning(angle: float, centre: float, stages: int) -> LeadLag:
+    """Lead/lag whose stages turn by an angle [°] together, lead where it is positive; otherwise as `lead_lag`."""
+    return lead_lag(180 - angle if angle >= 0 else -180 - angle, centre, stages)
 
 
 def required_gain(target: complex, initial: complex, magnitude: float) -> float:

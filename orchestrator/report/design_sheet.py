@@ -124,14 +124,14 @@ def _margins(m: "Margins", d: "PodDesign") -> Table:
         down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
     table.add_row(f"Gain up, {lost}", up)
     table.add_row("Gain down, the same", down)
-    for name, value in loop_rows(m):
+    for name, value in _loop_rows(m):
         table.add_row(name, value)
     for name, damping in m.variations.items():
         table.add_row(f"Damping of the target with {name}, the rest as it is", percent(damping))
     return table
 
 
-def loop_rows(m: "Margins") -> Iterable[tuple[str, str]]:
+def _loop_rows(m: "Margins") -> Iterable[tuple[str, str]]:
     """Names and values of the loop's margins."""
     if m.loop is None:
         yield "Phase and delay margin", f"not known: {m.no_loop}"

@@ -6,6 +6,7 @@ for every setting: only the converters need be linearised again, and the rest of
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from orchestrator.analysis.component_linearization import linearize_component
 from orchestrator.analysis.continuation import Eigenpair, follow
@@ -75,23 +76,37 @@ class PodLoop:
         """The linear model of the whole system with this setting."""
         if setting.gain == 0:
             return self._off
-        self._apply(setting)
-        for name in self._components:
-            exchange = self._master.exchanges[name]
-            self._blocks.components[name] = linearize_component(exchange, self._master.time, self._blocks.step_size)
+        self._linearize_converters(self._blocks, setting)
         return compose(self._blocks, self._master.schedule)
 
-    def continuous_model(self, setting: PodSetting) -> LinearModel:
-        """The same without any communication step.
+    def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
+        """The same without any communication step, with half the gain and with the gain; it is linear in the gain.
 
         Raises
         ------
         AnalysisError
             If a component does not give its derivatives.
         """
-        self._apply(setting)
+        half, full = (self._continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
+        return half, full
+
+    def _continuous_model(self, setting: PodSetting) -> LinearModel:
         with as_if_told(self._master, 0.0):
-            return continuous(Blocks(self._master, derivatives=True))
+            self._linearize_converters(self._continuous_blocks, setting, derivatives=True)
+        return continuous(self._continuous_blocks)
+
+    @cached_property
+    def _continuous_blocks(self) -> Blocks:
+        """Made within `as_if_told`."""
+        return Blocks(self._master, derivatives=True)
+
+    def _linearize_converters(self, blocks: Blocks, setting: PodSetting, *, derivatives: bool = False) -> None:
+        self._apply(setting)
+        for name in self._components:
+            exchange = self._master.exchanges[name]
+            blocks.components[name] = linearize_component(
+                exchange, self._master.time, blocks.step_size, derivatives=derivatives
+            )
 
     def place(self, start: Placed, gain: float, filters: LeadLag | None = None) -> Placed:
         """Follow the target mode to another gain.

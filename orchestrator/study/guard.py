@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linear_model import LinearModel, Vector
 from orchestrator.analysis.modes import Mode, find_spectrum, to_continuous
 from orchestrator.analysis.pod_design import damping_ratio
 
@@ -101,6 +101,12 @@ def extremes(model: LinearModel) -> tuple[complex, complex]:
     """The eigenvalue [rad/s] of least damping from 0.1 to 2 Hz (−1 where there is none), and that which grows most."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
     values = values[values.imag >= 0]
-    frequencies = values.imag / (2 * np.pi)
-    inside = values[(frequencies >= GUARDED[0]) & (frequencies <= GUARDED[1])]
-    return min(inside.tolist(), key=damping_ratio, default=complex(-1)), complex(values[np.argmax(values.real)])
+    return min(guarded(values).tolist(), key=damping_ratio, default=complex(-1)), complex(
+        values[np.argmax(values.real)]
+    )
+
+
+def guarded(values: Vector) -> Vector:
+    """Those of some eigenvalues [rad/s] that are in the guarded range."""
+    hertz = values.imag / (2 * np.pi)
+    return np.asarray(values[(hertz >= GUARDED[0]) & (hertz <= GUARDED[1])])

@@ -76,8 +76,7 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
 
 def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:
     try:
-        half, full = (loop.continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
-        return loop_margins(half, full), ""
+        return loop_margins(*loop.continuous_models(setting)), ""
     except AnalysisError as error:
         return None, str(error)
 

@@ -11,7 +11,15 @@ from itertools import chain
 
 import numpy as np
 
-from orchestrator.analysis.pod_design import LeadLag, angle_deg, compensation_deg, lead_lag, local_non_compensated
+from orchestrator.analysis.pod_design import (
+    LARGEST_TURN,
+    LeadLag,
+    angle_deg,
+    compensation_deg,
+    lead_lag,
+    lead_lag_turning,
+    local_non_compensated,
+)
 from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import Placed, PodLoop
 from orchestrator.study.survey import CENTRES, MOST_STATES, survey
@@ -260,9 +268,9 @@ def _turned(base: Placed, turn: float) -> LeadLag | None:
     """The lead/lag of a setting with its angle changed, centred on the mode there; None if its stages cannot."""
     filters = base.setting.filters
     total = filters.N_S * filters.stage_angle_deg + turn
-    if abs(total) >= 85 * filters.N_S or base.eigenvalue.imag <= 0:
+    if abs(total) >= LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
         return None
-    return lead_lag(180 - total if total >= 0 else -180 - total, base.eigenvalue.imag, filters.N_S)
+    return lead_lag_turning(total, base.eigenvalue.imag, filters.N_S)
 
 
 def recentred(loop: PodLoop, here: Placed) -> LeadLag:
@@ -274,7 +282,7 @@ def recentred(loop: PodLoop, here: Placed) -> LeadLag:
     phase = angle_deg(local_non_compensated(slope, here.eigenvalue, filters))
     if here.eigenvalue.imag <= 0:
         raise AnalysisError(f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on")
-    if abs(compensation_deg(phase)) >= 85 * filters.N_S:
+    if abs(compensation_deg(phase)) >= LARGEST_TURN * filters.N_S:
         raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
     return lead_lag(phase, here.eigenvalue.imag, filters.N_S)
 

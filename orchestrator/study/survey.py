@@ -1,6 +1,6 @@
 """A survey of all settings of a POD, for where the search that begins at the design ends short of the requirement.
 
-With one lead/lag the state matrix is A(K) = A_0 + K·D, so two linearisations of the running FMUs give every gain. The
+With one lead/lag the state matrix is A(K) = A_0 + K·D, so two linearisations of the converters give every gain. The
 best settings of a coarse grid are polished by Nelder and Mead's method. Which mode is the target's is left to the
 caller: here a setting is as good as the least damped mode that it moves.
 """
@@ -13,10 +13,10 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from orchestrator.analysis.pod_design import LeadLag, damping_ratio, lead_lag
+from orchestrator.analysis.pod_design import LARGEST_TURN, LeadLag, damping_ratio, lead_lag_turning
 from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import PodLoop, PodSetting
-from orchestrator.study.guard import GROWTH, GUARDED
+from orchestrator.study.guard import GROWTH, guarded
 
 MOST_STATES = 500
 """In larger systems a survey would take longer than anybody waits."""
@@ -24,8 +24,6 @@ CENTRES = (0.5, 4.0)
 """Range of the lead/lag's centre, as parts of the mode's frequency."""
 
 _TURNS, _CENTRES, _GAINS = 17, 7, 10
-_MOST_TURN = 85.0
-"""Of one stage, to either side [°]."""
 _POLISHED = 3
 _EVALUATIONS = 150
 _UNMOVED = 0.02
@@ -108,14 +106,13 @@ class _Ground:
 
     def filters(self, place: Sequence[float]) -> LeadLag:
         """The lead/lag at a place: its turn is a part of the most that its stages can do."""
-        total = place[0] * _MOST_TURN * self._stages
-        phase = 180 - total if total >= 0 else -180 - total
-        return lead_lag(phase, math.exp(place[1]) * self._initial.imag, self._stages)
+        turn = place[0] * LARGEST_TURN * self._stages
+        return lead_lag_turning(turn, math.exp(place[1]) * self._initial.imag, self._stages)
 
     def over_gains(self, place: Sequence[float], gains: Sequence[float]) -> list[float]:
         """The worth of one lead/lag with some gains."""
-        filters, high = self.filters(place), self._bounds[1]
-        half, full = (self._loop.continuous_model(PodSetting(share * high, filters)).A for share in (0.5, 1.0))
+        high = self._bounds[1]
+        half, full = (model.A for model in self._loop.continuous_models(PodSetting(high, self.filters(place))))
         slope = (full - half) / (high / 2)
         return [self._worth(np.linalg.eigvals(full + (gain - high) * slope).astype(complex)) for gain in gains]
 
@@ -123,9 +120,7 @@ class _Ground:
         self.settings += 1
         if values.real.max() > GROWTH:
             return _HOPELESS
-        hertz = values.imag / (2 * math.pi)
-        inside = values[(hertz >= GUARDED[0]) & (hertz <= GUARDED[1])]
-        moved = [v for v in inside if not np.any(np.abs(v - self._others) < _UNMOVED * abs(v))]
+        moved = [v for v in guarded(values) if not np.any(np.abs(v - self._others) < _UNMOVED * abs(v))]
         return -min((damping_ratio(complex(v)) for v in moved), default=1.0)
 
     def polished(self, start: tuple[float, float, float]) -> tuple[float, tuple[float, float, float]]:
