@@ -5,6 +5,8 @@ import subprocess
 import sys
 import tempfile
 import uuid
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
@@ -20,8 +22,23 @@ TARGETS = {
 ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
 """Of a shared library."""
 
-FLAGS = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", "-fno-sanitize=undefined", "-fvisibility=hidden", "-g0", "-s")
-"""No fast-math and no fused operations: a compiled kernel and its Python fallback agree to rounding."""
+FLAGS = (
+    *("-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-sanitize=undefined", "-g0", "-s"),
+    "-ffp-contract=off",  # nor fast-math: a compiled kernel and its Python fallback agree to rounding
+    # LLVM 22 was seen to unroll a loop in one run and not in the next, and is known to vectorise so
+    # (llvm/llvm-project#200833): an FMU would not be the same file on each machine. It costs a grid's step 4 %.
+    *("-fno-unroll-loops", "-fno-vectorize"),
+)
+"""Of every library."""
+
+# Without a name of its own a Mac library would carry the path of the temporary folder.
+_MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
+
+
+@cache
+def recipe() -> tuple[str, ...]:
+    """What decides beside the source what a library holds: part of every name that is a hash of contents."""
+    return (*FLAGS, *_MAC_FLAGS, f"ziglang {version('ziglang')}")
 
 
 def host_platform() -> str | None:
@@ -62,9 +79,8 @@ def compile_library(source: str, platform: str) -> Path:
 
 def compile_for(source: str, target: str, ending: str) -> Path:
     """Compile C source for one zig target; otherwise as `compile_library`."""
-    # Without a name of its own a Mac library would carry the path of the temporary folder.
-    flags = [*FLAGS, "-Wl,-install_name,@rpath/library.dylib"] if target.endswith("macos") else FLAGS
-    key = hashlib.sha256("\0".join([source, target, *flags]).encode()).hexdigest()[:32]
+    flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS
+    key = hashlib.sha256("\0".join([source, target, *recipe()]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if library.exists():
         return library

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fmus.toolchain.archive import digest_of, guid_of, write_archive
 from fmus.toolchain.cache import cache_directory
-from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS, compile_for, compile_library, host_platform
+from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_library, host_platform, recipe
 from fmus.toolchain.description import model_description
 from fmus.toolchain.description3 import model_description_3
 from fmus.toolchain.model import Model
@@ -88,7 +88,7 @@ class _Sources:
         self._code = native_source(model, version)
         self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None
         icons = [self._icons.decode()] if self._icons else []
-        self.digest = digest_of(self._code, self._description("").decode(), *FLAGS, *icons)
+        self.digest = digest_of(self._code, self._description("").decode(), *recipe(), *icons)
 
     def _description(self, guid: str) -> bytes:
         tool = f"gfor-cosim {version_of('gfor-cosim')}"

@@ -14,7 +14,7 @@ import pythonfmu
 
 from fmus.toolchain.archive import digest_of, guid_of, write_archive
 from fmus.toolchain.cache import cache_directory
-from fmus.toolchain.compiler import ENDINGS, FLAGS, compile_library, host_platform
+from fmus.toolchain.compiler import ENDINGS, compile_library, host_platform, recipe
 from fmus.toolchain.description import model_description
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
@@ -79,7 +79,7 @@ class _Sources:
         description = model_description(model, "", model.name, self.tool).decode()
         exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
-        self.digest = digest_of(self.c, self.python, self.slave, description, data, exporter, *FLAGS)
+        self.digest = digest_of(self.c, self.python, self.slave, description, data, exporter, *recipe())
         self.guid = guid_of(self.digest)
 
 
