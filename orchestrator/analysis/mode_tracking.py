@@ -8,7 +8,7 @@ a half means: most of mode a is in mode b.
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,10 @@ class ModeSet:
 
         values = np.array([mode.eigenvalue for mode in modes], dtype=complex)
         return cls(values, rows(m.left for m in modes), rows(m.shape for m in modes), names)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All but the names."""
+        return {"eigenvalues": self.eigenvalues, "left": self.left, "right": self.right}
 
     @property
     def frequencies(self) -> NDArray[np.float64]:

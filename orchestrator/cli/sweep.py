@@ -16,9 +16,9 @@ from orchestrator.distributed.executor import Executor
 from orchestrator.report import sweep_tables
 from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
 from orchestrator.report.sweep_plots import save_sweep_plots
+from orchestrator.study.point_store import PointStore
 from orchestrator.study.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
 from orchestrator.study.sweep_axes import Vary, parse_vary
-from orchestrator.study.sweep_point import PointStore
 
 _INTERRUPTED = 130
 

@@ -11,8 +11,9 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import CaseError, Problem
+from orchestrator.study.point_store import PointStore
 from orchestrator.study.sweep_axes import ALPHA, Axis, Vary, grid_places, resolve
-from orchestrator.study.sweep_point import PointRecord, PointStore, PointTask, compute_point, make_task
+from orchestrator.study.sweep_point import PointRecord, PointTask, compute_point, make_task
 from orchestrator.study.sweep_trajectories import Place, Trajectory, find_trajectories
 
 REFINEMENTS = 5
@@ -197,7 +198,8 @@ def _fill(
     tasks: list[PointTask] = []
     for sweep, place in wanted:
         task = result.plan.task(sweep.prepared, place)
-        stored = store.load(task.key)
+        found = store.load(task.key)
+        stored = PointRecord.restored(*found) if found else None
         if stored is None:
             missing.append((sweep, place))
             tasks.append(task)
@@ -209,12 +211,9 @@ def _fill(
     report(done, total)
     for index, outcome in executor.run(compute_point, tasks):
         sweep, place = missing[index]
-        if isinstance(outcome, WorkerLostError):
-            record = PointRecord(tasks[index].key, error=str(outcome), lasting=False)
-        else:
-            record = outcome
+        record = PointRecord.lost(outcome) if isinstance(outcome, WorkerLostError) else outcome
         if record.lasting:
-            store.save(record)
+            store.save(tasks[index].key, *record.stored())
         sweep.points[place] = record
         result.computed += 1
         done += 1

@@ -15,9 +15,10 @@ from orchestrator.distributed.processes import Processes
 from orchestrator.distributed.serial import Serial
 from orchestrator.errors import InputError
 from orchestrator.study import sweep as sweep_module
+from orchestrator.study.point_store import PointStore
 from orchestrator.study.sweep import plan_sweep, run_sweep
 from orchestrator.study.sweep_axes import parse_vary
-from orchestrator.study.sweep_point import PointStore, compute_point
+from orchestrator.study.sweep_point import compute_point
 from tests.study.sweep_case import two_oscillators
 
 FULL_TURN = 2 * np.pi

@@ -1,6 +1,8 @@
 """`gfor bind`, `gfor check`, and a vendor's FMU in a case, as a user meets them."""
 
 import json
+import shutil
+import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -8,6 +10,9 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases import two_area
+from orchestrator.cases.case import load_case
+from orchestrator.study.sweep import plan_sweep
+from orchestrator.study.sweep_axes import parse_vary
 from orchestrator.vendor.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.vendor.checks.base import CHECKS as ENTERED
 from tests.vendor.gallery.hostile import entities
@@ -126,6 +131,25 @@ def test_a_vendors_fmu_that_crashes_leaves_what_was_computed(gfor, gallery, case
     assert "component 'gfor' at t = 0.05 s: fmi2DoStep returned crash: its process died with" in error
     run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
     assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
+
+
+def test_a_sweep_computes_anew_what_a_changed_binding_or_fmu_decides(gallery, case, tmp_path):
+    fmu, binding = (Path(shutil.copy(path, tmp_path)) for path in gallery("converter_qd_si"))
+    path = case(fmu, binding)
+
+    def key():
+        plan = plan_sweep(load_case(path), [parse_vary("grid.X_L=0.1,0.3")])
+        return plan.task(plan.scenarios[0], (1,)).key
+
+    first, text = key(), binding.read_text(encoding="utf-8")
+    binding.write_text(f"# a remark\n{text}", encoding="utf-8")
+    assert key() == first
+    binding.write_text(text.replace("1500 MVA", "1600 MVA"), encoding="utf-8")
+    second = key()
+    assert second != first
+    with zipfile.ZipFile(fmu, "a") as archive:  # and its guid stays
+        archive.writestr("resources/tables.csv", "1,2")
+    assert key() != second
 
 
 def test_modes_say_why_a_black_box_has_none(gfor, gallery, case):

@@ -1,0 +1,57 @@
+"""Finished points on disk: what was computed is not computed again, and an interrupted study continues."""
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import InputError
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class PointStore:
+    """A folder with one small file for each point; what is not whole is not there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def load(self, key: str) -> tuple[dict[str, Any], Arrays] | None:
+        """Header and arrays of a point; None if there is no file of it that can be read."""
+        try:
+            with np.load(self._path(key), allow_pickle=False) as data:
+                arrays = {name: data[name] for name in data}
+            header = json.loads(arrays.pop("header").tobytes())
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error):
+            return None
+        return (header, arrays) if isinstance(header, dict) and header.pop("key", None) == key else None
+
+    def save(self, key: str, header: Mapping[str, Any], arrays: Arrays) -> None:
+        """Write a point at once; only a whole file gets the name that `load` looks for.
+
+        Raises
+        ------
+        InputError
+            If the folder takes no more.
+        """
+        text = json.dumps({**header, "key": key}).encode()
+        partial = self._path(key).with_suffix(f".{os.getpid()}.part")
+        try:
+            with partial.open("wb") as file:
+                np.savez(file, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **arrays)
+            partial.replace(self._path(key))
+        except OSError as error:
+            raise InputError(
+                f"--out: a finished point cannot be written to {self.folder}: {error.strerror}; make room there, or "
+                "choose another folder, and start the same command again: what is written stays"
+            ) from error
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.npz"
