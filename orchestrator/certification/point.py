@@ -1,6 +1,7 @@
 """One point of the study: one reactance of the line, with or without the converter. It can run in another process."""
 
 from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,14 @@ from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.threads import one_thread
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
-from orchestrator.cases.case import load_case
+from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError
 from orchestrator.study.modes import modes_of, running
+from orchestrator.study.point_key import same_case
+from orchestrator.study.point_store import Arrays
 
 COMPUTED = (0.05, 2.0)
 """Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range."""
@@ -25,6 +28,9 @@ POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
 Numbers = NDArray[np.float64]
 
+_SIGNAL = "signal "
+"""Begins the names of signals among a stored point's arrays."""
+
 
 @dataclass(frozen=True)
 class PointTask:
@@ -32,18 +38,22 @@ class PointTask:
 
     Attributes
     ----------
-    case
-        Path of the case file.
+    case, fingerprint
+        Path of the case file, and as in a sweep's task.
     values
         Values by ``component.variable``.
+    key
+        Names the point's file: a hash of all that the result depends on.
     black_box
         Identify the converter even if it shows its states.
     """
 
     case: str
+    fingerprint: str
     scenario: str
     X_L: float
     values: dict[str, Value]
+    key: str
     black_box: bool = False
 
 
@@ -82,20 +92,49 @@ class PointResult:
     warnings: tuple[str, ...] = ()
     failure: str | None = None
 
+    def stored(self) -> tuple[dict[str, Any], Arrays]:
+        """Header and arrays for a `PointStore`."""
+        header = {name: value for name, value in vars(self).items() if name not in ("modes", "times", "signals")}
+        modes = self.modes.arrays() if self.modes is not None else {}
+        signals = {_SIGNAL + name: values for name, values in self.signals.items()}
+        return header | {"names": self.modes and self.modes.names}, {**modes, **signals, "times": self.times}
+
+    @classmethod
+    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
+        """The result that was stored so; None if this is none."""
+        try:
+            names, times = header.pop("names"), arrays.pop("times")
+            signals = {
+                name.removeprefix("signal "): arrays.pop(name) for name in [*arrays] if name.startswith("signal ")
+            }
+            modes = None if names is None else ModeSet(**arrays, names=tuple(names))
+            header["warnings"] = tuple(header["warnings"])
+            return cls(**header, modes=modes, times=times, signals=signals)
+        except (KeyError, TypeError, ValueError):
+            return None
+
 
 def compute_point(task: PointTask) -> PointResult:
-    """Steady state, modes and response of one point; what fails becomes part of the result."""
+    """Steady state, modes and response of one point; what fails becomes part of the result.
+
+    Raises
+    ------
+    InputError
+        As `same_case`.
+    """
+    case = same_case(task.case, task.fingerprint)
     result = PointResult(task.X_L, task.scenario)
     try:
         with one_thread():
-            _compute(task, result)
+            _compute(case, task, result)
     except CosimError as error:
         result.failure = str(error)
+    except Exception as error:  # whatever a foreign FMU or library does, the other points go on
+        result.failure = f"{type(error).__name__}: {error}"
     return result
 
 
-def _compute(task: PointTask, result: PointResult) -> None:
-    case = load_case(task.case)
+def _compute(case: Case, task: PointTask, result: PointResult) -> None:
     (prepared,) = case.prepare([task.scenario], {**task.values, "grid.X_L": task.X_L})
     recorder = Recorder(prepared.record, prepared.record_every)
     with running(prepared) as master:

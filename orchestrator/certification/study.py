@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN, Case, load_case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.certification.criteria import (
     ModalTest,
@@ -19,12 +20,17 @@ from orchestrator.certification.swings import SwingTest, slow_part, swing_test
 from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.study.point_key import fingerprint, key_of, reference_to, scenario_content
+from orchestrator.study.point_store import PointStore
 
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
 """X_L of the norm [pu, 100 MVA]."""
 
 SETTLING = 0.5
 """From this long after the event [s] the signal is taken for a free response and decomposed into modes."""
+
+BASE = BUILT_IN / "norm631" / "case.toml"
+"""The study, with our converter in it."""
 
 PODS = ("none", "p", "q", "pq")
 WITHOUT, WITH = "without", "with"
@@ -106,7 +112,15 @@ class PointVerdict:
 
 @dataclass
 class Certification:
-    """The study, done."""
+    """The study, done.
+
+    Attributes
+    ----------
+    points
+        By scenario and X_L.
+    stored
+        How many of them an earlier start had left.
+    """
 
     request: CertificationRequest
     description: FmuDescription
@@ -115,6 +129,7 @@ class Certification:
     case: Path
     points: dict[tuple[str, float], PointResult]
     verdicts: list[PointVerdict]
+    stored: int = 0
 
     @property
     def passed(self) -> bool:
@@ -144,7 +159,7 @@ def watched(pod: str) -> str:
 
 def write_case(request: CertificationRequest, folder: Path) -> Path:
     """The study's case file with this converter in it; FMU and binding are laid beside it, so that it stands alone."""
-    text = (BUILT_IN / "norm631" / "case.toml").read_text(encoding="utf-8")
+    text = BASE.read_text(encoding="utf-8")
     for file in (request.fmu, *([request.binding] if request.binding else [])):
         if not file.is_file():
             raise InputError(f"{file}: there is no such file; give the path of an .fmu, and with --binding of a .toml")
@@ -172,7 +187,8 @@ def certify(
     Parameters
     ----------
     folder
-        Takes the study's case file, the FMU and its binding.
+        Takes the study's case file, the FMU and its binding, and every point as soon as it is there: those that are
+        there already are not computed again.
     report
         Is told how many points are done, of how many.
 
@@ -181,29 +197,57 @@ def certify(
     InputError
         If the FMU or a value cannot be used.
     """
-    path = write_case(request, folder)
-    case = load_case(path)
+    case = load_case(write_case(request, folder))
     own = {f"{CONVERTER}.{name}": value for name, value in request.values.items()}
-    fixed = dict(request.study_values)
-    (prepared,) = case.prepare([WITH], {**fixed, **own, "grid.X_L": request.reactances[0]})
-    description = prepared.system.components[CONVERTER].description
-    pod = request.pod or _pod_of(description, prepared.values)
+    settings = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
+    prepared = {
+        name: case.prepare([name], {**values, "grid.X_L": request.reactances[0]})[0]
+        for name, values in settings.items()
+    }
+    description = prepared[WITH].system.components[CONVERTER].description
+    pod = request.pod or _pod_of(description, prepared[WITH].values)
     tasks = [
-        PointTask(str(path), scenario, X_L, {**fixed, **(own if scenario == WITH else {})}, request.black_box)
+        _task(case, prepared[scenario], X_L, settings[scenario], request.black_box and scenario == WITH)
         for X_L in request.reactances
         for scenario in (WITHOUT, WITH)
     ]
-    points: dict[tuple[str, float], PointResult] = {}
-    for index, outcome in executor.run(compute_point, tasks):
-        task = tasks[index]
+    store = PointStore(folder / "points")
+    points = _stored(tasks, store)
+    stored = len(points)
+    report(stored, len(tasks))
+    missing = [task for task in tasks if (task.scenario, task.X_L) not in points]
+    for index, outcome in executor.run(compute_point, missing):
+        task = missing[index]
         if isinstance(outcome, WorkerLostError):
-            points[task.scenario, task.X_L] = PointResult(task.X_L, task.scenario, failure=str(outcome))
+            result = PointResult(task.X_L, task.scenario, failure=str(outcome))
         else:
-            points[task.scenario, task.X_L] = outcome
+            result = outcome
+        if result.failure is None:  # what was missing for the others, a licence for one, may be there next time
+            store.save(task.key, *result.stored())
+        points[task.scenario, task.X_L] = result
         report(len(points), len(tasks))
-    event = prepared.events[0].time
+    event = prepared[WITH].events[0].time
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], watched(pod), event) for X in request.reactances]
-    return Certification(request, description, pod, event, path, points, verdicts)
+    return Certification(request, description, pod, event, case.path, points, verdicts, stored)
+
+
+def _task(case: Case, prepared: PreparedScenario, X_L: float, values: dict[str, Value], black_box: bool) -> PointTask:
+    # The case file names the binding, if there is one: what that says is in the scenario's content, where it matters.
+    content = {
+        "case": BASE.read_text(encoding="utf-8"),
+        **scenario_content(prepared),
+        "overrides": sorted(values.items()),
+        "X_L": X_L,
+        "black box": black_box,
+    }
+    return PointTask(reference_to(case), fingerprint(case), prepared.name, X_L, values, key_of(content), black_box)
+
+
+def _stored(tasks: Sequence[PointTask], store: PointStore) -> dict[tuple[str, float], PointResult]:
+    """Points that an earlier start left, by scenario and X_L."""
+    found = {(task.scenario, task.X_L): store.load(task.key) for task in tasks}
+    results = {place: PointResult.restored(*content) for place, content in found.items() if content}
+    return {place: result for place, result in results.items() if result is not None}
 
 
 def judge(having: PointResult, lacking: PointResult, signal: str, event_time: float) -> PointVerdict:

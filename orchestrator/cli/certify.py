@@ -11,7 +11,8 @@ from orchestrator.certification.files import certification_json, save
 from orchestrator.certification.study import PODS, REACTANCES, Certification, CertificationRequest, certify
 from orchestrator.cli.arguments import setting
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.terminal import made_folder, make_console, progress_bar
+from orchestrator.cli.points import INTERRUPTED, compute_points
+from orchestrator.cli.terminal import made_folder, make_console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--black-box", action="store_true",
                         help="do not use the converter's states for the modes, even if it shows them")  # fmt: skip
     add_executor_arguments(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/certify_<file>)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder for results (default: results/certify_<file>); points that are there are not computed again",
+    )
     parser.add_argument(
         "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
     )
@@ -50,20 +56,17 @@ def run(options: argparse.Namespace) -> int:
         options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
     )
     executor = choose_executor(options.workers, options.scheduler, ["orchestrator.certification.point"])
-    with progress_bar(console) as bar:
-        task = bar.add_task("Points", total=None)
-        try:
-            result = certify(
-                request, executor, folder, lambda done, total: bar.update(task, completed=done, total=total)
-            )
-        finally:
-            executor.close()
+    result = compute_points(lambda report: certify(request, executor, folder, report), executor, folder, console)
+    if result is None:
+        return INTERRUPTED
     files = save(result, folder, pdf=options.pdf)
     if options.json:
         print(json.dumps(certification_json(result), indent=1, ensure_ascii=False))
     else:
         console.print(_table(result), "")
         console.print(f"[bold {'green' if result.passed else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
+        if result.stored:
+            console.print(f"{result.stored} of {len(result.points)} points were there already")
         console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
     return 0 if result.passed else 1
 

@@ -13,7 +13,14 @@ from orchestrator.cases.case import Case
 from orchestrator.cli import like
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_warnings, progress_bar
+from orchestrator.cli.terminal import (
+    made_folder,
+    make_console,
+    make_errors,
+    print_named_modes,
+    print_warnings,
+    progress_bar,
+)
 from orchestrator.coupling.progress import Progress
 from orchestrator.report import tables
 from orchestrator.report.study_files import save_run, save_study, summary_of
@@ -61,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
     if results and results[-1].failure:
-        Console(stderr=True, soft_wrap=True, highlight=False).print(
+        make_errors().print(
             f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: "
             f"{escape(str(results[-1].failure))}\nWhat was computed until then is in {folder}"
         )

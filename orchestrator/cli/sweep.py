@@ -11,16 +11,14 @@ from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.terminal import made_folder, make_console, progress_bar
-from orchestrator.distributed.executor import Executor
+from orchestrator.cli.points import INTERRUPTED, compute_points
+from orchestrator.cli.terminal import made_folder, make_console, make_errors
 from orchestrator.report import sweep_tables
 from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
 from orchestrator.report.sweep_plots import save_sweep_plots
 from orchestrator.study.point_store import PointStore
-from orchestrator.study.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
+from orchestrator.study.sweep import SweepResult, plan_sweep, run_sweep
 from orchestrator.study.sweep_axes import Vary, parse_vary
-
-_INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,31 +54,9 @@ def run(options: argparse.Namespace) -> int:
     plan = plan_sweep(case, options.vary, options.scenario, values, options.step, options.range)
     folder = made_folder(options.out or Path("results") / f"{case.name}_sweep")
     console = make_console(stderr=options.json)
-    result = _compute(plan, executor, folder, console)
-    return _INTERRUPTED if result is None else _present(result, folder, console, as_json=options.json)
-
-
-def _compute(plan: SweepPlan, executor: Executor, folder: Path, console: Console) -> SweepResult | None:
-    """Run a sweep; None, with a word on how to continue, after Ctrl-C."""
-    state = (0, plan.number_of_points)
-    with progress_bar(console) as bar:
-        task = bar.add_task("Points", total=None)
-
-        def report(done: int, total: int) -> None:
-            nonlocal state
-            state = (done, total)
-            bar.update(task, completed=done, total=total)
-
-        try:
-            return run_sweep(plan, executor, PointStore(folder / "points"), report)
-        except KeyboardInterrupt:
-            _errors().print(
-                f"interrupted: {state[0]} of {state[1]} points are in {escape(str(folder))}; "
-                "the same command continues from there"
-            )
-            return None
-        finally:
-            executor.close()
+    store = PointStore(folder / "points")
+    result = compute_points(lambda report: run_sweep(plan, executor, store, report), executor, folder, console)
+    return INTERRUPTED if result is None else _present(result, folder, console, as_json=options.json)
 
 
 def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bool) -> int:
@@ -93,7 +69,7 @@ def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bo
     else:
         console.print(sweep_tables.trajectories(samples), "")
     for text in sweep_tables.remarks(samples):
-        _errors().print(escape(text))
+        make_errors().print(escape(text))
     if not as_json:
         stored = f", {result.stored} were there already" if result.stored else ""
         files = ", ".join(["sweep.nc", "sweep.csv", *(path.name for path in plots)])
@@ -107,7 +83,3 @@ def _vary(text: str) -> Vary:
         return parse_vary(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _errors() -> Console:
-    return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)

@@ -23,6 +23,11 @@ def make_console(*, stderr: bool = False) -> Console:
     return console if console.is_terminal else Console(stderr=stderr, width=160)
 
 
+def make_errors() -> Console:
+    """Standard error, one line for each message."""
+    return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
+
+
 def progress_bar(console: Console) -> ProgressBar:
     """A bar on a terminal; elsewhere nothing."""
     columns = (
@@ -47,7 +52,7 @@ def print_named_modes(console: Console, case: "Case", results: "Sequence[ModesRe
 
 def print_warnings(results: "Sequence[ModesResult]") -> None:
     """Say on standard error what is to be borne in mind of results."""
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = make_errors()
     for result in results:
         for text in result.warnings:
             console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")

@@ -1,10 +1,14 @@
 """The damping test as a whole: our converter passes, detuned ones fail where their exact eigenvalues say so."""
 
 import json
+import shutil
+import zipfile
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import gfor_fmu.converter as converter_module
 from fmus.toolchain.catalogue import build_model
@@ -12,6 +16,7 @@ from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.cases.case import load_case
+from orchestrator.certification import study as study_module
 from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.files import certification_json, save
 from orchestrator.certification.point import FREQUENCY, POWER, PointResult
@@ -136,6 +141,75 @@ def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
     assert "there is no such file" in capsys.readouterr().err
 
 
+# -- keeping ---------------------------------------------------------------------------------------
+
+
+def rings(task):
+    """A point as it may come out, at once."""
+    t = np.arange(0, 20, 1e-3)
+    signal = 1 + 0.1 * np.exp(-0.5 * np.maximum(t - 1, 0)) * np.sin(2 * np.pi * 0.6 * np.maximum(t - 1, 0))
+    modes = ModeSet(np.array([-0.5 + 4j]), np.ones((1, 2), complex), np.ones((1, 2), complex), ("a", "b"))
+    names = {POWER: signal, FREQUENCY: 50 * signal}
+    return PointResult(
+        task.X_L, task.scenario, modes, ["a 100 %"], -0.5, 1e-9, None, t, names, dict.fromkeys(names, "pu")
+    )
+
+
+def test_an_interrupted_test_continues_and_gives_the_same(tmp_path, fmu_path, gfor, monkeypatch):
+    arguments = ("certify", fmu_path("gfor"), "--reactances", "0.1,0.3", "--workers", 1, "--out")
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    assert gfor(*arguments, tmp_path / "whole")[0] == 0
+    computed = []
+
+    def interrupted(task):
+        if len(computed) == 3:
+            raise KeyboardInterrupt
+        computed.append(task)
+        return rings(task)
+
+    out = tmp_path / "out"
+    monkeypatch.setattr(study_module, "compute_point", interrupted)
+    code, text, error = gfor(*arguments, out)
+    assert (code, text) == (130, "")
+    assert error == f"interrupted: 3 of 4 points are in {out}; the same command continues from there\n"
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    code, text, _ = gfor(*arguments, out)
+    assert code == 0
+    assert "3 of 4 points were there already" in text
+    for file in ("certificate.json", "certificate.html"):
+        assert (out / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+    xr.testing.assert_identical(*(xr.load_dataset(folder / "responses.nc") for folder in (out, tmp_path / "whole")))
+
+
+def test_what_was_changed_is_computed_anew(tmp_path, fmu_path, gfor, monkeypatch):
+    """The system without the converter is not touched by the converter's settings."""
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    fmu = Path(shutil.copy(fmu_path("gfor"), tmp_path))
+    arguments = ("certify", fmu, "--reactances", "0.1", "--workers", 1, "--out", tmp_path / "out")
+    for changes, kept in (((), 0), ((), 2), (("--set", "pod_q.enabled=true"), 1), (("--set", "sg1.H=4"), 0)):
+        text = gfor(*arguments, *changes)[1]
+        assert (f"{kept} of 2 points were there already" in text) == bool(kept)
+    with zipfile.ZipFile(fmu, "a") as archive:  # and its guid stays
+        archive.writestr("resources/tables.csv", "1,2")
+    assert "1 of 2 points were there already" in gfor(*arguments)[1]
+
+
+def test_a_point_that_failed_is_tried_again(tmp_path, fmu_path, gfor, monkeypatch):
+    arguments = ("certify", fmu_path("gfor"), "--reactances", "0.1", "--workers", 1, "--out", tmp_path)
+
+    def fails(task):
+        return rings(task) if task.scenario == "without" else PointResult(task.X_L, task.scenario, failure="no licence")
+
+    monkeypatch.setattr(study_module, "compute_point", fails)
+    code, text, _ = gfor(*arguments)
+    assert code == 1
+    assert "the study failed with the converter: no licence" in text
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    code, text, _ = gfor(*arguments)
+    assert code == 0
+    assert "1 of 2 points were there already" in text
+
+
 # -- the study -------------------------------------------------------------------------------------
 
 
@@ -144,6 +218,10 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
     arguments = ["--set", "pod_p.enabled=true", "--reactances", "0.3", "--workers", "2"]
     assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 0
     assert "passes the damping test" in capsys.readouterr().out
+    kept = (tmp_path / "certificate.json").read_bytes()
+    assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 0
+    assert "2 of 2 points were there already" in capsys.readouterr().out
+    assert (tmp_path / "certificate.json").read_bytes() == kept
     content = json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))
     (verdict,) = content["points"]
     assert content["passed"]
