@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
 
 class CosimError(Exception):
     """Base of all errors that are the user's to mend; the command line prints them without a traceback."""
@@ -60,6 +63,12 @@ class ComponentError(CosimError):
         when = "" if time is None else f" at t = {time:.6g} s"
         said = log or "the FMU logged no text"
         super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}")
+
+
+class RunInterruptedError(CosimError):
+    """Ctrl-C ended a run before its time."""
+
+    exit_code = INTERRUPTED
 
 
 class AnalysisError(CosimError):

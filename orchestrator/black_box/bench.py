@@ -20,6 +20,7 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
@@ -214,12 +215,13 @@ class Runs:
         component, bench = self._running, self._bench
         into, out = RealBatch(component, bench.inputs, inputs[0]), RealBatch(component, bench.outputs, outputs[0])
         failed = (ctypes.c_int64 * 2)()
-        status = _library().drive(
-            component.pointer,
-            *(ctypes.cast(f, ctypes.c_void_p) for f in (component.set_real, component.get_real, component.do_step)),
-            into.arguments[1], len(bench.inputs), out.arguments[1], len(bench.outputs),
-            inputs.ctypes.data, outputs.ctypes.data, self._index, len(inputs), bench.step_size, failed,
-        )  # fmt: skip
+        with calls:
+            status = _library().drive(
+                component.pointer,
+                *(ctypes.cast(f, ctypes.c_void_p) for f in (component.set_real, component.get_real, component.do_step)),
+                into.arguments[1], len(bench.inputs), out.arguments[1], len(bench.outputs),
+                inputs.ctypes.data, outputs.ctypes.data, self._index, len(inputs), bench.step_size, failed,
+            )  # fmt: skip
         if status:
             component.check(status, _CALLS[failed[1]], (self._index + failed[0]) * bench.step_size)
         self._index += len(inputs)

@@ -8,7 +8,7 @@ from importlib import import_module
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.errors import CosimError
+from orchestrator.errors import INTERRUPTED, CosimError
 
 COMMANDS = {
     "run": "steady state, modes and time response of a case's scenarios",
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except KeyboardInterrupt:
         errors.print("interrupted")
-        return 130
+        return INTERRUPTED
 
 
 class _Parser(argparse.ArgumentParser):

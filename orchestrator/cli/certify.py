@@ -11,8 +11,9 @@ from orchestrator.certification.files import certification_json, save
 from orchestrator.certification.study import PODS, REACTANCES, Certification, CertificationRequest, certify
 from orchestrator.cli.arguments import setting
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.points import INTERRUPTED, compute_points
+from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.errors import INTERRUPTED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,9 +10,6 @@ from rich.markup import escape
 from orchestrator.cli.terminal import make_errors, progress_bar
 from orchestrator.distributed.executor import Executor
 
-INTERRUPTED = 130
-"""What a command returns after Ctrl-C."""
-
 Result = TypeVar("Result")
 
 

@@ -22,6 +22,7 @@ from orchestrator.cli.terminal import (
     progress_bar,
 )
 from orchestrator.coupling.progress import Progress
+from orchestrator.errors import INTERRUPTED, RunInterruptedError
 from orchestrator.report import tables
 from orchestrator.report.study_files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult, run_scenario
@@ -53,7 +54,12 @@ def run(options: argparse.Namespace) -> int:
             def report(done: int, total: int, task: Any = task) -> None:
                 bar.update(task, completed=done, total=total)
 
-            result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
+            try:
+                result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
+            except KeyboardInterrupt:
+                if not results:
+                    raise
+                break
             results.append(result)
             save_run(result, folder)
             print_warnings([result.modes])
@@ -67,13 +73,22 @@ def run(options: argparse.Namespace) -> int:
         console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
-    if results and results[-1].failure:
-        make_errors().print(
-            f"[bold red]error:[/bold red] scenario {results[-1].modes.prepared.name!r}: "
-            f"{escape(str(results[-1].failure))}\nWhat was computed until then is in {folder}"
-        )
-        return 1
-    return 0
+    return _end(results, len(scenarios), folder)
+
+
+def _end(results: Sequence[RunResult], wanted: int, folder: Path) -> int:
+    """Say what is missing; returns 0 if nothing is."""
+    failure = results[-1].failure if results else None
+    interrupted = isinstance(failure, RunInterruptedError) or (failure is None and len(results) < wanted)
+    if failure is not None:
+        what = f"scenario {results[-1].modes.prepared.name!r}: {failure}"
+    elif interrupted:
+        what = f"interrupted: {len(results)} of {wanted} scenarios are done"
+    else:
+        return 0
+    head = "" if interrupted else "[bold red]error:[/bold red] "
+    make_errors().print(f"{head}{escape(what)}\nWhat was computed until then is in {escape(str(folder))}")
+    return INTERRUPTED if interrupted else 1
 
 
 def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:

@@ -11,8 +11,9 @@ from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.points import INTERRUPTED, compute_points
+from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console, make_errors
+from orchestrator.errors import INTERRUPTED
 from orchestrator.report import sweep_tables
 from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
 from orchestrator.report.sweep_plots import save_sweep_plots

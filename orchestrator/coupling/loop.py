@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.compiler import compile_library, host_platform
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("inner_loop.c")
 _FUNCTIONS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
@@ -121,18 +122,18 @@ class CompiledLoop:
         call.group = group
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        status = self._library.advance(
-            ctypes.addressof(self._calls),
-            len(self._exchanges),
-            self._y.ctypes.data,
-            index,
-            count,
-            step_size,
-            ctypes.addressof(self._failure),
-        )
-        self.completed = count
+        with calls:
+            status = self._library.advance(
+                ctypes.addressof(self._calls),
+                len(self._exchanges),
+                self._y.ctypes.data,
+                index,
+                count,
+                step_size,
+                ctypes.addressof(self._failure),
+            )
+            self.completed = self._failure[0] - index if status else count
         if status:
-            self.completed = self._failure[0] - index
             component = self._exchanges[self._failure[1]].component
             component.check(status, _FUNCTIONS[self._failure[2]], self._failure[0] * step_size)
 
@@ -167,27 +168,30 @@ class PythonLoop:
     def advance(self, index: int, count: int, step_size: float) -> None:
         self.completed = 0
         for k in range(index, index + count):
-            time, size = self._interval(k, step_size)
-            known = self._extrapolated() if self._extrapolation else self._y
-            if self._hand_over is not None:
-                self._hand_over()
-            for group, spent in zip(self._groups, self._spent, strict=True):
-                for i, exchange in enumerate(group):
-                    np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
-                    start = perf_counter()
+            with calls:
+                self._step(*self._interval(k, step_size))
+                self.completed += 1
+
+    def _step(self, time: float, size: float) -> None:
+        known = self._extrapolated() if self._extrapolation else self._y
+        if self._hand_over is not None:
+            self._hand_over()
+        for group, spent in zip(self._groups, self._spent, strict=True):
+            for i, exchange in enumerate(group):
+                np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
+                start = perf_counter()
+                component = exchange.component
+                if exchange.inputs.names and self._hand_over is None:
+                    component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
+                component.step(time, size)
+                spent[i] += perf_counter() - start
+            for i, exchange in enumerate(group):
+                start = perf_counter()
+                if exchange.outputs.names:
                     component = exchange.component
-                    if exchange.inputs.names and self._hand_over is None:
-                        component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
-                    component.step(time, size)
-                    spent[i] += perf_counter() - start
-                for i, exchange in enumerate(group):
-                    start = perf_counter()
-                    if exchange.outputs.names:
-                        component = exchange.component
-                        component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
-                    known[exchange.window] = exchange.outputs.values
-                    spent[i] += perf_counter() - start
-            self.completed += 1
+                    component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
+                known[exchange.window] = exchange.outputs.values
+                spent[i] += perf_counter() - start
 
     def _interval(self, index: int, step_size: float) -> tuple[float, float]:
         """Time and size of a step [s]."""

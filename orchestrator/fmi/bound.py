@@ -14,6 +14,7 @@ from typing import Any
 from fmus.toolchain.compiler import compile_library, host_platform
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
+from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.port import PORT, START, SYSTEM_BASE_MVA, BoundDescription, PhasorMap
 
 _SOURCE = Path(__file__).with_name("port_adapter.c")
@@ -199,7 +200,8 @@ class BoundComponent(Component):
         if name not in ("v_re", "v_im"):
             raise InputError(f"component {self.name!r}: {name} is computed by the FMU and cannot be set")
         reference, number = ctypes.c_uint(PORT.index(name)), ctypes.c_double(value)
-        status = self.set_real(self.pointer, ctypes.addressof(reference), 1, ctypes.addressof(number))
+        with calls:
+            status = self.set_real(self.pointer, ctypes.addressof(reference), 1, ctypes.addressof(number))
         self.check(status, f"setting {name} = {value}")
 
     def _send_start(self) -> None:

@@ -27,9 +27,10 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
+from orchestrator.fmi.interrupts import calls
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-_ERROR = 3
+_ERROR, _FATAL = 3, 4
 _LOG_LENGTH = 50
 
 try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms
@@ -143,13 +144,15 @@ class RealBatch:
     def read(self) -> NDArray[np.float64]:
         """Fetch the values from the FMU."""
         if self.names:
-            self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
+            with calls:
+                self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
         return self.values
 
     def write(self) -> None:
         """Send the values to the FMU."""
         if self.names:
-            self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
+            with calls:
+                self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
 
 
 class Component:
@@ -165,6 +168,9 @@ class Component:
         Where its archive is extracted; by default a new temporary folder of its own.
     """
 
+    _lost = False
+    """Whether it said ``fmi2Fatal``: no call is allowed any more."""
+
     def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
         self.name = name
         self.description = description
@@ -173,9 +179,11 @@ class Component:
         self._callbacks = _callbacks(self._messages)
         self._fmu: Any = None
         self._initialised = False
+        calls.watch()
         try:
             self._fmu = self._loaded(Path(directory or self._own_directory or ""))
-            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+            with calls:
+                self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:  # fmpy raises a bare Exception here
             said = "; ".join(self._texts()) or str(error)
             self.close()
@@ -224,6 +232,7 @@ class Component:
     def check(self, status: int, call: str, time: float | None = None) -> None:
         """Raise unless a call's status is OK or Warning."""
         if status > 1:
+            self._lost = self._lost or status == _FATAL
             name = STATUS[status] if status < len(STATUS) else f"status {status}"
             said = "; ".join(self._texts(1) or self._texts())
             raise ComponentError(self.name, self._in_its_words(call), self._in_its_words(name), said, time)
@@ -236,7 +245,8 @@ class Component:
         """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""
         self._messages.clear()
         try:
-            result = function(*arguments)
+            with calls:
+                result = function(*arguments)
         except FMICallException as error:
             self.check(error.status, call)
             raise ComponentError(self.name, call, str(error), "; ".join(self._texts())) from error
@@ -259,7 +269,8 @@ class Component:
 
     def step(self, time: float, step_size: float) -> None:
         """One communication step [s]."""
-        self.check(self.do_step(self.pointer, time, step_size, 1), "fmi2DoStep", time)
+        with calls:
+            self.check(self.do_step(self.pointer, time, step_size, 1), "fmi2DoStep", time)
 
     def reset(self) -> None:
         """Back to where it was after instantiation."""
@@ -269,13 +280,14 @@ class Component:
     def close(self) -> None:
         """Terminate and free the instance, and remove what was extracted for it."""
         fmu, self._fmu = self._fmu, None
-        if fmu is not None and fmu.component is not None:
-            try:
-                if self._initialised:
-                    fmu.terminate()
-            except FMICallException:
-                pass  # an FMU that failed may refuse to terminate; it is freed all the same
-            fmu.freeInstance()
+        if fmu is not None and fmu.component is not None and not self._lost:
+            with calls:
+                try:
+                    if self._initialised:
+                        fmu.terminate()
+                except FMICallException:
+                    pass  # an FMU that failed may refuse to terminate; it is freed all the same
+                fmu.freeInstance()
         if self._own_directory is not None:
             shutil.rmtree(self._own_directory, ignore_errors=True)
             self._own_directory = None

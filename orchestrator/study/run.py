@@ -1,6 +1,6 @@
 """A run: the modes of a scenario, its response to the events, and what links the two."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import xarray as xr
@@ -18,7 +18,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.told_step import as_if_told
-from orchestrator.errors import AnalysisError, CosimError
+from orchestrator.errors import AnalysisError, CosimError, RunInterruptedError
 from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
@@ -78,10 +78,12 @@ def run_scenario(
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
     A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
-    A component that fails in the middle ends the run; what was recorded until then is in the result.
+    A component that fails in the middle ends the run, and so does Ctrl-C; what was recorded until then is in the
+    result.
     """
     recorder = Recorder(prepared.record, prepared.record_every)
-    statistics, failure = None, None
+    statistics = None
+    failure: CosimError | None = None
     with running(prepared) as master:
         reasons = [text for component in master.components.values() if (text := obstacle(component))]
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(case, prepared, master, frequency_range)
@@ -91,19 +93,11 @@ def run_scenario(
             statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
         except CosimError as error:
             failure = error
+        except KeyboardInterrupt:
+            failure = RunInterruptedError(f"interrupted at t = {master.time:.6g} s")
     dataset = trajectory_dataset(recorder, case, prepared)
     ring_down = None if failure else _ring_down(case, modes, dataset)
     return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure)
-
-
-def run_study(
-    case: Case,
-    scenarios: Sequence[PreparedScenario],
-    observe: Callable[[PreparedScenario], Sequence[Observer]] | None = None,
-) -> Iterator[RunResult]:
-    """Run scenarios one after another; each result is there as soon as it is computed."""
-    for prepared in scenarios:
-        yield run_scenario(case, prepared, observers=observe(prepared) if observe else ())
 
 
 def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:

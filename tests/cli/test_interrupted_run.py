@@ -1,0 +1,58 @@
+"""`gfor run` and Ctrl-C: what was computed is kept, and said to be there."""
+
+import json
+
+import pytest
+import xarray as xr
+
+from orchestrator.cli import run as command
+from orchestrator.coupling.progress import Progress
+from orchestrator.study.run import run_scenario
+
+WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--stop", "2")
+
+
+class Stops(Progress):
+    """Ctrl-C as it arrives between two steps, in the second scenario."""
+
+    def observe(self, master):
+        if "gfor" in master.components and master.time > 1.5:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("output", [(), ("--json",)])
+def test_in_the_middle_of_a_scenario(gfor, monkeypatch, tmp_path, output):
+    monkeypatch.setattr(command, "Progress", Stops)
+    code, text, error = gfor(*WORDS, "--out", tmp_path, *output)
+    assert code == 130
+    assert "scenario 'gfor': interrupted at t = 1.6 s" in error
+    assert "error" not in error
+    assert f"What was computed until then is in {tmp_path}" in error
+    whole, part = (xr.load_dataset(tmp_path / name / "trajectory.nc") for name in ("base", "gfor"))
+    assert float(whole["time"].max()) == pytest.approx(2.0)
+    assert float(part["time"].max()) == pytest.approx(1.6)
+    base, other = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]
+    assert base["failure"] is None
+    assert "interrupted at t = 1.6 s" in other["failure"]
+    assert not output or len(json.loads(text)) == 2
+
+
+def test_between_two_scenarios(gfor, monkeypatch, tmp_path):
+    def only_one(case, prepared, **options):
+        if prepared.name == "gfor":
+            raise KeyboardInterrupt
+        return run_scenario(case, prepared, **options)
+
+    monkeypatch.setattr(command, "run_scenario", only_one)
+    code, _, error = gfor(*WORDS, "--out", tmp_path)
+    assert code == 130
+    assert error.startswith("interrupted: 1 of 2 scenarios are done\nWhat was computed until then is in ")
+    assert len(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]) == 1
+
+
+def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
+    def none(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "run_scenario", none)
+    assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")

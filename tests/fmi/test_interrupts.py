@@ -1,0 +1,122 @@
+"""Ctrl-C, sent for real and while FMUs with Python inside are being called: a process of its own may die of it."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from orchestrator.fmi.interrupts import calls
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can send itself Ctrl-C there")
+
+_RUNS = """
+import os, signal, threading
+from orchestrator.cases.case import load_case
+from orchestrator.coupling import loop
+from orchestrator.coupling.master import Master
+
+{patch}
+(ready,) = load_case("two_area").prepare(["pod_pq"])
+for delay in (0.02, 0.05, 0.09, 0.2):
+    with Master(ready.system, ready.schedule, ready.step_size) as master:
+        threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)).start()
+        try:
+            master.run(1000.0)
+        except KeyboardInterrupt:
+            done = master.index
+        master.advance(10)  # the FMUs are as well as before
+        assert master.index == done + 10 > 10
+        print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.parametrize("patch", ["", "loop._library = lambda: None"], ids=["compiled loop", "python loop"])
+def test_a_run_can_be_interrupted_at_any_time(patch):
+    result = subprocess.run(
+        [sys.executable, "-c", _RUNS.format(patch=patch)], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout.split() == ["interrupted"] * 4
+
+
+# -- the rule ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def taken():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    calls.watch()
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def ctrl_c():
+    signal.raise_signal(signal.SIGINT)
+
+
+def test_it_waits_for_the_end_of_the_outermost_call(taken):
+    reached = []
+
+    def outer():
+        with calls:
+            with calls:
+                ctrl_c()
+                reached.append("inner")
+            reached.append("outer")
+
+    with pytest.raises(KeyboardInterrupt):
+        outer()
+    assert reached == ["inner", "outer"]
+    with calls:
+        pass  # and is then forgotten
+
+
+def test_between_calls_it_is_as_ever(taken):
+    with pytest.raises(KeyboardInterrupt):
+        ctrl_c()
+
+
+def test_a_second_one_does_not_wait(taken):
+    reached = []
+
+    def call():
+        with calls:
+            ctrl_c()
+            reached.append("first")
+            ctrl_c()
+            reached.append("second")
+
+    with pytest.raises(KeyboardInterrupt):
+        call()
+    assert reached == ["first"]
+    with calls:
+        pass
+
+
+def test_other_threads_do_not_hold_it_up(taken):
+    inside, go_on = threading.Event(), threading.Event()
+
+    def call():
+        with calls:
+            inside.set()
+            go_on.wait()
+
+    thread = threading.Thread(target=call)
+    thread.start()
+    inside.wait()
+    with pytest.raises(KeyboardInterrupt):
+        ctrl_c()
+    go_on.set()
+    thread.join()
+
+
+def test_the_handler_of_others_stays(taken):
+    heard = []
+    signal.signal(signal.SIGINT, lambda *_: heard.append(os.getpid()))
+    calls.watch()
+    with calls:
+        ctrl_c()
+    assert heard == [os.getpid()]
