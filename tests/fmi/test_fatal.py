@@ -1,11 +1,13 @@
-"""After ``fmi2Fatal`` no call is allowed: an instance that pythonfmu gave up crashes at the next one."""
+"""After ``fmi2Fatal`` no call is allowed, not even to free the instance."""
 
 import subprocess
 import sys
-from pathlib import Path
+from dataclasses import replace
 
 import pytest
-from pythonfmu import FmuBuilder
+
+from tests.vendor.gallery.build import build
+from tests.vendor.gallery.members import LAG, small
 
 _STEPS = """
 import sys
@@ -21,14 +23,16 @@ try:
         for k in range(100):
             component.step(0.01 * k, 0.01)
 except ComponentError as error:
-    print(error.call, error.status, error.time)
+    print(error.status, error.log, error.time)
 """
 
 
 @pytest.mark.parametrize("isolated", [False, True])
 def test_an_fmu_that_gave_itself_up_is_left_alone(isolated, tmp_path):
-    fmu = FmuBuilder.build_FMU(Path(__file__).with_name("raising_slave.py"), dest=tmp_path)
+    """This one ends its process at the next call."""
+    source = small("gives_up", "LAG", LAG, step_size="1e-2", stop_time="2")
+    fmu = build(replace(source, defines={**source.defines, "FAULT_FATAL_AT": 0.055}), tmp_path)
     call = [sys.executable, "-c", _STEPS, str(fmu), str(isolated)]
     result = subprocess.run(call, capture_output=True, text=True, check=False, timeout=60)
-    assert result.returncode == 0, result.stderr
-    assert result.stdout == "fmi2DoStep fmi2Fatal 0.05\n"
+    assert (result.returncode, result.stderr) == (0, "")
+    assert result.stdout == "fmi2Fatal out of its mind 0.05\n"

@@ -54,7 +54,7 @@ static state_t shared; /* one for all instances */
 #define S (&instance->s)
 #endif
 
-static int instances_made;
+static int instances_made, given_up; /* after FATAL no call is allowed */
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
@@ -90,6 +90,7 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 EXPORT void fmi2FreeInstance(void *c) {
     instance_t *instance = c;
     if (!instance) return;
+    if (given_up) abort();
 #ifndef FAULT_LEAK_INSTANCE
     free(instance->name);
     free(instance);
@@ -122,7 +123,10 @@ EXPORT int fmi2ExitInitializationMode(void *c) {
     memcpy(instance->late, S->z, sizeof S->z);
     return OK;
 }
-EXPORT int fmi2Terminate(void *c) { return OK; }
+EXPORT int fmi2Terminate(void *c) {
+    if (given_up) abort();
+    return OK;
+}
 EXPORT int fmi2Reset(void *c) {
     instance_t *instance = c;
 #ifdef FAULT_RESET
@@ -233,6 +237,13 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
     if (S->time > FAULT_ERROR_AT) {
         log_text(instance, ERROR, "licence expired");
         return ERROR;
+    }
+#endif
+#ifdef FAULT_FATAL_AT
+    if (S->time > FAULT_FATAL_AT) {
+        log_text(instance, FATAL, "out of its mind");
+        given_up = 1;
+        return FATAL;
     }
 #endif
 #ifdef FAULT_FLOOD
