@@ -104,9 +104,8 @@ class PointResult:
         """The result that was stored so; None if this is none."""
         try:
             names, times = header.pop("names"), arrays.pop("times")
-            signals = {
-                name.removeprefix("signal "): arrays.pop(name) for name in [*arrays] if name.startswith("signal ")
-            }
+            recorded = [name for name in arrays if name.startswith(_SIGNAL)]
+            signals = {name.removeprefix(_SIGNAL): arrays.pop(name) for name in recorded}
             modes = None if names is None else ModeSet(**arrays, names=tuple(names))
             header["warnings"] = tuple(header["warnings"])
             return cls(**header, modes=modes, times=times, signals=signals)

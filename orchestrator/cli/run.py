@@ -22,7 +22,7 @@ from orchestrator.cli.terminal import (
     progress_bar,
 )
 from orchestrator.coupling.progress import Progress
-from orchestrator.errors import INTERRUPTED, RunInterruptedError
+from orchestrator.errors import INTERRUPTED, CosimError, RunInterruptedError
 from orchestrator.report import tables
 from orchestrator.report.study_files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult, run_scenario
@@ -47,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     folder = made_folder(options.out or Path("results") / case.name)
     console = make_console(stderr=options.json)
     results: list[RunResult] = []
+    stopped: tuple[str, BaseException] | None = None
     with progress_bar(console) as bar:
         for prepared in scenarios:
             task = bar.add_task(prepared.title, total=None)
@@ -56,14 +57,16 @@ def run(options: argparse.Namespace) -> int:
 
             try:
                 result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
-            except KeyboardInterrupt:
+            except (CosimError, KeyboardInterrupt) as error:
                 if not results:
                     raise
+                stopped = (prepared.name, error)
                 break
             results.append(result)
             save_run(result, folder)
             print_warnings([result.modes])
             if result.failure:
+                stopped = (prepared.name, result.failure)
                 break
     plots = save_study(case, results, folder)
     if options.json:
@@ -73,21 +76,15 @@ def run(options: argparse.Namespace) -> int:
         console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
-    return _end(results, len(scenarios), folder)
+    return _end(*stopped, folder) if stopped else 0
 
 
-def _end(results: Sequence[RunResult], wanted: int, folder: Path) -> int:
-    """Say what is missing; returns 0 if nothing is."""
-    failure = results[-1].failure if results else None
-    interrupted = isinstance(failure, RunInterruptedError) or (failure is None and len(results) < wanted)
-    if failure is not None:
-        what = f"scenario {results[-1].modes.prepared.name!r}: {failure}"
-    elif interrupted:
-        what = f"interrupted: {len(results)} of {wanted} scenarios are done"
-    else:
-        return 0
+def _end(scenario: str, error: BaseException, folder: Path) -> int:
+    """Say where a study ended before its time, and what is left of it."""
+    interrupted = isinstance(error, KeyboardInterrupt | RunInterruptedError)
     head = "" if interrupted else "[bold red]error:[/bold red] "
-    make_errors().print(f"{head}{escape(what)}\nWhat was computed until then is in {escape(str(folder))}")
+    text = f"scenario {scenario!r}: {str(error) or 'interrupted'}\nWhat was computed until then is in {folder}"
+    make_errors().print(f"{head}{escape(text)}")
     return INTERRUPTED if interrupted else 1
 
 

@@ -1,4 +1,4 @@
-"""`gfor run` and Ctrl-C: what was computed is kept, and said to be there."""
+"""`gfor run` that ends before its time: what was computed is kept, and said to be there."""
 
 import json
 
@@ -7,6 +7,7 @@ import xarray as xr
 
 from orchestrator.cli import run as command
 from orchestrator.coupling.progress import Progress
+from orchestrator.errors import AnalysisError
 from orchestrator.study.run import run_scenario
 
 WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--stop", "2")
@@ -37,16 +38,23 @@ def test_in_the_middle_of_a_scenario(gfor, monkeypatch, tmp_path, output):
     assert not output or len(json.loads(text)) == 2
 
 
-def test_between_two_scenarios(gfor, monkeypatch, tmp_path):
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "scenario 'gfor': interrupted"),
+        (AnalysisError("no steady state"), 1, "error: scenario 'gfor': no steady state"),
+    ],
+)
+def test_between_two_scenarios(gfor, monkeypatch, tmp_path, error, code, said):
     def only_one(case, prepared, **options):
         if prepared.name == "gfor":
-            raise KeyboardInterrupt
+            raise error
         return run_scenario(case, prepared, **options)
 
     monkeypatch.setattr(command, "run_scenario", only_one)
-    code, _, error = gfor(*WORDS, "--out", tmp_path)
-    assert code == 130
-    assert error.startswith("interrupted: 1 of 2 scenarios are done\nWhat was computed until then is in ")
+    ended, _, text = gfor(*WORDS, "--out", tmp_path)
+    assert ended == code
+    assert text.startswith(f"{said}\nWhat was computed until then is in ")
     assert len(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]) == 1
 
 
