@@ -21,6 +21,7 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.interrupts import calls
 
 _INITIAL_PASSES = 20
 _LONGEST_STRETCH = 1000
@@ -237,6 +238,7 @@ class Master:
         ComponentError
             If an FMU fails; observers are ended first, so nothing recorded is lost.
         """
+        calls.watch()  # again: a notebook hands Ctrl-C back to Python after each cell
         stop = self.clock.index(stop_time, "the stop")
         due: dict[int, list[Event]] = {}
         for event in events:

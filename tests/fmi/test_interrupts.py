@@ -22,6 +22,7 @@ from orchestrator.coupling.master import Master
 (ready,) = load_case("two_area").prepare(["pod_pq"])
 for delay in (0.02, 0.05, 0.09, 0.2):
     with Master(ready.system, ready.schedule, ready.step_size) as master:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # as a notebook does between two cells
         threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)).start()
         try:
             master.run(1000.0)
