@@ -1,26 +1,16 @@
 """One running FMU: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
-import itertools
-import os
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
-from weakref import WeakValueDictionary
 from xml.etree import ElementTree
 
 import numpy as np
-from fmpy import calloc, free
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
+from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, InputError
@@ -28,90 +18,10 @@ from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
 from orchestrator.fmi.interrupts import calls
+from orchestrator.fmi.messages import Messages, callbacks_for
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 _ERROR, _FATAL = 3, 4
-_LOG_LENGTH = 50
-
-try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms
-    from fmpy import logging as fmpy_logging
-except (ImportError, OSError):
-    fmpy_logging = None
-
-
-class _Messages(list[tuple[int, str]]):
-    """The newest messages of one component, as (status, text)."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.streak, self.step = 0, 0
-
-
-FLOODED = 97
-"""Exit code of a process whose FMU logs without end."""
-
-_guard: Callable[[_Messages], None] | None = None
-
-
-def on_message(
-    most: int, steps: Callable[[], int], keep: Callable[[list[tuple[int, str]]], None] | None = None
-) -> None:
-    """Watch what FMUs log in this process, and end it if one logs without end; for processes of foreign FMUs.
-
-    Parameters
-    ----------
-    most
-        Messages in one step.
-    steps
-        Tells how many steps were begun.
-    keep
-        Given the newest messages of an FMU whenever there is another one.
-    """
-
-    def guard(messages: _Messages) -> None:
-        if messages.step != (now := steps()):
-            messages.step, messages.streak = now, 0
-        messages.streak += 1
-        if keep is not None and messages.streak < _LOG_LENGTH:
-            keep(messages)
-        if messages.streak > most:
-            os._exit(FLOODED)
-
-    globals()["_guard"] = guard
-
-
-_message_lists: WeakValueDictionary[int, "_Messages"] = WeakValueDictionary()
-_next_environment = itertools.count(1)
-
-
-def _receive(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-    messages = _message_lists.get(environment or 0)
-    if messages is not None:
-        messages.append((status, (message or b"").decode("utf-8", "replace")))
-        del messages[:-_LOG_LENGTH]
-        if _guard is not None:
-            _guard(messages)
-
-
-_receive_pointer = fmi2CallbackLoggerTYPE(_receive)
-
-
-def _callbacks(messages: _Messages) -> Any:
-    """Callbacks whose messages end in one component's list.
-
-    All components share one logger function, because fmpy's proxy keeps only the last one it was
-    given; the component is told by its environment pointer.
-    """
-    environment = next(_next_environment)
-    _message_lists[environment] = messages
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = _receive_pointer
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    callbacks.componentEnvironment = environment
-    if fmpy_logging is not None:
-        fmpy_logging.addLoggerProxy(ctypes.byref(callbacks))
-    return callbacks
 
 
 class RealBatch:
@@ -174,9 +84,9 @@ class Component:
     def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
         self.name = name
         self.description = description
-        self._messages = _Messages()
+        self._messages = Messages()
         self._own_directory = None if directory else extract(description.path)
-        self._callbacks = _callbacks(self._messages)
+        self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None
         self._initialised = False
         calls.watch()
@@ -227,7 +137,7 @@ class Component:
 
     def _texts(self, least: int = 0) -> list[str]:
         """Distinct messages of at least that status, in order, oldest first."""
-        return list(dict.fromkeys(text for status, text in self._messages if status >= least))
+        return self._messages.texts(least)
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
         """Raise unless a call's status is OK or Warning."""

@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
-from orchestrator.fmi.component import FLOODED, Component, RealBatch
+from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, NOT_A_NUMBER, Mailbox
+from orchestrator.fmi.messages import FLOODED
 
 _ERROR = 3
 

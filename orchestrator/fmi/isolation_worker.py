@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError
-from orchestrator.fmi.component import Component, on_message
+from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.limits import Limits, apply_limits
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
+from orchestrator.fmi.messages import on_message
 
 
 class Worker:

@@ -14,8 +14,8 @@ from typing import Any
 
 from orchestrator.errors import BindingError, FmuFileError, HostileFmuError, InputError
 from orchestrator.fmi.archive import extract
-from orchestrator.fmi.component import FLOODED
 from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.messages import FLOODED
 from orchestrator.vendor.binding import bound_fmu, read_table
 from orchestrator.vendor.checks.all import CHECKS
 from orchestrator.vendor.checks.base import Result, Verdict, failed, not_applicable, passed

@@ -14,8 +14,8 @@ from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError
 from orchestrator.fmi import bound
-from orchestrator.fmi.component import on_message
 from orchestrator.fmi.limits import Limits, apply_limits
+from orchestrator.fmi.messages import on_message
 from orchestrator.vendor.binding import bound_fmu
 from orchestrator.vendor.checks.all import CHECKS
 from orchestrator.vendor.checks.base import Check, Result, failed, not_applicable
