@@ -4,6 +4,7 @@ Python raises `KeyboardInterrupt` in whatever Python code runs next. In a call o
 the FMU, which takes it for a failure of its own, reports ``fmi2Fatal``, and must not be called again.
 """
 
+import ctypes
 import signal
 import threading
 from types import FrameType
@@ -15,7 +16,12 @@ class _Calls:
     def __init__(self) -> None:
         self._main = threading.main_thread().ident
         self._depth = 0
-        self._asked = False
+        self._asked = ctypes.c_int(0)  # C that waits for another process looks at it as well
+
+    @property
+    def asked_address(self) -> int:
+        """Of an int that is 1 while Ctrl-C waits for the end of a call."""
+        return ctypes.addressof(self._asked)
 
     def watch(self) -> None:
         """Take Ctrl-C over from Python, where nobody else has; between calls it works as before."""
@@ -24,10 +30,10 @@ class _Calls:
             signal.signal(signal.SIGINT, self._take)
 
     def _take(self, number: int, frame: FrameType | None) -> None:
-        if self._depth and not self._asked:  # who asks twice does not want to wait
-            self._asked = True
+        if self._depth and not self._asked.value:  # who asks twice does not want to wait
+            self._asked.value = 1
         else:
-            self._asked = False
+            self._asked.value = 0
             signal.default_int_handler(number, frame)
 
     def __enter__(self) -> None:
@@ -37,8 +43,8 @@ class _Calls:
     def __exit__(self, *error: object) -> None:
         if threading.get_ident() == self._main:
             self._depth -= 1
-            if self._asked and not self._depth:
-                self._asked = False
+            if self._asked.value and not self._depth:
+                self._asked.value = 0
                 raise KeyboardInterrupt
 
 

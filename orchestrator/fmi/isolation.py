@@ -25,8 +25,9 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import Limits
-from orchestrator.fmi.mailbox import DIED, HUNG, NOT_A_NUMBER, Mailbox
+from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mailbox
 from orchestrator.fmi.messages import FLOODED
 
 _ERROR = 3
@@ -50,6 +51,7 @@ class IsolatedComponent(Component):
         self._process: subprocess.Popen[bytes] | None = None
         self._end: str | None = None
         self._own_directory = extract(description.path) if directory is None else None
+        calls.watch()
         self._folder = Path(tempfile.mkdtemp(prefix="gfor_isolated_"))
         try:
             self._box = Mailbox(self._folder / "mailbox", create=True)
@@ -94,6 +96,10 @@ class IsolatedComponent(Component):
             names = [n for n, v in self.description.variables.items() if v.reference == bad and v.type == "Real"]
             said = f"{names[0] if names else 'a variable'} is no finite number"
             raise ComponentError(self.name, call, "not a number", said, time)
+        if status == INTERRUPTED:  # it is still at work on the question
+            self._kill()
+            self._end = "interrupted: its process was ended"
+            raise KeyboardInterrupt
         if status in (DIED, HUNG):
             raise ComponentError(self.name, call, self._how_it_ended(status), self._last_words(), time)
         super().check(status, call, time)
@@ -143,8 +149,8 @@ class IsolatedComponent(Component):
             raise ComponentError(self.name, call, self._end, "")
         self._box.clear_log()
         self._box.write_text([command, *arguments])
-        status = self._box.library.mailbox_talk(self._box.address)
-        self.check(status, call)
+        with calls:
+            self.check(self._box.library.mailbox_talk(self._box.address), call)
         answer = self._box.read_text()
         if "input_error" in answer:
             raise InputError(answer["input_error"])

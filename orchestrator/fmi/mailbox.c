@@ -59,7 +59,7 @@ static int is_orphan(int64_t parent) { return (int64_t)getppid() != parent; }
 #endif
 
 enum { MOST = 16384, TEXT = 1 << 20, LOG = 8192 };
-enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66 };
+enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66, INTERRUPTED = 67 };
 enum { EXCHANGE = 1, TALK = 2 };
 enum { SET = 1, STEP = 2, GET = 4 };
 
@@ -121,7 +121,12 @@ static void publish(volatile int32_t *word, int32_t value, volatile int32_t *sle
     if (__atomic_load_n(sleeping, __ATOMIC_SEQ_CST)) wake(word);
 }
 
-/* Ask, and wait for the answer: the call's status, or DIED or HUNG. */
+/* Has Python look for signals, which it does not by itself while C waits; *asked then says whether Ctrl-C was among them. */
+static int (*look)(void);
+static const volatile int *asked;
+EXPORT void mailbox_heed(int (*function)(void), const int *flag) { look = function, asked = flag; }
+
+/* Ask, and wait for the answer: the call's status, or DIED, HUNG or INTERRUPTED. */
 static int ask(struct mailbox *box, int32_t kind) {
     const int32_t before = box->reply, number = before + 1;
     box->kind = kind;
@@ -130,6 +135,7 @@ static int ask(struct mailbox *box, int32_t kind) {
     while (!changed(&box->reply, before, &box->sleeping[1])) {
         if (is_gone(box->peer)) return box->reply == number ? box->status : DIED;
         if (seconds() > end) return HUNG;
+        if (look && (look() || *asked)) return INTERRUPTED;
     }
     return box->status;
 }

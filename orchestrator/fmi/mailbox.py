@@ -9,13 +9,14 @@ from typing import Any
 
 from fmus.toolchain.compiler import compile_library, host_platform
 from orchestrator.errors import InputError
+from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("mailbox.c")
 _MOST = 16384
 _TEXT, _LOG = 1 << 20, 8192
 
 OK = 0
-DIED, HUNG, NOT_A_NUMBER = 64, 65, 66
+DIED, HUNG, NOT_A_NUMBER, INTERRUPTED = 64, 65, 66, 67
 """Answers of a mailbox that no FMU gives; those of mailbox.c."""
 
 
@@ -65,6 +66,9 @@ def mailbox_library() -> Any:
     library.mailbox_serve.argtypes = [address, ctypes.c_int64, *[address] * 4]
     library.mailbox_answer.argtypes = [address, ctypes.c_int]
     library.mailbox_answer.restype = None
+    library.mailbox_heed.argtypes = [address, address]
+    library.mailbox_heed.restype = None
+    library.mailbox_heed(ctypes.cast(ctypes.pythonapi.PyErr_CheckSignals, address), calls.asked_address)
     return library
 
 

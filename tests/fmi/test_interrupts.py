@@ -5,10 +5,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+from dataclasses import replace
 
 import pytest
 
 from orchestrator.fmi.interrupts import calls
+from tests.vendor.gallery.build import build
+from tests.vendor.gallery.members import LAG, small
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can send itself Ctrl-C there")
 
@@ -41,6 +45,39 @@ def test_a_run_can_be_interrupted_at_any_time(patch):
     )
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout.split() == ["interrupted"] * 4
+
+
+_WAITS = """
+import sys, time
+from orchestrator.fmi.description import read_description
+from orchestrator.fmi.instance import open_component
+
+component = open_component("vendor", read_description(sys.argv[1]), isolated=True)
+component.setup(0.0, None)
+component.enter_initialization_mode()
+component.exit_initialization_mode()
+print("stepping", flush=True)
+start = time.perf_counter()
+try:
+    for k in range(100):
+        component.step(0.01 * k, 0.01)
+except KeyboardInterrupt:
+    print("interrupted" if time.perf_counter() - start < 10 else "late")
+component.close()
+"""
+
+
+def test_a_foreign_fmu_that_hangs_does_not_hold_it_up(tmp_path):
+    """By itself it would be given 30 s."""
+    source = small("hangs", "LAG", LAG, step_size="1e-2", stop_time="2")
+    fmu = build(replace(source, defines={**source.defines, "FAULT_HANG_AT": 0.055}), tmp_path)
+    call = [sys.executable, "-c", _WAITS, str(fmu)]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "stepping\n"
+        time.sleep(0.5)  # the process holds Python's lock by now: no thread of its own could send this
+        process.send_signal(signal.SIGINT)
+        output, error = process.communicate(timeout=60)
+    assert (process.returncode, output, error) == (0, "interrupted\n", "")
 
 
 # -- the rule ----------------------------------------------------------------------------------------
