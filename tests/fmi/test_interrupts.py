@@ -27,13 +27,13 @@ from orchestrator.coupling.master import Master
 for delay in (0.02, 0.05, 0.09, 0.2):
     with Master(ready.system, ready.schedule, ready.step_size) as master:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # as a notebook does between two cells
-        threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)).start()
         try:
+            threading.Timer(delay, os.kill, (os.getpid(), signal.SIGINT)).start()
             master.run(1000.0)
         except KeyboardInterrupt:
             done = master.index
         master.advance(10)  # the FMUs are as well as before
-        assert master.index == done + 10 > 10
+        assert master.index == done + 10
         print("interrupted", flush=True)
 """
 
