@@ -176,7 +176,10 @@ def test_there_is_no_cycle():
     ("library", "users"),
     [
         ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
-        ("fmpy", {f"orchestrator.fmi.{name}" for name in ("component", "description", "fmi3", "validation")}),
+        (
+            "fmpy",
+            {f"orchestrator.fmi.{name}" for name in ("component", "description", "fmi3", "messages", "validation")},
+        ),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),
