@@ -18,7 +18,7 @@ from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
 from orchestrator.fmi.interrupts import calls
-from orchestrator.fmi.messages import Messages, callbacks_for
+from orchestrator.fmi.messages import Messages, callbacks_for, texts
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 _ERROR, _FATAL = 3, 4
@@ -137,7 +137,7 @@ class Component:
 
     def _texts(self, least: int = 0) -> list[str]:
         """Distinct messages of at least that status, in order, oldest first."""
-        return self._messages.texts(least)
+        return texts(self._messages, least)
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
         """Raise unless a call's status is OK or Warning."""

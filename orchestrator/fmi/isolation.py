@@ -28,7 +28,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mailbox
-from orchestrator.fmi.messages import FLOODED
+from orchestrator.fmi.messages import FLOODED, texts
 
 _ERROR = 3
 
@@ -105,7 +105,7 @@ class IsolatedComponent(Component):
         super().check(status, call, time)
 
     def _texts(self, least: int = 0) -> list[str]:
-        return list(dict.fromkeys(text for status, text in self._box.read_log() if status >= least))
+        return texts(self._box.read_log(), least)
 
     def _how_it_ended(self, status: int) -> str:
         """Crash, hang, exit or flood, in words; the process is ended if it is still there."""

@@ -3,7 +3,7 @@
 import ctypes
 import itertools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -33,9 +33,10 @@ class Messages(list[tuple[int, str]]):
         super().__init__()
         self.streak, self.step = 0, 0
 
-    def texts(self, least: int = 0) -> list[str]:
-        """Distinct messages of at least that status, in order, oldest first."""
-        return list(dict.fromkeys(text for status, text in self if status >= least))
+
+def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:
+    """Distinct messages of at least that status, in order, oldest first."""
+    return list(dict.fromkeys(text for status, text in messages if status >= least))
 
 
 _guard: Callable[[Messages], None] | None = None
