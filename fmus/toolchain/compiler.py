@@ -77,6 +77,20 @@ def compile_library(source: str, platform: str) -> Path:
     return library
 
 
+def compile_here(file: Path) -> Path:
+    """Compile a file of C to a shared library for this machine; otherwise as `compile_library`.
+
+    Raises
+    ------
+    RuntimeError
+        If the compiler fails, or has no target for this machine.
+    """
+    platform = host_platform()
+    if platform is None:
+        raise RuntimeError("there is no compiler for this platform")
+    return compile_library(file.read_text(encoding="utf-8"), platform)
+
+
 def compile_for(source: str, target: str, ending: str) -> Path:
     """Compile C source for one zig target; otherwise as `compile_library`."""
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
@@ -231,11 +231,11 @@ class Runs:
 
 @cache
 def _library() -> Any:
-    platform = host_platform()
-    if platform is None:
-        raise InputError("the test bench is compiled, and there is no compiler for this platform")
-    # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
-    library = ctypes.PyDLL(str(compile_library(_SOURCE.read_text(encoding="utf-8"), platform)))
+    try:
+        # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
+        library = ctypes.PyDLL(str(compile_here(_SOURCE)))
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"the test bench is compiled, and {error}") from error
     address, integer = ctypes.c_void_p, ctypes.c_int64
     library.drive.argtypes = [
         address, address, address, address, address, integer, address, integer, address, address, integer, integer,

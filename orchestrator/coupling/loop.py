@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.interrupts import calls
@@ -80,13 +80,9 @@ class _Call(ctypes.Structure):
 
 @cache
 def _library() -> Any | None:
-    platform = host_platform()
-    if platform is None:
-        return None
     try:
-        path = compile_library(_SOURCE.read_text(encoding="utf-8"), platform)
         # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
-        library = ctypes.PyDLL(str(path))
+        library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError):
         return None
     address, integer = ctypes.c_void_p, ctypes.c_int64

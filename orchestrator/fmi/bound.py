@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.interrupts import calls
@@ -59,13 +59,10 @@ class _Adapter(ctypes.Structure):
 @cache
 def compiled_adapter() -> Any:
     """The library of port_adapter.c."""
-    platform = host_platform()
-    if platform is None:
-        raise InputError("a binding is compiled, and there is no compiler for this platform")
     try:
-        return ctypes.PyDLL(str(compile_library(_SOURCE.read_text(encoding="utf-8"), platform)))
+        return ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
-        raise InputError(f"a binding is compiled, and the compiler failed: {error}") from error
+        raise InputError(f"a binding is compiled, and {error}") from error
 
 
 class BoundComponent(Component):

@@ -8,7 +8,7 @@ from typing import Any
 
 import fmpy
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import FmuFileError
 from orchestrator.fmi.description import FmuDescription
 
@@ -62,11 +62,8 @@ def adapter_path() -> Path:
     FmuFileError
         If it cannot be compiled here.
     """
-    platform = host_platform()
     try:
-        if platform is None:
-            raise RuntimeError("there is no compiler for this platform")
-        return compile_library(_SOURCE.read_text(encoding="utf-8"), platform)
+        return compile_here(_SOURCE)
     except (OSError, RuntimeError) as error:
         raise FmuFileError(f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0") from error
 

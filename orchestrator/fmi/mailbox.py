@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import InputError
 from orchestrator.fmi.interrupts import calls
 
@@ -52,14 +52,11 @@ def mailbox_library() -> Any:
     InputError
         If it cannot be compiled here.
     """
-    platform = host_platform()
-    if platform is None:
-        raise InputError("the mailbox to an FMU's own process is compiled, and there is no compiler for this platform; "
-                         "set isolated = false if you trust the FMU")  # fmt: skip
     try:
-        library = ctypes.PyDLL(str(compile_library(_SOURCE.read_text(encoding="utf-8"), platform)))
+        library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
-        raise InputError(f"the mailbox to an FMU's own process cannot be compiled: {error}") from error
+        raise InputError(f"the mailbox to an FMU's own process is compiled, and {error}; "
+                         "set isolated = false if you trust the FMU") from error  # fmt: skip
     address, size = ctypes.c_void_p, ctypes.c_size_t
     library.mailbox_size.restype = library.mailbox_offset.restype = size
     library.mailbox_talk.argtypes = [address]
