@@ -15,6 +15,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.distributed.executor import WorkerLostError
 from orchestrator.errors import CosimError
 from orchestrator.study.modes import modes_of, running
 from orchestrator.study.point_key import same_case
@@ -91,6 +92,16 @@ class PointResult:
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     failure: str | None = None
+
+    @property
+    def lasting(self) -> bool:
+        """A failure is none: what was missing, a licence for one, may be there next time."""
+        return self.failure is None
+
+    @classmethod
+    def lost(cls, task: PointTask, error: WorkerLostError) -> Self:
+        """That of a point whose worker died."""
+        return cls(task.X_L, task.scenario, failure=str(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""

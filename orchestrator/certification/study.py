@@ -1,7 +1,7 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,11 +17,12 @@ from orchestrator.certification.criteria import (
 )
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult, PointTask, compute_point
 from orchestrator.certification.swings import SwingTest, slow_part, swing_test
-from orchestrator.distributed.executor import Executor, WorkerLostError
+from orchestrator.distributed.executor import Executor
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.study.point_key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.study.point_store import PointStore
+from orchestrator.study.points import Report, kept_or_computed
 
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
 """X_L of the norm [pu, 100 MVA]."""
@@ -180,7 +181,7 @@ def certify(
     request: CertificationRequest,
     executor: Executor,
     folder: Path,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    report: Report = lambda done, total: None,
 ) -> Certification:
     """Compute all points and judge them.
 
@@ -206,48 +207,36 @@ def certify(
     }
     description = prepared[WITH].system.components[CONVERTER].description
     pod = request.pod or _pod_of(description, prepared[WITH].values)
-    tasks = [
-        _task(case, prepared[scenario], X_L, settings[scenario], request.black_box and scenario == WITH)
-        for X_L in request.reactances
-        for scenario in (WITHOUT, WITH)
-    ]
+    without = _tasks(case, prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
+    having = _tasks(case, prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
+    tasks = [task for pair in zip(without, having, strict=True) for task in pair]
+    points: dict[tuple[str, float], PointResult] = {}
+    stored = 0
     store = PointStore(folder / "points")
-    points = _stored(tasks, store)
-    stored = len(points)
-    report(stored, len(tasks))
-    missing = [task for task in tasks if (task.scenario, task.X_L) not in points]
-    for index, outcome in executor.run(compute_point, missing):
-        task = missing[index]
-        if isinstance(outcome, WorkerLostError):
-            result = PointResult(task.X_L, task.scenario, failure=str(outcome))
-        else:
-            result = outcome
-        if result.failure is None:  # what was missing for the others, a licence for one, may be there next time
-            store.save(task.key, *result.stored())
-        points[task.scenario, task.X_L] = result
-        report(len(points), len(tasks))
+    for index, point, was_stored in kept_or_computed(PointResult, compute_point, tasks, executor, store, report):
+        points[tasks[index].scenario, tasks[index].X_L] = point
+        stored += was_stored
     event = prepared[WITH].events[0].time
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], watched(pod), event) for X in request.reactances]
     return Certification(request, description, pod, event, case.path, points, verdicts, stored)
 
 
-def _task(case: Case, prepared: PreparedScenario, X_L: float, values: dict[str, Value], black_box: bool) -> PointTask:
+def _tasks(
+    case: Case, prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
+) -> list[PointTask]:
+    """One scenario at all reactances."""
     # The case file names the binding, if there is one: what that says is in the scenario's content, where it matters.
     content = {
         "case": BASE.read_text(encoding="utf-8"),
         **scenario_content(prepared),
         "overrides": sorted(values.items()),
-        "X_L": X_L,
         "black box": black_box,
     }
-    return PointTask(reference_to(case), fingerprint(case), prepared.name, X_L, values, key_of(content), black_box)
-
-
-def _stored(tasks: Sequence[PointTask], store: PointStore) -> dict[tuple[str, float], PointResult]:
-    """Points that an earlier start left, by scenario and X_L."""
-    found = {(task.scenario, task.X_L): store.load(task.key) for task in tasks}
-    results = {place: PointResult.restored(*content) for place, content in found.items() if content}
-    return {place: result for place, result in results.items() if result is not None}
+    place, mark = reference_to(case), fingerprint(case)
+    return [
+        PointTask(place, mark, prepared.name, X_L, values, key_of({**content, "X_L": X_L}), black_box)
+        for X_L in reactances
+    ]
 
 
 def judge(having: PointResult, lacking: PointResult, signal: str, event_time: float) -> PointVerdict:

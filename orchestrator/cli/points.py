@@ -9,12 +9,13 @@ from rich.markup import escape
 
 from orchestrator.cli.terminal import make_errors, progress_bar
 from orchestrator.distributed.executor import Executor
+from orchestrator.study.points import Report
 
 Result = TypeVar("Result")
 
 
 def compute_points(
-    study: Callable[[Callable[[int, int], None]], Result], executor: Executor, folder: Path, console: Console
+    study: Callable[[Report], Result], executor: Executor, folder: Path, console: Console
 ) -> Result | None:
     """Run a study, and close its executor.
 

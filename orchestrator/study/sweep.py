@@ -1,6 +1,6 @@
 """A sweep: the modes of a case's scenarios over a grid of parameters, computed, kept, and followed."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,9 +9,10 @@ from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.distributed.executor import Executor, WorkerLostError
+from orchestrator.distributed.executor import Executor
 from orchestrator.errors import CaseError, Problem
 from orchestrator.study.point_store import PointStore
+from orchestrator.study.points import Report, kept_or_computed
 from orchestrator.study.sweep_axes import ALPHA, Axis, Vary, grid_places, resolve
 from orchestrator.study.sweep_point import PointRecord, PointTask, compute_point, make_task
 from orchestrator.study.sweep_trajectories import Place, Trajectory, find_trajectories
@@ -113,10 +114,6 @@ class SweepResult:
                     yield sweep, place, error
 
 
-Report = Callable[[int, int], None]
-"""Is told how many points are done, of how many."""
-
-
 def plan_sweep(
     case: Case,
     vary: Sequence[Vary],
@@ -194,30 +191,17 @@ def _fill(
     report: Report,
 ) -> None:
     """Load or compute some points."""
-    missing: list[tuple[ScenarioSweep, Place]] = []
-    tasks: list[PointTask] = []
-    for sweep, place in wanted:
-        task = result.plan.task(sweep.prepared, place)
-        found = store.load(task.key)
-        stored = PointRecord.restored(*found) if found else None
-        if stored is None:
-            missing.append((sweep, place))
-            tasks.append(task)
-        else:
-            sweep.points[place] = stored
-            result.stored += 1
-    done = result.stored + result.computed
-    total = done + len(tasks)
-    report(done, total)
-    for index, outcome in executor.run(compute_point, tasks):
-        sweep, place = missing[index]
-        record = PointRecord.lost(outcome) if isinstance(outcome, WorkerLostError) else outcome
-        if record.lasting:
-            store.save(tasks[index].key, *record.stored())
+    tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
+    before = result.stored + result.computed
+
+    def report_all(done: int, total: int) -> None:
+        report(before + done, before + total)
+
+    for index, record, stored in kept_or_computed(PointRecord, compute_point, tasks, executor, store, report_all):
+        sweep, place = wanted[index]
         sweep.points[place] = record
-        result.computed += 1
-        done += 1
-        report(done, total)
+        result.stored += stored
+        result.computed += not stored
 
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[Place]:

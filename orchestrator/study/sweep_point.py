@@ -13,6 +13,7 @@ from orchestrator.analysis.threads import one_thread
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.distributed.executor import WorkerLostError
 from orchestrator.errors import AnalysisError, CaseError, CosimError
 from orchestrator.study.modes import ModesResult, compute_modes
 from orchestrator.study.point_key import fingerprint, key_of, reference_to, same_case, scenario_content
@@ -77,8 +78,8 @@ class PointRecord:
     warnings: tuple[str, ...] = ()
 
     @classmethod
-    def lost(cls, error: Exception) -> Self:
-        """That of a point which another start may well have."""
+    def lost(cls, _: PointTask, error: WorkerLostError) -> Self:
+        """That of a point whose worker died."""
         return cls(error=str(error), lasting=False)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
