@@ -4,7 +4,7 @@ import filecmp
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
-from orchestrator.fmi.bound import BoundComponent
+from orchestrator.fmi.bound import BoundComponent, compiled_adapter
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import adapter_path
@@ -22,6 +22,21 @@ def is_ours(path: Path) -> bool:
         return True
     size = path.stat().st_size
     return any(file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) for file in built.glob("*/*.fmu"))
+
+
+def compile_adapters(description: FmuDescription) -> None:
+    """Compile what an FMU runs behind, or find it compiled: a process with limits neither sees the cache nor fills it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be compiled here.
+    """
+    if isinstance(description, BoundDescription):
+        compiled_adapter()
+        description = description.native
+    if description.fmi_version == "3.0":
+        adapter_path()
 
 
 def open_component(
@@ -44,13 +59,12 @@ def open_component(
     ------
     ComponentError
         If the FMU gives no instance.
-    FmuFileError
-        If it is one of FMI 3.0 and the adapter for these cannot be compiled.
+    InputError
+        If what it runs behind cannot be compiled.
     """
+    compile_adapters(description)
     if isinstance(description, BoundDescription):
         return BoundComponent(open_component(name, description.native, directory, isolated=isolated), description)
-    if description.fmi_version == "3.0":
-        adapter_path()  # here, as a process with limits may not compile
     if isolated or (isolated is None and not is_ours(description.path)):
         return IsolatedComponent(name, description, directory)
     return Component(name, description, directory)

@@ -12,7 +12,7 @@ from typing import Any
 from orchestrator.errors import ComponentError, CosimError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
-from orchestrator.fmi.fmi3 import adapter_path
+from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, apply_limits
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
 from orchestrator.fmi.messages import on_message
@@ -27,8 +27,7 @@ class Worker:
         self._box = Mailbox(folder / "mailbox")
         limits = Limits(**request["limits"])
         self._description = read_description(request["fmu"])
-        if self._description.fmi_version == "3.0":
-            adapter_path()  # within the limits the cache of compiled libraries is out of sight
+        compile_adapters(self._description)
         apply_limits(limits, folder / "work")
         on_message(limits.messages, lambda: self._box.head.steps + self._box.head.request, self._box.write_log)
         self._component: Component | None = None

@@ -14,6 +14,7 @@ from typing import Any
 
 from orchestrator.errors import BindingError, FmuFileError, HostileFmuError, InputError
 from orchestrator.fmi.archive import extract
+from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.messages import FLOODED
 from orchestrator.vendor.binding import bound_fmu, read_table
@@ -117,6 +118,7 @@ def check_fmu(
     try:
         report.results.append(passed("archive", "unpacked within limits, and read"))
         checked = None if binding is None or not _binding_fits(report, binding) else binding
+        compile_adapters(bound_fmu(fmu, checked))  # here, where nobody waits for the FMU
         with tempfile.TemporaryDirectory(prefix="gfor_check_", ignore_cleanup_errors=True) as folder:
             _Runner(report, checked, directory, Path(folder), limits or Limits(), run_for).run(list(only or CHECKS))
     finally:

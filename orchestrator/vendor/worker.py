@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError
-from orchestrator.fmi import bound
+from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, apply_limits
 from orchestrator.fmi.messages import on_message
 from orchestrator.vendor.binding import bound_fmu
@@ -47,7 +47,7 @@ def main(request: dict[str, Any]) -> None:
     """
     folder = Path(request["folder"])
     description = bound_fmu(request["fmu"], request["binding"])
-    bound.compiled_adapter()  # compiled before this process may no longer write
+    compile_adapters(description)
     with (
         (folder / "results").open("a", encoding="utf-8", buffering=1) as results,
         (folder / "progress").open("r+b") as shared,

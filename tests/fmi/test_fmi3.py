@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here, compile_library, host_platform
 from fmus.toolchain.native_fmu import export_native
+from orchestrator import fmi
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.cases import two_area
 from orchestrator.cases.case import load_case
@@ -148,9 +149,21 @@ def test_a_refused_value_is_told_in_words_of_fmi_3(ours):
 
 @pytest.mark.slow
 def test_gfor_check_finds_nothing(ours, gfor):
-    code, out, err = gfor("check", ours("gfor", "3.0"), "--time-limit", "10")
-    assert (code, err) == (0, "")
-    assert not re.search(r"^fail", out, re.MULTILINE)
+    code, out, err = gfor("check", ours("gfor", "3.0"))
+    assert (re.findall(r"^fail.*", out, re.MULTILINE), code, err) == ([], 0, "")
+
+
+def test_no_fmu_waits_for_a_compiler_while_it_is_checked(ours, gfor, monkeypatch):
+    """It took seconds of the FMU's time limit, and a good FMU was said to hang."""
+    for variable in ("GFOR_COSIM_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(variable, raising=False)  # in the home folder, as a user has it
+    fmu = ours("gfor", "3.0")
+    compile_here(Path(fmi.__file__).with_name("fmi3_as_fmi2.c"))
+    monkeypatch.setenv("ZIG_LIB_DIR", str(fmu.parent))
+    with pytest.raises(RuntimeError, match="the C compiler"):
+        compile_library("int never_compiled_before;", host_platform())
+    code, out, err = gfor("check", fmu, "--only", "runs")
+    assert (re.findall(r"^fail.*", out, re.MULTILINE), code, err) == ([], 0, "")
 
 
 # -- somebody else's -------------------------------------------------------------------------------
