@@ -26,7 +26,7 @@ from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.interrupts import calls
-from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mailbox
 from orchestrator.fmi.messages import FLOODED, texts
 
@@ -56,6 +56,8 @@ class IsolatedComponent(Component):
         try:
             self._box = Mailbox(self._folder / "mailbox", create=True)
             self._start(directory or self._own_directory or Path())
+            self._remote("the beginning of its process", "begin")
+            self._box.head.patience = self.limits.seconds
             self._remote("fmi2Instantiate", "instantiate")
         except BaseException:
             self.close()
@@ -84,7 +86,7 @@ class IsolatedComponent(Component):
             )  # fmt: skip
         handle = getattr(self._process, "_handle", None)  # Windows
         self._box.head.peer = self._process.pid if handle is None else int(handle)
-        self._box.head.patience = self.limits.seconds
+        self._box.head.patience = TO_BEGIN
 
     # -- errors ----------------------------------------------------------------------------------
 
@@ -115,7 +117,7 @@ class IsolatedComponent(Component):
         assert process is not None
         if status == HUNG:
             self._kill()
-            self._end = f"hang: no answer within {self.limits.seconds:g} s; its process was ended"
+            self._end = f"hang: no answer within {self._box.head.patience:g} s; its process was ended"
             return self._end
         code = process.wait()
         if code == FLOODED:

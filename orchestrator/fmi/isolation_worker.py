@@ -72,6 +72,9 @@ class Worker:
         assert self._component is not None
         return self._component
 
+    def do_begin(self) -> None:
+        """Tell that from here on it is the FMU that takes time."""
+
     def do_instantiate(self) -> None:
         if self._description.guid != self._request["guid"]:
             said = f"the guid {self._request['guid']} is not that of the FMU; read its description again"

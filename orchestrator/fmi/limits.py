@@ -21,6 +21,9 @@ _REFER, _TRUNCATE = 1 << 13, 1 << 14
 _PATH_BENEATH = 1
 _NO_NEW_PRIVILEGES = 38
 
+TO_BEGIN = 60.0
+"""Wall-clock time for a process to begin, before it comes to the FMU [s]: on a busy machine that is not the FMU's."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:

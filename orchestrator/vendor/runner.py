@@ -15,7 +15,7 @@ from typing import Any
 from orchestrator.errors import BindingError, FmuFileError, HostileFmuError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.instance import compile_adapters
-from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.messages import FLOODED
 from orchestrator.vendor.binding import bound_fmu, read_table
 from orchestrator.vendor.checks.all import CHECKS
@@ -204,7 +204,8 @@ class _Runner:
                 size, begun = written, monotonic()
             if now != state or begun > moved:
                 state, moved = now, monotonic()
-            if monotonic() - moved > self._limits.seconds or monotonic() - begun > _PATIENCE * self._limits.seconds:
+            patience = self._limits.seconds if size else TO_BEGIN
+            if monotonic() - moved > patience or monotonic() - begun > _PATIENCE * patience:
                 return True
             sleep(0.02)
         return False

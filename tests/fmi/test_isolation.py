@@ -21,6 +21,7 @@ from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import is_ours, open_component
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
+from orchestrator.vendor.runner import check_fmu
 from tests.vendor.gallery.build import build
 from tests.vendor.gallery.members import converter
 
@@ -159,6 +160,19 @@ def test_after_its_end_every_call_says_so(box):
         for again in (lambda: component.step(0.0, H), component.save_state, lambda: component.set({"R_f": 0.1})):
             with pytest.raises(ComponentError, match="exit code 3"):
                 again()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a script of the shell")
+def test_the_beginning_of_our_own_process_is_not_the_fmus_time(box, tmp_path, monkeypatch):
+    slow = tmp_path / "slow_python"
+    slow.write_text(f'#!/bin/sh\nsleep 2\nexec "{sys.executable}" "$@"\n', encoding="utf-8")
+    slow.chmod(0o755)
+    description, limits = box(), Limits(seconds=1.5)
+    monkeypatch.setattr(sys, "executable", str(slow))
+    with IsolatedComponent("box", description, limits=limits) as component:
+        initialised(component)
+    report = check_fmu(description.path, limits=limits, only=("start_values",))
+    assert not report.failures
 
 
 def test_an_instance_that_cannot_be_made(box):
