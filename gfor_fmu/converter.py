@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.filter import declare_filter, filter_equations

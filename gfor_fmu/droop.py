@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.filter import APPENDIX, SteadyState
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, QdState, power, qd_state
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
 
 APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"

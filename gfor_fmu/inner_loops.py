@@ -3,7 +3,7 @@
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, QdState, qd_state
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.filter import APPENDIX, Filter, SteadyState
 
 LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"

@@ -8,7 +8,8 @@ states alone. The current limit is not represented; ``current_limit`` tells when
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import device_port
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control

@@ -13,7 +13,7 @@ be measured. Because of T_f the output never depends directly on the input: no a
 import casadi as ca
 
 from fmus.toolchain.blocks import lead_lag, limit, low_pass, washout
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 N_S_MAX = 3
 """Most lead/lag stages a controller can be given."""

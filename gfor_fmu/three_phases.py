@@ -9,7 +9,8 @@ the communication point, exactly as in the variant with v_re and v_im.
 import casadi as ca
 
 from fmus.toolchain.frames import of_phases, phases, power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_rating, port_at
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 

@@ -16,7 +16,7 @@ import casadi as ca
 from fmus.grid.elements import Bus, DeclaredLoad
 from fmus.grid.network import Load
 from fmus.toolchain.frames import Phasor, power
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import SYSTEM_BASE
 
 RECOVERY_TIME = 1e-3

@@ -7,7 +7,7 @@ import casadi as ca
 
 from fmus.grid.network import SMALLEST_REACTANCE, SYSTEM_BASE_MVA, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
-from fmus.toolchain.model import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.port import BREAKER_TIME, SYSTEM_BASE
 
 OPEN_CHARGING = 1e-3

@@ -22,7 +22,8 @@ from fmus.grid.elements import (
 )
 from fmus.grid.network import Network
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 
 
 def grid(network: Network) -> Model:

@@ -22,7 +22,8 @@ from fmus.grid.elements import (
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import Model, ModelBuilder, Scalar
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port import SYSTEM_BASE
 

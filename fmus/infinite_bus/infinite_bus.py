@@ -8,7 +8,8 @@ FMU's own, which runs only where it is asked to, so that without it the system c
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import SYSTEM_BASE
 
 SYSTEM_BASE_MVA = 100.0

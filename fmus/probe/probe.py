@@ -6,7 +6,8 @@ are neither 0 nor what the partner gives), whether inputs are extrapolated, and 
 inputs of the step or with those of the next.
 """
 
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 
 
 def probe_a() -> Model:

@@ -12,7 +12,7 @@ import casadi as ca
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
-from fmus.toolchain.model import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
 TerminalVoltage = Callable[[ca.SX], ca.SX]
 

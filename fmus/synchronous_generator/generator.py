@@ -16,7 +16,8 @@ from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import Machine, declare_machine, machine_equations, terminal_voltage
 from fmus.synchronous_generator.stabilizers import pss2a
 from fmus.toolchain.frames import power
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 
 

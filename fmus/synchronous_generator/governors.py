@@ -4,7 +4,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.data import GovernorData
 from fmus.toolchain.blocks import lead_lag, low_pass_or_nothing
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 
 def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX:

@@ -17,7 +17,7 @@ import casadi as ca
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches, convert
 from fmus.synchronous_generator.data import STAMP, MachineData
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
 
 FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]

@@ -28,7 +28,8 @@ from fmus.synchronous_generator.generator import declare_generator_outputs
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
 

@@ -14,7 +14,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.data import NTS631
 from fmus.toolchain.blocks import lead_lag, limit, low_pass, low_pass_or_nothing, washout
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 RAMP_LAGS = 5
 """M of the ramp-tracking filter; N is 1."""

@@ -8,7 +8,7 @@ through; its state then follows the input with `BYPASS_TIME` and is seen by nobo
 
 import casadi as ca
 
-from fmus.toolchain.model import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
 BYPASS_TIME = 0.01
 """Time constant [s] with which the unused state of a left-out block follows its input."""

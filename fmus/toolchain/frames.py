@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.toolchain.model import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
 
 @dataclass(frozen=True)

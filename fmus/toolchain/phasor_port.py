@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import SYSTEM_BASE, DevicePort, declare_port_outputs
 
 INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3

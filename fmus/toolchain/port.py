@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 SYSTEM_BASE = "100 MVA"
 BREAKER_TIME = 1e-3

@@ -3,7 +3,7 @@
 import pytest
 
 from fmus.toolchain.frames import current_of_power, polar
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import cached
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case

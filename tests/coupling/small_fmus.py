@@ -3,7 +3,8 @@
 from functools import cache
 from math import ceil
 
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import cached
 from orchestrator.fmi.description import FmuDescription, read_description
 

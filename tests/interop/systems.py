@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fmus.toolchain.model import Model, ModelBuilder
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.cases.case import load_case

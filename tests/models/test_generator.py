@@ -8,7 +8,7 @@ from fmus.synchronous_generator.conversion import AxisData, classical, exact
 from fmus.synchronous_generator.data import GovernorData
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 OMEGA_B = 2 * np.pi * 50
 AXES = {"SG1 d": (2.135, 0.34, 0.269, 0.234, 6.47, 0.022), "SG2 q": (1.7, 0.55, 0.25, 0.2, 0.4, 0.05)}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.pod import pod
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from fmus.synchronous_generator.stabilizers import pss2a
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 
 
 def response(frequency):

@@ -11,7 +11,7 @@ import pytest
 
 from fmus.toolchain.compiler import compile_library, host_platform
 from fmus.toolchain.kernel import c_source
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_kernel import python_source
 
 

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
-from fmus.toolchain.model import ModelBuilder
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import cached, export
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import read_description

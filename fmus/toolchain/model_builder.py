@@ -1,0 +1,287 @@
+"""How a model is written: each declaration returns a CasADi symbol.
+
+A quantity is declared where it is used, and the equations read like the block diagram.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import casadi as ca
+
+from fmus.toolchain.model import Integrator, Model
+from fmus.toolchain.variables import (
+    UNITS,
+    CalculatedParameter,
+    Input,
+    Output,
+    Parameter,
+    State,
+    Variable,
+    VariableType,
+)
+
+Scalar = ca.SX | float
+"""What equations are made of."""
+
+
+class ModelBuilder:
+    """Collects declarations and equations of one model.
+
+    Parameters
+    ----------
+    name
+        Identifier of the FMU (letters, digits, underscore).
+    title
+        One line that says what the model is.
+    internal_step, longest_step
+        Default and maximum of the parameter ``internal_step`` [s]. The defaults are for electromagnetic transients.
+    """
+
+    def __init__(self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4) -> None:
+        self.name = name
+        self.title = title
+        self._prefix: list[str] = []
+        self._declared: dict[str, tuple[Variable, ca.SX]] = {}
+        self._expressions: dict[str, ca.SX] = {}
+        self._derivatives: dict[str, ca.SX] = {}
+        self._requirements: list[tuple[ca.SX, str]] = []
+        self._opened: list[ca.SX] = []
+        self._algebraic: list[tuple[ca.SX, ca.SX]] = []
+        self.internal_step = self.parameter(
+            "internal_step",
+            internal_step,
+            "s",
+            "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
+            minimum=1e-6,
+            maximum=longest_step,
+        )
+
+    # -- names -------------------------------------------------------------------------------
+
+    @contextmanager
+    def scope(self, name: str) -> Iterator[None]:
+        """Put ``name.`` before every name declared inside."""
+        self._prefix.append(name)
+        try:
+            yield
+        finally:
+            self._prefix.pop()
+
+    def _full(self, name: str) -> str:
+        return ".".join([*self._prefix, name])
+
+    def _declare(self, variable: Variable) -> ca.SX:
+        if variable.name in self._declared:
+            raise ValueError(f"model {self.name}: {variable.name!r} is declared twice")
+        symbol = ca.SX.sym(variable.name)
+        self._declared[variable.name] = (variable, symbol)
+        return symbol
+
+    # -- declarations ------------------------------------------------------------------------
+
+    def parameter(
+        self,
+        name: str,
+        start: float,
+        unit: str,
+        description: str,
+        *,
+        base: str = "",
+        minimum: float | None = None,
+        maximum: float | None = None,
+        tunable: bool = False,
+        type: VariableType = "Real",
+        source: str = "",
+    ) -> ca.SX:
+        """Declare a parameter; ``start`` is its default."""
+        return self._declare(
+            Parameter(
+                self._full(name),
+                unit,
+                description,
+                base,
+                float(start),
+                minimum,
+                maximum,
+                tunable,
+                type,
+                source,
+            )
+        )
+
+    def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
+        """Declare a Boolean parameter; in the equations it is 0 or 1."""
+        return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
+
+    def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
+        """Declare a quantity computed at initialisation from fixed parameters."""
+        full = self._full(name)
+        self._expressions[full] = ca.SX(value)
+        return self._declare(CalculatedParameter(full, unit, description, base))
+
+    def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
+        """Declare an input."""
+        return self._declare(Input(self._full(name), unit, description, base, start))
+
+    def state(
+        self, name: str, initial: Scalar, unit: str, description: str, base: str = "", *, stepwise: bool = False
+    ) -> ca.SX:
+        """Declare a continuous state with its initial value, an expression of parameters.
+
+        ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end.
+        """
+        full = self._full(name)
+        if f"{unit}/s" not in UNITS:
+            raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
+        self._expressions[full] = ca.SX(initial)
+        return self._declare(State(full, unit, description, base, stepwise))
+
+    def derivative(self, state: ca.SX, rate: Scalar) -> None:
+        """Give the time derivative [unit of the state per second] of a declared state."""
+        declared = self._declared.get(state.name())
+        if declared is None or not isinstance(declared[0], State):
+            raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
+        if state.name() in self._derivatives:
+            raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
+        self._derivatives[state.name()] = ca.SX(rate)
+
+    def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
+        """Declare an output as a function of states, inputs and parameters."""
+        full = self._full(name)
+        self._expressions[full] = ca.SX(value)
+        self._declare(Output(full, unit, description, base))
+
+    def algebraic(self, name: str) -> ca.SX:
+        """Return a symbol for a signal that is used before it can be written; `close` gives its value."""
+        symbol = ca.SX.sym(self._full(name))
+        self._opened.append(symbol)
+        return symbol
+
+    def close(self, symbol: ca.SX, value: Scalar) -> None:
+        """Give the value of an `algebraic` signal.
+
+        Raises
+        ------
+        ValueError
+            If the value depends on the signal itself: an algebraic loop.
+        """
+        value = ca.SX(value)
+        if ca.depends_on(value, symbol):
+            raise ValueError(f"model {self.name}: signal {symbol.name()!r} depends directly on itself")
+        self._algebraic.append((symbol, value))
+
+    def require(self, positive: Scalar, rule: str) -> None:
+        """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
+        self._requirements.append((ca.SX(positive), rule))
+
+    # -- the model ---------------------------------------------------------------------------
+
+    def build(self, integrator: Integrator = "runge_kutta") -> Model:
+        """Return the finished model.
+
+        Raises
+        ------
+        ValueError
+            If a state has no derivative, or a calculated parameter or initial state depends on
+            something other than parameters.
+        """
+        kinds: dict[type, list[tuple[Variable, ca.SX]]] = {
+            kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
+            for kind in (Parameter, CalculatedParameter, Input, State, Output)
+        }
+        p, c, u, x, _ = (_stack([symbol for _, symbol in entries]) for entries in kinds.values())
+        algebraic = self._closed_signals()
+        self._check_origins(p)
+        missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
+        if missing:
+            raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
+        if integrator == "sdirk" and any(isinstance(v, State) and v.stepwise for v, _ in kinds[State]):
+            raise ValueError(f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta")
+
+        def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
+            stacked = _stack([values[variable.name] for variable, _ in entries])
+            for symbol, value in algebraic:
+                stacked = ca.substitute(stacked, symbol, value)
+            return stacked
+
+        c_value = self._calculate(kinds[CalculatedParameter], c)
+        x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
+        r_value = _stack([value for value, _ in self._requirements])
+        arguments = [x, u, p, c]
+        return Model(
+            name=self.name,
+            title=self.title,
+            parameters=tuple(v for v, _ in kinds[Parameter]),  # type: ignore[misc]
+            calculated=tuple(v for v, _ in kinds[CalculatedParameter]),  # type: ignore[misc]
+            inputs=tuple(v for v, _ in kinds[Input]),  # type: ignore[misc]
+            states=tuple(v for v, _ in kinds[State]),  # type: ignore[misc]
+            outputs=tuple(v for v, _ in kinds[Output]),  # type: ignore[misc]
+            initialise=ca.Function("initialise", [p], [c_value, x_value]),
+            derivatives=ca.Function("derivatives", arguments, [collect(kinds[State], self._derivatives)]),
+            outputs_function=ca.Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
+            requirements=ca.Function("requirements", [p, c], [r_value]),
+            requirement_texts=tuple(text for _, text in self._requirements),
+            integrator=integrator,
+        )
+
+    def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:
+        """Express every calculated parameter by parameters alone; each may use those declared before it."""
+        tunable = ca.vertcat(*[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable])
+        values: list[ca.SX] = []
+        for index, (variable, _) in enumerate(entries):
+            value = self._expressions[variable.name]
+            if values:
+                value = ca.substitute(value, c[:index], ca.vertcat(*values))
+            if tunable.numel() and ca.depends_on(value, tunable):
+                raise ValueError(
+                    f"model {self.name}: {variable.name!r} is computed once, at initialisation, "
+                    "and must not depend on a tunable parameter"
+                )
+            values.append(value)
+        return _stack(values)
+
+    def _closed_signals(self) -> list[tuple[ca.SX, ca.SX]]:
+        """Algebraic signals in an order in which each can be substituted once and for all.
+
+        Raises
+        ------
+        ValueError
+            If one was never closed, or several depend on one another in a circle.
+        """
+        declared = ca.vertcat(*self._opened) if self._opened else ca.SX(0, 1)
+        closed = [symbol.name() for symbol, _ in self._algebraic]
+        never = [symbol.name() for symbol in self._opened if symbol.name() not in closed]
+        if never:
+            raise ValueError(f"model {self.name}: signal {', '.join(never)} is used but never closed")
+        waiting = list(self._algebraic)
+        ordered: list[tuple[ca.SX, ca.SX]] = []
+        for _ in range(len(waiting)):
+            for symbol, given in list(waiting):
+                value = given
+                for other, known in ordered:
+                    value = ca.substitute(value, other, known)
+                if not ca.depends_on(value, declared):
+                    ordered.append((symbol, value))
+                    waiting = [entry for entry in waiting if entry[0].name() != symbol.name()]
+        if waiting:
+            names = ", ".join(symbol.name() for symbol, _ in waiting)
+            raise ValueError(f"model {self.name}: signals {names} depend on one another in a circle")
+        return ordered
+
+    def _check_origins(self, p: ca.SX) -> None:
+        """Calculated parameters and initial states come from parameters (and calculated ones) alone."""
+        allowed = {s.name() for s in ca.symvar(p)} | {
+            v.name for v, _ in self._declared.values() if isinstance(v, CalculatedParameter)
+        }
+        for variable, _ in self._declared.values():
+            if isinstance(variable, CalculatedParameter | State):
+                others = {s.name() for s in ca.symvar(self._expressions[variable.name])} - allowed
+                if others:
+                    raise ValueError(
+                        f"model {self.name}: {variable.name!r} must follow from parameters at initialisation, "
+                        f"but depends on {', '.join(sorted(others))}"
+                    )
+
+
+def _stack(entries: list[ca.SX]) -> ca.SX:
+    return ca.SX(ca.vertcat(*entries)) if entries else ca.SX(0, 1)
