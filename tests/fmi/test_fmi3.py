@@ -149,7 +149,7 @@ def test_a_refused_value_is_told_in_words_of_fmi_3(ours):
 
 @pytest.mark.slow
 def test_gfor_check_finds_nothing(ours, gfor):
-    code, out, err = gfor("check", ours("gfor", "3.0"))
+    code, out, err = gfor("check", ours("gfor", "3.0"), "--time-limit", "10")
     assert (re.findall(r"^fail.*", out, re.MULTILINE), code, err) == ([], 0, "")
 
 
