@@ -14,10 +14,12 @@ from typing import Any
 
 from orchestrator.errors import BindingError, FmuFileError, HostileFmuError, InputError
 from orchestrator.fmi.archive import extract
+from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.messages import FLOODED
-from orchestrator.vendor.binding import bound_fmu, read_table
+from orchestrator.fmi.port import BoundDescription
+from orchestrator.vendor.binding import bind, read_table
 from orchestrator.vendor.checks.all import CHECKS
 from orchestrator.vendor.checks.base import Result, Verdict, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import RUN_FOR
@@ -109,7 +111,7 @@ def check_fmu(
         read_table(binding)  # what is wrong with its form is not the FMU's fault
     report = Report(fmu, binding)
     try:
-        bound_fmu(fmu)
+        native = read_description(fmu)
         directory = extract(fmu)
     except FmuFileError as error:
         fault = error.kind if isinstance(error, HostileFmuError) else "unreadable"
@@ -117,8 +119,9 @@ def check_fmu(
         return report
     try:
         report.results.append(passed("archive", "unpacked within limits, and read"))
-        checked = None if binding is None or not _binding_fits(report, binding) else binding
-        compile_adapters(bound_fmu(fmu, checked))  # here, where nobody waits for the FMU
+        bound = None if binding is None else _bound(report, native, binding)
+        compile_adapters(bound or native)  # here, where nobody waits for the FMU
+        checked = binding if bound else None
         with tempfile.TemporaryDirectory(prefix="gfor_check_", ignore_cleanup_errors=True) as folder:
             _Runner(report, checked, directory, Path(folder), limits or Limits(), run_for).run(list(only or CHECKS))
     finally:
@@ -126,15 +129,16 @@ def check_fmu(
     return report
 
 
-def _binding_fits(report: Report, binding: Path) -> bool:
+def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescription | None:
+    """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
-        bound_fmu(report.fmu, binding)
+        bound = bind(native, binding)
     except BindingError as error:
         unit = any("the FMU declares" in p.text or "needs the key 'value'" in p.text for p in error.problems)
         report.results.append(failed("binding", "wrong units" if unit else "binding does not fit", str(error)))
-        return False
+        return None
     report.results.append(passed("binding", "all variables are there, with the units that it says"))
-    return True
+    return bound
 
 
 class _Runner:
