@@ -56,8 +56,6 @@ class IsolatedComponent(Component):
         try:
             self._box = Mailbox(self._folder / "mailbox", create=True)
             self._start(directory or self._own_directory or Path())
-            self._remote("the beginning of its process", "begin")
-            self._box.head.patience = self.limits.seconds
             self._remote("fmi2Instantiate", "instantiate")
         except BaseException:
             self.close()
@@ -87,6 +85,8 @@ class IsolatedComponent(Component):
         handle = getattr(self._process, "_handle", None)  # Windows
         self._box.head.peer = self._process.pid if handle is None else int(handle)
         self._box.head.patience = TO_BEGIN
+        self._remote("the beginning of its process", "begin")
+        self._box.head.patience = self.limits.seconds
 
     # -- errors ----------------------------------------------------------------------------------
 
