@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
-from orchestrator.analysis.threads import one_thread
+from orchestrator.analysis.threads import alone
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
@@ -135,7 +135,7 @@ def compute_point(task: PointTask) -> PointResult:
     case = same_case(task.case, task.fingerprint)
     result = PointResult(task.X_L, task.scenario)
     try:
-        with one_thread():
+        with alone():
             _compute(case, task, result)
     except CosimError as error:
         result.failure = str(error)

@@ -3,13 +3,12 @@
 Everything here can be sent to another process or another machine.
 """
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.analysis.threads import one_thread
+from orchestrator.analysis.threads import alone
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -18,9 +17,6 @@ from orchestrator.errors import AnalysisError, CaseError, CosimError
 from orchestrator.study.modes import ModesResult, compute_modes
 from orchestrator.study.point_key import fingerprint, key_of, reference_to, same_case, scenario_content
 from orchestrator.study.point_store import Arrays
-
-_one_at_a_time = threading.Lock()
-"""FMUs and the limit on BLAS threads belong to the whole process, whose workers may be threads of a Dask cluster."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +135,7 @@ def compute_point(task: PointTask) -> PointRecord:
         If this worker has another case file or other code than the sweep was started with.
     """
     case = same_case(task.case, task.fingerprint)
-    # One BLAS thread for every worker: several workers do not fight, and rounding is the same everywhere.
-    with _one_at_a_time, one_thread():
+    with alone():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size)
             return _record(compute_modes(case, prepared, task.frequency_range))

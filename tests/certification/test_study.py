@@ -2,7 +2,9 @@
 
 import json
 import shutil
+import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from unittest import mock
 
@@ -16,6 +18,7 @@ from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.cases.case import load_case
+from orchestrator.certification import point as point_module
 from orchestrator.certification import study as study_module
 from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.files import certification_json, save
@@ -208,6 +211,28 @@ def test_a_point_that_failed_is_tried_again(tmp_path, fmu_path, gfor, monkeypatc
     code, text, _ = gfor(*arguments)
     assert code == 0
     assert "1 of 2 points were there already" in text
+
+
+def test_threads_of_one_worker_compute_one_point_at_a_time(tmp_path, fmu_path, monkeypatch):
+    """As those of a Dask worker; FMUs and the limit on BLAS threads are the whole process's."""
+    inside, most = [], []
+
+    def compute(case, task, result):
+        inside.append(task)
+        time.sleep(0.1)
+        most.append(len(inside))
+        inside.remove(task)
+        result.failure = "not computed"
+
+    class Threads:
+        def run(self, function, tasks):
+            with ThreadPoolExecutor(2) as pool:
+                yield from enumerate(pool.map(function, tasks))
+
+    monkeypatch.setattr(point_module, "_compute", compute)
+    result = certify(CertificationRequest(fmu_path("gfor"), reactances=(0.1,)), Threads(), tmp_path)
+    assert [point.failure for point in result.points.values()] == ["not computed"] * 2
+    assert most == [1, 1]
 
 
 # -- the study -------------------------------------------------------------------------------------
