@@ -28,6 +28,7 @@ from orchestrator.cli import main
 from orchestrator.distributed.processes import Processes
 from orchestrator.errors import CaseError, InputError
 from tests.support.exact import exact_continuous
+from tests.support.interruption import interrupted_after
 
 
 def flipped(controller):
@@ -162,16 +163,8 @@ def test_an_interrupted_test_continues_and_gives_the_same(tmp_path, fmu_path, gf
     arguments = ("certify", fmu_path("gfor"), "--reactances", "0.1,0.3", "--workers", 1, "--out")
     monkeypatch.setattr(study_module, "compute_point", rings)
     assert gfor(*arguments, tmp_path / "whole")[0] == 0
-    computed = []
-
-    def interrupted(task):
-        if len(computed) == 3:
-            raise KeyboardInterrupt
-        computed.append(task)
-        return rings(task)
-
     out = tmp_path / "out"
-    monkeypatch.setattr(study_module, "compute_point", interrupted)
+    monkeypatch.setattr(study_module, "compute_point", interrupted_after(3, rings))
     code, text, error = gfor(*arguments, out)
     assert (code, text) == (130, "")
     assert error == f"interrupted: 3 of 4 points are in {out}; the same command continues from there\n"

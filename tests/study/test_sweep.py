@@ -20,6 +20,7 @@ from orchestrator.study.sweep import plan_sweep, run_sweep
 from orchestrator.study.sweep_axes import parse_vary
 from orchestrator.study.sweep_point import compute_point
 from tests.study.sweep_case import two_oscillators
+from tests.support.interruption import interrupted_after
 
 FULL_TURN = 2 * np.pi
 
@@ -205,15 +206,7 @@ def test_a_mode_beyond_the_range_is_not_followed_there(case, tmp_path):
 def test_an_interrupted_sweep_continues(gfor, case, tmp_path, monkeypatch):
     out = tmp_path / "out"
     arguments = (case, "--vary", "a1.gain=3:12:4", "--workers", 1, "--out", out)
-    computed = []
-
-    def interrupted(task):
-        if len(computed) == 5:
-            raise KeyboardInterrupt
-        computed.append(task)
-        return compute_point(task)
-
-    monkeypatch.setattr(sweep_module, "compute_point", interrupted)
+    monkeypatch.setattr(sweep_module, "compute_point", interrupted_after(5, compute_point))
     code, text, err = gfor(*arguments)
     assert (code, text) == (130, "")
     assert err == f"interrupted: 5 of 8 points are in {out}; the same command continues from there\n"
