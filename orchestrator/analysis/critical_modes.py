@@ -68,27 +68,6 @@ def find_critical_modes(
     return least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping_ratio)
 
 
-def growth_rate(model: LinearModel) -> float | None:
-    """Growth [1/s] of what grows fastest in a step map, or None if Arnoldi's method tells nothing from the rest.
-
-    A numerically unstable coupling stands out: |μ| is clearly above the crowd of slow modes at 1, and a few
-    dozen steps show it. That nothing stands out says that no such thing is there.
-    """
-    if model.step_size is None:
-        raise AnalysisError("the growth of a step map was asked for, but the model is continuous")
-    if len(model.names) <= DENSE:
-        values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
-        return float(values.real.max())
-    n = len(model.names)
-    step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
-    start = np.random.default_rng(0).standard_normal(n)
-    try:
-        mu = spla.eigs(step, k=2, ncv=20, maxiter=50, tol=1e-6, v0=start, return_eigenvectors=False)
-    except spla.ArpackNoConvergence:
-        return None
-    return float(np.log(np.abs(mu).max()) / model.step_size)
-
-
 def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone.
 
@@ -100,7 +79,7 @@ def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     if len(model.names) <= DENSE:
         values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return complex(values[np.argmin(np.abs(values - wanted))])
-    values = _Search(model, wanted).nearest(2)
+    values = Search(model, wanted).nearest(2)
     return complex(values[np.argmin(np.abs(values - wanted))])
 
 
@@ -112,7 +91,7 @@ def nearest_pairs(model: LinearModel, wanted: complex, count: int) -> list[tuple
     AnalysisError
         If Arnoldi's method does not converge.
     """
-    search = _Search(model, wanted)
+    search = Search(model, wanted)
     search.nearest(count)
     return search.pairs(range(count))
 
@@ -166,7 +145,7 @@ def _search(model: LinearModel, lowest: float, highest: float, damping_ratio: fl
             raise AnalysisError(
                 f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
             )
-        search = _Search(model, cell.centre)
+        search = Search(model, cell.centre)
         values = search.reaching(cell.radius)
         if values is None:
             waiting += cell.halves()
@@ -175,21 +154,31 @@ def _search(model: LinearModel, lowest: float, highest: float, damping_ratio: fl
     return modes
 
 
-class _Search:
-    """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``."""
+class Search:
+    """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
+
+    Attributes
+    ----------
+    sigma
+        The point in the plane of A's own eigenvalues.
+    reach
+        Distance in that plane up to which every eigenvalue was found last.
+    """
 
     def __init__(self, model: LinearModel, centre: complex) -> None:
         self._model, self.centre = model, centre
-        self._sigma = np.exp(centre * model.step_size) if model.step_size else centre
+        self.sigma = np.exp(centre * model.step_size) if model.step_size else centre
         with one_thread():
-            self._solver = model.shifted(self._sigma)
+            self._solver = model.shifted(self.sigma)
         self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+        self.reach = 0.0
         self._right = np.zeros((len(model.names), 0), dtype=complex)
 
     def nearest(self, count: int) -> NDArray[np.complex128]:
         """The nearest eigenvalues λ."""
         nu, self._right = self._arnoldi(self._solver.solve, count)
         self._values = self._to_lambda(nu)
+        self.reach = float(1 / np.abs(nu).min())
         return self._values
 
     def reaching(self, radius: float) -> NDArray[np.complex128] | None:
@@ -218,7 +207,7 @@ class _Search:
         ]
 
     def _to_lambda(self, nu: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return to_continuous(self._sigma + 1 / nu, self._model.step_size)[0]
+        return to_continuous(self.sigma + 1 / nu, self._model.step_size)[0]
 
     def _arnoldi(self, solve: Callable[[Vector], Vector], count: int) -> tuple[Vector, Vector]:
         n = len(self._model.names)

@@ -10,8 +10,15 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel
 
+ZERO = 1e-3
+"""An eigenvalue of at most this size [rad/s] is a zero: the free angle of a system without an infinite bus, in the
+accuracy of a perturbation. A double one, where nothing restores the frequency either, is split by up to as much."""
+
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this belongs to what decays within one step, not to a mode."""
+
+_REAL = 1e-2
+"""A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +93,17 @@ class Mode:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first."""
+    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first.
+
+    Attributes
+    ----------
+    rightmost
+        The mode of the largest real part at any frequency, zeros left out; None where there is no other.
+    """
 
     eigenvalues: NDArray[np.complex128]
     modes: list[Mode]
+    rightmost: Mode | None
 
     @property
     def growth_rate(self) -> float:
@@ -124,7 +138,22 @@ def find_spectrum(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float 
         k for k, value in enumerate(lambdas) if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
     ]
     modes = [make_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
-    return Spectrum(lambdas, least_damped_first(modes))
+    k = index_of_rightmost(lambdas)
+    rightmost = None if k is None else make_mode(lambdas[k], left[:, k], right[:, k], model.names)
+    return Spectrum(lambdas, least_damped_first(modes), rightmost)
+
+
+def index_of_rightmost(values: NDArray[np.complex128]) -> int | None:
+    """Place of the largest real part among eigenvalues [rad/s], zeros left out; of a pair, that of the upper half."""
+    candidates = np.flatnonzero((np.abs(values) > ZERO) & (values.imag >= 0))
+    return int(candidates[np.argmax(values.real[candidates])]) if len(candidates) else None
+
+
+def oscillations(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Which eigenvalues [rad/s] are oscillations, one of each pair: neither real poles nor zeros."""
+    values = np.asarray(values)
+    mask: NDArray[np.bool_] = (values.imag > _REAL * np.abs(values.real)) & (np.abs(values) > ZERO)
+    return mask
 
 
 def least_damped_first(modes: Iterable[Mode]) -> list[Mode]:

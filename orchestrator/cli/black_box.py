@@ -8,7 +8,8 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.stability import Stability, judge
 from orchestrator.black_box.coupled_modes import (
     BoxedSystem,
     component_participation,
@@ -20,6 +21,7 @@ from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.study.modes import modes_of, running
 
@@ -31,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_black_box)")
     add_excitation_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -39,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
     console = make_console(stderr=options.json)
     folder = made_folder(options.out or Path("results") / f"{case.name}_black_box")
     output = []
+    verdicts: dict[str, Stability] = {}
     for prepared in scenarios:
         with running(prepared) as master, console.status(f"{prepared.name}: measuring {options.component}"):
             if options.component not in master.components:
@@ -50,17 +54,19 @@ def run(options: argparse.Namespace) -> int:
             system = linearize_with_box(master, options.component, excitation_of(options), restore=restore)
             box = is_black_box(master.components[options.component])
             white = [] if box else modes_of(case, prepared, master, (0.1, 2.0)).modes
+        verdicts[prepared.title] = judge(system.model)
         passive = passivity(system.response)
         save_identification(system.response, system.identified, passive, folder / prepared.name)
         if options.json:
-            output.append(_system_json(prepared.name, system, passive, white))
+            output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
         else:
+            print_stability(console, {prepared.title: verdicts[prepared.title]})
             console.print(_modes_table(prepared.title, system, white), "")
     if options.json:
         print(json.dumps(output, indent=1))
     else:
         console.print(f"Admittances and models in {folder}", soft_wrap=True, highlight=False)
-    return 0
+    return exit_code(options, list(verdicts.values()))
 
 
 def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
@@ -85,13 +91,16 @@ def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     return table
 
 
-def _system_json(name: str, system: BoxedSystem, passive: Any, white: list[Mode]) -> dict[str, Any]:
+def _system_json(
+    name: str, system: BoxedSystem, stability: Stability, passive: Any, white: list[Mode]
+) -> dict[str, Any]:
     def figures(mode: Mode) -> dict[str, float]:
         return {"real": mode.eigenvalue.real, "imag": mode.eigenvalue.imag, "frequency_hz": mode.frequency_hz,
                 "damping_percent": mode.damping_percent,
                 "participation": component_participation(mode, system.component)}  # fmt: skip
 
-    growth = find_spectrum(system.model, 0.1, 2.0).growth_rate
-    return {"scenario": name, "component": system.component, "residual": system.residual, "growth": growth,
+    return {"scenario": name, "component": system.component, "residual": system.residual,
+            "stable": stability.stable, "largest_growth_rate": stability.largest_growth_rate,
+            "stability": stability.as_json(),
             "identification": identification_json(system.response, system.identified, passive),
             "modes": [figures(m) for m in system.modes()], "white_box_modes": [figures(m) for m in white]}  # fmt: skip

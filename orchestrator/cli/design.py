@@ -11,6 +11,7 @@ from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.cli.arguments import positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.terminal import make_console
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.report.design_files import design_json, parameters_of, provenance
 from orchestrator.report.design_sheet import sheet
@@ -67,6 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--refine", action="store_true", help="search gain and lead/lag on the closed loop as well")
     parser.add_argument("--no-margins", action="store_true", help="leave out the margins, which take longest")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_verdict_argument(parser)
     parser.add_argument(
         "--out", type=Path, metavar="FILE.toml", help="parameter file (default: <case>_<controller>.toml, here)"
     )
@@ -107,12 +109,15 @@ def run(options: argparse.Namespace) -> int:
     path.with_suffix(".json").write_text(content + "\n", encoding="utf-8")  # for `gfor report`
     if options.json:
         print(content)
-        return 0
+        return exit_code(options, [design.stability])
+    print_stability(
+        console, {"without the controller": design.stability_before, "with the final setting": design.stability}
+    )
     for part in sheet(design):
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)
     console.print(f"Parameter file {path}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}", soft_wrap=True, highlight=False)  # fmt: skip
-    return 0
+    return exit_code(options, [design.stability])
 
 
 def _command_line(options: argparse.Namespace) -> str:

@@ -3,8 +3,10 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.analysis.stability import Stability
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import made_folder
+from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linear_model_files import save_linear_model
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
 
@@ -26,18 +28,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--continuous", action="store_true", help="ẋ = A·x + B·u instead of the step map")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
+    add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Linearise every scenario and write its model."""
     case, scenarios = prepare(options)
     folder = made_folder(options.out or Path("results") / f"{case.name}_linear")
+    verdicts: dict[str, Stability] = {}
+    lines = []
     for prepared in scenarios:
         inputs = options.input or default_inputs(prepared)
         outputs = options.output or default_outputs(case, prepared)
-        model, point = linear_model(prepared, inputs, outputs, as_continuous=options.continuous)
-        paths = save_linear_model(model, point, case, prepared, folder / prepared.name)
+        model, point, verdicts[prepared.title] = linear_model(
+            prepared, inputs, outputs, as_continuous=options.continuous
+        )
+        paths = save_linear_model(model, point, verdicts[prepared.title], case, prepared, folder / prepared.name)
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
-        print(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
-    return 0
+        lines.append(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
+    print_stability(make_console(), verdicts)
+    print("\n".join(lines))
+    return exit_code(options, list(verdicts.values()))

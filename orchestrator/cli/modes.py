@@ -7,6 +7,7 @@ from pathlib import Path
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_warnings
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.report import tables
 from orchestrator.study.modes import compute_modes, modes_json
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,12 +59,13 @@ def run(options: argparse.Namespace) -> int:
         written += [path.name for path in save_modes(case, results, folder)]
     if options.json:
         print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
-        return 0
+        return exit_code(options, [r.stability for r in results])
     console = make_console()
+    print_verdicts(console, results)
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, case, results)
     if folder:
         console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
     print_warnings(results)
-    return 0
+    return exit_code(options, [r.stability for r in results])

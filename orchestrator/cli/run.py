@@ -21,6 +21,7 @@ from orchestrator.cli.terminal import (
     print_warnings,
     progress_bar,
 )
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, RunInterruptedError
 from orchestrator.report import tables
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    add_verdict_argument(parser)
     like.add_arguments(parser)
 
 
@@ -76,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
-    return _end(*stopped, folder) if stopped else 0
+    return _end(*stopped, folder) if stopped else exit_code(options, [r.modes.stability for r in results])
 
 
 def _end(scenario: str, error: BaseException, folder: Path) -> int:
@@ -90,6 +92,7 @@ def _end(scenario: str, error: BaseException, folder: Path) -> int:
 
 def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
     modes = [r.modes for r in results]
+    print_verdicts(console, modes)
     console.print(tables.steady_states(modes), "")
     print_named_modes(console, case, modes)
     if any(r.ring_down for r in results):

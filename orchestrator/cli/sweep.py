@@ -13,6 +13,7 @@ from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console, make_errors
+from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.errors import INTERRUPTED
 from orchestrator.report import sweep_tables
 from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder for results (default: results/<case>_sweep); points that are there are not computed again",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,7 +59,10 @@ def run(options: argparse.Namespace) -> int:
     console = make_console(stderr=options.json)
     store = PointStore(folder / "points")
     result = compute_points(lambda report: run_sweep(plan, executor, store, report), executor, folder, console)
-    return INTERRUPTED if result is None else _present(result, folder, console, as_json=options.json)
+    if result is None:
+        return INTERRUPTED
+    failed = _present(result, folder, console, as_json=options.json)
+    return failed or int(options.fail_unstable and not all(s.stable for s in result.scenarios))
 
 
 def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bool) -> int:
@@ -68,7 +73,9 @@ def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bo
     if as_json:
         print(json.dumps(sweep_json(samples), indent=1, ensure_ascii=False))
     else:
-        console.print(sweep_tables.trajectories(samples), "")
+        for line in sweep_tables.stability(samples):
+            console.print(line, soft_wrap=True, highlight=False)
+        console.print("", sweep_tables.trajectories(samples), "")
     for text in sweep_tables.remarks(samples):
         make_errors().print(escape(text))
     if not as_json:

@@ -7,17 +7,23 @@ from pathlib import Path
 import numpy as np
 import scipy.io
 
+from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.report.storage import provenance, save_table
+from orchestrator.report.storage import provenance, save_json, save_table
 
 
 def save_linear_model(
-    model: StateSpace, point: OperatingPoint, case: Case, prepared: PreparedScenario, folder: Path
+    model: StateSpace,
+    point: OperatingPoint,
+    stability: Stability,
+    case: Case,
+    prepared: PreparedScenario,
+    folder: Path,
 ) -> list[Path]:
-    """Write A, B, C, D with names and operating point: ``linear_model.mat`` for MATLAB, and one CSV a matrix."""
+    """Write A, B, C, D with names, operating point and verdict: ``linear_model.mat`` for MATLAB, one CSV a matrix."""
     folder.mkdir(parents=True, exist_ok=True)
     matrices = {"A": model.A, "B": model.B, "C": model.C, "D": model.D}
     names = {"states": model.states, "inputs": model.inputs, "outputs": model.outputs}
@@ -29,6 +35,7 @@ def save_linear_model(
         | {
             "step_size": model.step_size or 0.0,  # as MATLAB's ss: 0 is continuous
             "operating_point": np.array(operating_point).reshape(-1, 1),
+            "stability": json.dumps(stability.as_json()),
             "provenance": json.dumps(provenance(case, prepared)),
         },
     )
@@ -42,4 +49,5 @@ def save_linear_model(
         labelled = zip(rows, matrices[key].tolist(), strict=True)
         lines = [{"": row, **dict(zip(columns, values, strict=True))} for row, values in labelled]
         save_table(lines, folder / f"{key}.csv")
-    return [folder / "linear_model.mat", *(folder / f"{key}.csv" for key in entries)]
+    save_json(stability.as_json(), folder / "stability.json")
+    return [folder / "linear_model.mat", folder / "stability.json", *(folder / f"{key}.csv" for key in entries)]

@@ -38,7 +38,7 @@ def plot_eigenvalues(results: Sequence["ModesResult"], title: str, path: Path) -
                 s=[70 if result.name_of(m) else 30 for m in modes],
                 linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
                 color=colour(index),
-                label=result.prepared.title,
+                label=result.label,
                 zorder=3,
             )
             for reference in result.references.values():

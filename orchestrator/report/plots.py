@@ -46,7 +46,7 @@ def plot_signals(table: PlotTable, results: Sequence["RunResult"], path: Path) -
                         data["time"],
                         panel.scale * data,
                         color=colour(index),
-                        label=result.modes.prepared.title,
+                        label=result.modes.label,
                     )
                 follows = signal(result.linear, panel.signal) if result.linear is not None else None
                 if follows is not None:

@@ -14,6 +14,7 @@ from orchestrator.report.storage import provenance, save_table
 
 if TYPE_CHECKING:
     from orchestrator.study.sweep import ScenarioSweep, SweepResult
+    from orchestrator.study.sweep_point import PointRecord
     from orchestrator.study.sweep_trajectories import Place, Trajectory
 
 _FIGURES = {
@@ -103,6 +104,7 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
     of_components = np.full((*shape, len(samples.components)), np.nan)
     names = [[""] * longest for _ in result.scenarios]
     residual, errors = np.full(shape[:-1], np.nan), np.full(shape[:-1], "", dtype=object)
+    growth, stable = np.full(shape[:-1], np.nan), np.full(shape[:-1], -1, dtype=np.int8)
     for s, sweep in enumerate(result.scenarios):
         for t, trajectory in enumerate(sweep.trajectories):
             names[s][t] = trajectory.name
@@ -116,6 +118,11 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
         for place in itertools.product(*map(range, sizes)):
             residual[(s, *place)] = sweep.points[place].residual
             errors[(s, *place)] = sweep.points[place].error or ""
+            verdict = sweep.points[place].stability
+            if verdict.get("stable") is not None:
+                stable[(s, *place)] = verdict["stable"]
+            if verdict.get("largest_growth_rate") is not None:
+                growth[(s, *place)] = verdict["largest_growth_rate"]
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
     data: dict[str, Any] = {
         _IN_DATASET.get(name, name): (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
@@ -130,6 +137,14 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
             [*dims, "component"], of_components, {"units": "1", "long_name": f"{of} a component, all its states"},
         ),
         "residual": (dims[:-1], residual, {"units": "pu", "long_name": "Change of the steady state in one step"}),
+        "stable": (
+            dims[:-1],
+            stable,
+            {"units": "1", "long_name": "Whether nothing grows at any frequency", "_FillValue": np.int8(-1)},
+        ),
+        "largest_growth_rate": (
+            dims[:-1], growth, {"units": "1/s", "long_name": "Largest real part of the whole spectrum"},
+        ),
         "error": (dims[:-1], errors.astype(str), {"long_name": "Why there are no modes"}),
     }  # fmt: skip
     coordinates: dict[str, Any] = {
@@ -176,13 +191,20 @@ def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
                 rows.append(
                     {"scenario": sweep.prepared.name, **setting, "trajectory": trajectory.name, **figures}
                     | {"named": int(sample["named"]), "beginning": sample["beginning"].name.lower()}
-                    | {**shares, "error": ""}
+                    | {**shares, **_verdict(sweep.points[place]), "error": ""}
                 )
     empty = dict.fromkeys(rows[0] if rows else ["scenario", *units.values(), "error"], "")
     for sweep, place, error in samples.result.failures():
         setting = {units[key]: value for key, value in samples.setting(place).items()}
         rows.append(empty | {"scenario": sweep.prepared.name, **setting, "error": error})
     return rows
+
+
+def _verdict(record: "PointRecord") -> dict[str, str]:
+    """The stability of a point in a row of the table."""
+    rate = record.stability.get("largest_growth_rate")
+    word = "" if record.stability.get("stable") is None else str(record.stability["stable"]).lower()
+    return {"stable": word, "largest growth rate [1/s]": "" if rate is None else f"{rate:.10g}"}
 
 
 def _share(shares: dict[str, float], name: str) -> str:
@@ -204,6 +226,11 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
             {
                 "name": sweep.prepared.name,
                 "title": sweep.prepared.title,
+                "stable": sweep.stable,
+                "unstable": [
+                    {"values": samples.setting(place)} | sweep.points[place].stability
+                    for place in sweep.unstable(samples.axes)
+                ],
                 "trajectories": [
                     {
                         "name": trajectory.name,

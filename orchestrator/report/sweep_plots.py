@@ -74,7 +74,9 @@ def plot_trajectories(samples: Samples, path: Path) -> bool:
                 number = trajectory.name.removeprefix(trajectory.carries or "").strip()
                 axis.annotate(number, ends[-1], xytext=(5, 3), textcoords="offset points", color=colour(k), fontsize=9)
         for k, sweep in enumerate(samples.result.scenarios):
-            axis.plot([], [], color=colour(k), label=sweep.prepared.title)
+            unstable = len(sweep.unstable(samples.axes))
+            words = f": UNSTABLE at {unstable} of its points" if unstable else ""
+            axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
         axis.set_xlim(left, right)
         axis.set_ylim(0, highest)
         damping_rays(axis, left, highest)

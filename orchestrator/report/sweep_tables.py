@@ -1,5 +1,6 @@
 """A sweep on a terminal."""
 
+import math
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -44,6 +45,24 @@ def trajectories(samples: Samples) -> Table:
             )
         table.add_section()
     return table
+
+
+def stability(samples: Samples) -> list[str]:
+    """The verdict on every scenario over all its points, as rich markup; an unstable one first."""
+    axes, lines = samples.axes, []
+    order = {False: 0, None: 1, True: 2}
+    for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
+        title, places = escape(sweep.prepared.title), sweep.unstable(axes)
+        total = math.prod(len(axis.values) for axis in axes)
+        if places:
+            worst = sweep.points[places[0]].stability["sentence"].removeprefix("UNSTABLE: ")
+            where = escape(f"at {len(places)} of {total} points; worst at {place_text(samples, places[0])}: {worst}")
+            lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
+        elif sweep.stable is None:
+            lines.append(f"[bold yellow]not known[/]: {title}: a point without a verdict is among {total}")
+        else:
+            lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
+    return lines
 
 
 def remarks(samples: Samples) -> list[str]:

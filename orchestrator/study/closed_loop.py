@@ -13,9 +13,10 @@ from orchestrator.analysis.continuation import Eigenpair, follow
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.pod_design import LeadLag, damping_ratio
+from orchestrator.analysis.stability import Stability, judge
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.told_step import as_if_told
-from orchestrator.errors import InputError
+from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.description import FmuDescription
 
 _TUNED = ("enabled", "K", "T_S1", "T_S2")
@@ -78,6 +79,14 @@ class PodLoop:
             return self._off
         self._linearize_converters(self._blocks, setting)
         return compose(self._blocks, self._master.schedule)
+
+    def stability(self, setting: PodSetting) -> Stability:
+        """The verdict on the whole system with this setting, at any frequency."""
+        model = self.model(setting)
+        try:
+            return judge(model, system=self._continuous_model(setting))
+        except AnalysisError:
+            return judge(model)
 
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
         """The same without any communication step, with half the gain and with the gain; it is linear in the gain.

@@ -20,6 +20,7 @@ from orchestrator.analysis.pod_design import (
     required_gain,
     sensitivity,
 )
+from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
@@ -102,6 +103,8 @@ class PodDesign:
         The other modes without the controller, and with the final setting.
     broken
         What the final setting does to other modes that it must not.
+    stability_before, stability
+        The verdict over the whole spectrum without the controller, and with the final setting.
     """
 
     request: DesignRequest
@@ -124,6 +127,8 @@ class PodDesign:
     after: Surroundings
     broken: str | None
     margins: Margins | None
+    stability_before: Stability
+    stability: Stability
 
     @property
     def unbounded_gain(self) -> float:
@@ -256,7 +261,7 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
             loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others]
         )
         final = refinement.chosen or designed
-    after = around(final)
+    after, stability = around(final), loop.stability(final.setting)
     margins = None
     if request.margins and final.setting.gain:
         report("margins")
@@ -280,9 +285,16 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
         final=final,
         before=before,
         after=after,
-        broken=breach(before, after, request.least_damping),
+        broken=breach(before, after, request.least_damping) or _unstable(stability),
         margins=margins,
+        stability_before=loop.stability(_OFF),
+        stability=stability,
     )
+
+
+def _unstable(stability: Stability) -> str | None:
+    """What a design that leaves the system unstable is told."""
+    return f"the system is {stability.sentence()}" if stability.stable is False else None
 
 
 def _required(request: DesignRequest, initial: complex) -> float:

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.linear_model import LinearModel, Matrix
 from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.case import Case
@@ -15,7 +16,7 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import InputError
 from orchestrator.report.signals import variables_of
-from orchestrator.study.modes import running
+from orchestrator.study.modes import continuous_model, running
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:
@@ -47,8 +48,8 @@ def _is_output(prepared: PreparedScenario, name: str) -> bool:
 
 def linear_model(
     prepared: PreparedScenario, inputs: Sequence[str], outputs: Sequence[str], *, as_continuous: bool = False
-) -> tuple[StateSpace, OperatingPoint]:
-    """The scenario's linear model around its steady state, as step map or continuous.
+) -> tuple[StateSpace, OperatingPoint, Stability]:
+    """The scenario's linear model around its steady state, as step map or continuous, with the verdict on it.
 
     Raises
     ------
@@ -61,7 +62,9 @@ def linear_model(
         point = find_operating_point(master)
         with as_if_told(master, 0.0 if as_continuous else prepared.step_size):
             blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=as_continuous)
-        return state_space(blocks, None if as_continuous else master.schedule), point
+        space = state_space(blocks, None if as_continuous else master.schedule)
+        model = LinearModel.from_matrix(space.A, space.states, space.step_size)
+        return space, point, judge(model, system=None if as_continuous else continuous_model(master))
 
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:

@@ -9,24 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.critical_modes import find_critical_modes, growth_rate
+from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous
-from orchestrator.analysis.modes import Mode, eigenvalues, find_modes, most_associated, most_opposed
+from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed, oscillations
+from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.told_step import as_if_told
+from orchestrator.coupling.told_step import as_if_told, told_parameters
 from orchestrator.errors import AnalysisError
 
 _NAMING_RANGE = (0.1, 2.0)
 """Frequencies [Hz] among which the modes with names are looked for."""
-
-_COUPLING_UNSTABLE = 1.0
-"""A step map's growth rate above the continuous system's by more than this [1/s] is the coupling's doing."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +41,12 @@ class ModesResult:
         States that show who swings against whom, mostly speeds.
     areas
         Area of every component that has one.
+    stability
+        The verdict over the whole spectrum.
+    hidden
+        The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
+    system
+        The continuous model, without a communication step; None where a component gives no derivatives.
     """
 
     prepared: PreparedScenario
@@ -54,6 +58,17 @@ class ModesResult:
     warnings: tuple[str, ...]
     swing: tuple[str, ...]
     areas: dict[str, str]
+    stability: Stability
+    hidden: Hidden | None
+    system: LinearModel | None
+
+    @property
+    def label(self) -> str:
+        """The scenario's title in a picture, with the verdict where the system is unstable."""
+        rate = self.stability.largest_growth_rate
+        if self.stability.stable is not False or rate is None:
+            return self.prepared.title
+        return f"{self.prepared.title}: UNSTABLE, {rate:+.3g} 1/s"
 
     @property
     def electromechanical(self) -> Mode | None:
@@ -114,28 +129,54 @@ def modes_of(
 ) -> ModesResult:
     """Steady state and modes of a running system; see `compute_modes`."""
     point = find_operating_point(master)
-    model = compose(Blocks(master, directional=directional), master.schedule)
+    step_aware = any(told_parameters(master, name) for name in master.components)
+    blocks = Blocks(master, derivatives=not step_aware, directional=directional)
+    model = compose(blocks, master.schedule)
+    system = continuous_model(master, None if step_aware else blocks)
     low, high = frequency_range
     if critical is None:
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
-        everything = find_modes(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
-        modes = [mode for mode in everything if low <= mode.frequency_hz <= high]
-        candidates = named_modes(case, model, everything)
+        everything = find_spectrum(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
+        spectrum: Spectrum | None = everything
+        shown = [mode for mode in everything.modes if low <= mode.frequency_hz <= high]
+        candidates = named_modes(case, model, everything.modes)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
-        modes, named = find_critical_modes(model, low, high, critical), {}
+        spectrum = whole_spectrum(model)
+        shown, named = find_critical_modes(model, low, high, critical), {}
+    stability = judge(model, spectrum, system)
     analysis = case.table.analysis
     return ModesResult(
         prepared=prepared,
         operating_point=point,
         model=model,
-        modes=modes,
+        modes=[mode for mode in shown if oscillations(np.array([mode.eigenvalue]))[0]],
         named=named,
         references=_references(case, prepared),
-        warnings=_warnings(master, model),
+        warnings=_warnings(stability),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
+        stability=stability,
+        hidden=None if spectrum is None else hidden(spectrum.eigenvalues, low, high),
+        system=system,
     )
+
+
+def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
+    """The system without any communication step; None where a component gives no derivatives.
+
+    Parameters
+    ----------
+    blocks
+        With derivatives and of components that do not know the step, where there are such already.
+    """
+    try:
+        if blocks is not None:
+            return continuous(blocks)
+        with as_if_told(master, 0.0):
+            return continuous(Blocks(master, derivatives=True))
+    except AnalysisError:
+        return None
 
 
 def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:
@@ -150,6 +191,9 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
         warnings=(f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",),
         swing=(),
         areas={},
+        stability=Stability(None, reason=f"the system cannot be linearised: {'; '.join(reasons)}"),
+        hidden=None,
+        system=None,
     )
 
 
@@ -170,21 +214,14 @@ def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, 
     return found
 
 
-def _warnings(master: Master, model: LinearModel) -> tuple[str, ...]:
+def _warnings(stability: Stability) -> tuple[str, ...]:
     """Say before a run that the coupling itself is unstable."""
-    coupled = growth_rate(model)
-    if coupled is None or coupled <= _COUPLING_UNSTABLE:
-        return ()
-    try:
-        with as_if_told(master, 0.0):
-            growth = eigenvalues(continuous(Blocks(master, derivatives=True))).real.max()
-    except AnalysisError:
-        return ()
-    if coupled - growth <= _COUPLING_UNSTABLE:
+    rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
+    if stability.cause is not Cause.COUPLING or growth is None:
         return ()
     return (
-        f"the coupling is numerically unstable: with a communication step of {model.step_size:g} s the step map grows "
-        f"at {coupled:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s; take a shorter step or the "
+        f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
+        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s; take a shorter step or the "
         "Gauss-Seidel schedule, devices before the grid",
     )
 
@@ -210,6 +247,10 @@ def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> 
                 "name": r.prepared.name,
                 "residual": r.operating_point.residual,
                 "states": r.model.number_of_states,
+                "stable": r.stability.stable,
+                "largest_growth_rate": r.stability.largest_growth_rate,
+                "stability": r.stability.as_json(),
+                "outside_range": None if r.hidden is None else r.hidden.as_json(),
                 "warnings": list(r.warnings),
                 "modes": [
                     {

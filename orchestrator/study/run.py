@@ -7,8 +7,7 @@ import xarray as xr
 
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
-from orchestrator.analysis.linearization import Blocks, compose, continuous
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.state_access import obstacle
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
@@ -87,7 +86,7 @@ def run_scenario(
     with running(prepared) as master:
         reasons = [text for component in master.components.values() if (text := obstacle(component))]
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(case, prepared, master, frequency_range)
-        shifts = _shifts(master, modes.electromechanical)
+        shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
         try:
             statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
@@ -100,13 +99,12 @@ def run_scenario(
     return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure)
 
 
-def _shifts(master: Master, mode: Mode | None) -> list[ModeShift]:
+def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
     """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
-    if mode is None:
+    if modes.electromechanical is None or modes.system is None:
         return []
     try:
-        with as_if_told(master, 0.0):
-            exact = nearest_eigenvalue(continuous(Blocks(master, derivatives=True)), mode.eigenvalue)
+        exact = nearest_eigenvalue(modes.system, modes.electromechanical.eigenvalue)
     except AnalysisError:
         return []
     schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}

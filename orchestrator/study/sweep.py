@@ -86,6 +86,19 @@ class ScenarioSweep:
     points: dict[Place, PointRecord] = field(default_factory=dict)
     trajectories: list[Trajectory] = field(default_factory=list)
 
+    def unstable(self, axes: Sequence[Axis]) -> list[Place]:
+        """Places of the grid where a mode grows at any frequency, the fastest first."""
+        found = [place for place in grid_places(axes) if self.points[place].is_unstable]
+        return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether every point is stable; None where a point has no verdict and none is unstable."""
+        verdicts = [record.stability.get("stable") for record in self.points.values()]
+        if any(verdict is False for verdict in verdicts):
+            return False
+        return True if all(verdicts) else None
+
 
 @dataclass
 class SweepResult:

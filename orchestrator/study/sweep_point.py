@@ -64,6 +64,8 @@ class PointRecord:
         Whether the same would come out again: not so where a worker, the machine or an FMU was at fault.
     residual
         Of the steady state, as in `OperatingPoint`.
+    stability
+        The verdict over the whole spectrum, as `Stability.as_json` gives it; empty where the point failed.
     """
 
     modes: ModeSet | None = None
@@ -72,6 +74,12 @@ class PointRecord:
     lasting: bool = True
     residual: float = float("nan")
     warnings: tuple[str, ...] = ()
+    stability: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_unstable(self) -> bool:
+        """Whether a mode is known to grow."""
+        return self.stability.get("stable") is False
 
     @classmethod
     def lost(cls, _: PointTask, error: WorkerLostError) -> Self:
@@ -154,4 +162,5 @@ def _record(result: ModesResult) -> PointRecord:
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
         residual=result.operating_point.residual,
         warnings=result.warnings,
+        stability=result.stability.as_json(),
     )

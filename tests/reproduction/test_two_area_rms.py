@@ -103,7 +103,7 @@ def test_a_shift_is_that_of_devices_which_know_the_step():
 
 
 def test_a_continuous_model_is_that_of_emfs_without_a_lead():
-    model, _ = linear_model(
+    model, _, _ = linear_model(
         prepare("two_area_rms", "gfor")[1], ["grid.load_2.scale"], ["sg1.omega"], as_continuous=True
     )
     devices = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}

@@ -32,6 +32,9 @@ def findings(results: Results) -> str:
     for s in results.scenarios:
         if s["failure"]:
             items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
+        if verdict := s.get("stability"):
+            shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")
+            items.append(f'{escape(s["title"])}: <b class="{shade}">{escape(verdict["sentence"])}</b>')
         for name, mode in s["modes"].items():
             state = "unstable" if mode["damping_percent"] < 0 else "damped"
             items.append(

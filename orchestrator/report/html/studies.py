@@ -43,7 +43,9 @@ def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
     fixed = "".join(
         f"<p>At {escape(str(d))} = {float(sweep[d].values[0]):g}, the first of its values.</p>" for d in others
     )
-    parts = [f"{fixed}<p>{link} shows how the modes move with {escape(label)}.</p>{picture}"]
+    parts = [
+        f"{fixed}{_unstable(shown, axis, title)}<p>{link} shows how the modes move with {escape(label)}.</p>{picture}"
+    ]
     for quantity, text, tick in (
         ("damping", "Damping ratio", "Damping [%]"),
         ("frequency", "Frequency", "Frequency [Hz]"),
@@ -61,6 +63,22 @@ def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
             parts.append(f"<p>{link}: {_extremes(curves, tick)}</p>{picture}")
     parts.append(_states(shown, axis, label, names, title, figures))
     return "".join(parts)
+
+
+def _unstable(shown: xr.Dataset, axis: str, title: dict[str, str]) -> str:
+    """Where a mode grows at any frequency, scenario by scenario."""
+    if "stable" not in shown:
+        return ""
+    lines = []
+    for s in (str(name) for name in shown["scenario"].values):
+        bad = shown["stable"].sel(scenario=s).values == 0
+        if bad.any():
+            rates = shown["largest_growth_rate"].sel(scenario=s).values[bad]
+            where = ", ".join(f"{value:.4g}" for value in shown[axis].values[bad][:8])
+            more = " …" if bad.sum() > 8 else ""
+            lines.append(f'<p class="bad">{escape(title.get(s, s))}: unstable at {axis} = {where}{more} '
+                         f"({int(bad.sum())} of {bad.size} points, up to {rates.max():+.3g} 1/s)</p>")  # fmt: skip
+    return "".join(lines)
 
 
 def _trajectories(
@@ -162,6 +180,10 @@ def design(sheet: dict[str, Any]) -> str:
         rows.append([name, eigenvalue(mode["real"], mode["imag"]), f"{mode['imag'] / 2 / np.pi:.3f}", damping(percent)])
     kind = "lead" if sensitivity["phase_deg"] >= 0 else "lag"
     extra = []
+    if "stability" in sheet:
+        after = sheet["stability"]["after"]
+        shade = {True: "good", False: "bad"}.get(after["stable"], "soft")
+        extra.append(f'<p class="{shade}">With the final setting: {escape(after["sentence"])}</p>')
     if "verdict" in sheet:
         state = "good" if sheet.get("met") else "bad"
         extra.append(f'<p class="{state}">{escape(sheet["verdict"])}</p>')

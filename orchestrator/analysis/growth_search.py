@@ -1,0 +1,161 @@
+"""Everything that grows in a system too large for its full spectrum: sparse search of the whole right half-plane.
+
+The half-plane is cut into sectors of rings around 0. Arnoldi's method on (A − σI)⁻¹ around the middle σ of a sector
+gives the eigenvalues nearest to it; the sector is done when they reach beyond its edge, and is cut where they do not.
+What grows in a step map by a tenth or more in each step stands out: Arnoldi's method on A alone finds it.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.analysis.critical_modes import Search, nearest_pairs
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import Mode, make_mode
+from orchestrator.errors import AnalysisError
+
+SLOWEST = 2 * np.pi * 1e-3
+"""Eigenvalues [rad/s] nearer to 0 are not looked for: they grow by less than a hundredth in a second."""
+
+FASTEST = 2 * np.pi * 1e5
+"""Nor are those of a continuous model that are farther from 0 than this [rad/s]."""
+
+_RING = 1.6
+"""Ratio of the radii of a ring."""
+
+_AT_A_TIME = (20, 80)
+"""Eigenvalues looked for around one point: first, and at most."""
+
+_STANDS_OUT = 1.1
+"""Multipliers of a step map beyond this size are found as the largest ones."""
+
+_THINNEST = 1e-3
+"""A sector is not cut below this size, relative to its radius."""
+
+
+@dataclass(frozen=True)
+class GrowthSearch:
+    """Modes [rad/s] that grow, fastest first, and in words what was not looked at."""
+
+    modes: tuple[Mode, ...]
+    not_searched: str
+
+
+@dataclass(frozen=True)
+class _Sector:
+    """|λ| from ``inner`` to ``outer`` [rad/s], angle of λ from ``low`` to ``high`` [rad]."""
+
+    inner: float
+    outer: float
+    low: float
+    high: float
+
+    @property
+    def centre(self) -> complex:
+        return complex((self.inner + self.outer) / 2 * np.exp(1j * (self.low + self.high) / 2))
+
+    @property
+    def edge(self) -> NDArray[np.complex128]:
+        """Points along the whole edge."""
+        angles, radii = np.linspace(self.low, self.high, 9), np.linspace(self.inner, self.outer, 9)
+        arcs = [r * np.exp(1j * angles) for r in (self.inner, self.outer)]
+        rays = [radii * np.exp(1j * a) for a in (self.low, self.high)]
+        return np.concatenate([*arcs, *rays])
+
+    def holds(self, value: complex) -> bool:
+        """A sector owns its lower edges, and not the upper ones; the last one in the ring owns the imaginary axis."""
+        angle = float(np.angle(value))
+        return self.inner <= abs(value) < self.outer and self.low <= angle < self.high
+
+    def parts(self) -> tuple["_Sector", ...]:
+        """Cut in both directions."""
+        radius, angle = float(np.sqrt(self.inner * self.outer)), (self.low + self.high) / 2
+        return tuple(
+            _Sector(inner, outer, low, high)
+            for inner, outer in ((self.inner, radius), (radius, self.outer))
+            for low, high in ((self.low, angle), (angle, self.high))
+        )
+
+
+def find_growing_modes(model: LinearModel) -> GrowthSearch:
+    """Every mode that grows, of a step map or continuous matrix of any size.
+
+    Raises
+    ------
+    AnalysisError
+        If Arnoldi's method does not converge, or too many modes lie in one place.
+    """
+    H = model.step_size
+    farthest = FASTEST if H is None else np.pi / H
+    rings = 1 + int(np.ceil(np.log(farthest / SLOWEST) / np.log(_RING)))
+    radii = np.geomspace(SLOWEST, farthest, rings).tolist()
+    found = [] if H is None else _standing_out(model, H)
+    limit = np.inf if H is None else np.log(_STANDS_OUT) / H
+    waiting = [sector for inner, outer in pairwise(radii) for sector in _ring(inner, outer, limit)]
+    while waiting:
+        sector = waiting.pop()
+        modes = _modes_in(model, sector)
+        if modes is None:
+            waiting += _cut(sector)
+        else:
+            found += [mode for mode in modes if mode.eigenvalue.real <= limit]
+    found.sort(key=lambda mode: -mode.eigenvalue.real)
+    beyond = f"|λ| below {SLOWEST:.2g} rad/s and above {farthest:.3g} rad/s were not searched"
+    return GrowthSearch(tuple(found), beyond)
+
+
+def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
+    """The sectors of a ring with real parts up to a limit [1/s]; those of a wide ring are two."""
+    low = float(np.arccos(min(1.0, limit / inner)))
+    middle = (np.pi / 4,) if low < np.pi / 8 else ()
+    # A little below 0, so that what lies on the real axis belongs to a sector.
+    return [_Sector(inner, outer, *angles) for angles in pairwise((low - 1e-9, *middle, np.pi / 2))]
+
+
+def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
+    """What grows so fast in a step map that its multipliers are far larger than all others.
+
+    Raises
+    ------
+    AnalysisError
+        If there are more of them than are looked for.
+    """
+    n = len(model.names)
+    step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
+    start = np.random.default_rng(0).standard_normal(n)
+    count = _AT_A_TIME[0]
+    try:
+        mu = spla.eigs(step, k=count, ncv=3 * count, maxiter=30, tol=1e-6, v0=start, return_eigenvectors=False)
+    except spla.ArpackNoConvergence as error:
+        mu = error.eigenvalues  # what stands out converges first
+    mu = mu[(np.abs(mu) > _STANDS_OUT) & (mu.imag >= 0)]
+    if len(mu) == count:
+        raise AnalysisError(f"more than {count} modes grow by a tenth in each communication step; take a shorter one")
+    pairs = [nearest_pairs(model, complex(np.log(value.astype(complex)) / step_size), 1)[0] for value in mu]
+    return [make_mode(*pair, model.names) for pair in pairs]
+
+
+def _cut(sector: _Sector) -> tuple[_Sector, ...]:
+    if sector.outer - sector.inner < _THINNEST * sector.outer:
+        raise AnalysisError(
+            f"more than {_AT_A_TIME[1]} modes lie at {sector.centre:.4g} rad/s; compute the full spectrum instead"
+        )
+    return sector.parts()
+
+
+def _modes_in(model: LinearModel, sector: _Sector) -> list[Mode] | None:
+    """The growing modes of a sector; None if more eigenvalues than are looked for lie around it."""
+    H = model.step_size
+    search = Search(model, sector.centre)
+    edge = sector.edge if H is None else np.exp(sector.edge * H)
+    needed = float(np.abs(edge - search.sigma).max())
+    count, most = _AT_A_TIME
+    while count <= most:
+        values = search.nearest(count)
+        if search.reach > needed:
+            return search.modes([k for k, value in enumerate(values) if sector.holds(value)])
+        count *= 2
+    return None

@@ -1,0 +1,258 @@
+"""Whether a coupled system is stable: the verdict over its whole spectrum, with what grows and why.
+
+The step map is what a simulation runs, the continuous model is the system itself. Both are judged: a coupling may
+make a stable system grow, and a long communication step may damp what grows in the system.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.analysis.critical_modes import nearest_pairs
+from orchestrator.analysis.growth_search import find_growing_modes
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import (
+    ZERO,
+    Mode,
+    Spectrum,
+    eigenvalues,
+    find_spectrum,
+    index_of_rightmost,
+    make_mode,
+    oscillations,
+)
+
+WHOLE = 4000
+"""Up to so many states all eigenvalues are computed; beyond, what grows is searched for."""
+
+_GROWING = 1e-6
+"""A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding."""
+
+_COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
+"""A step map that grows faster than this many times the continuous system's rate and this much [1/s] owes that to the
+coupling."""
+
+_DENSE_VECTORS = 200
+"""Up to so many states all eigenvectors cost less than a search for one."""
+
+_STATES_NAMED = 3
+
+
+class Cause(StrEnum):
+    """What makes a system grow."""
+
+    SYSTEM = "system"
+    COUPLING = "coupling"
+    UNKNOWN = "not known"
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Oscillatory modes outside of a frequency range [Hz]: how many, and the least damped of them [rad/s]."""
+
+    frequency_range: tuple[float, float]
+    count: int
+    least_damped: complex | None
+
+    def sentence(self) -> str:
+        """The same in words."""
+        low, high = self.frequency_range
+        words = "oscillatory mode lies" if self.count == 1 else "oscillatory modes lie"
+        text = f"{self.count} {words} outside {low:g} to {high:g} Hz"
+        if self.least_damped is None:
+            return text
+        return f"{text}; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
+
+    def as_json(self) -> dict[str, Any]:
+        """The same for a machine."""
+        known = self.least_damped is not None
+        least = {"frequency_hz": self._hertz, "damping_percent": self._percent} if known else None
+        return {"range_hz": list(self.frequency_range), "oscillatory_modes": self.count, "least_damped": least}
+
+    @property
+    def _hertz(self) -> float:
+        return 0.0 if self.least_damped is None else self.least_damped.imag / (2 * np.pi)
+
+    @property
+    def _percent(self) -> float:
+        return 0.0 if self.least_damped is None else -100 * self.least_damped.real / abs(self.least_damped)
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The verdict on a linearised system.
+
+    Attributes
+    ----------
+    stable
+        Whether nothing grows; None where that is not known.
+    mode
+        The mode of the largest real part, of the step map; of the continuous system where only that grows.
+    growing
+        How many modes of that model grow, a pair counted once.
+    zeros
+        Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`): the free angle.
+    cause
+        Where something grows.
+    continuous_growth_rate
+        Largest real part [1/s] of the continuous system; None where a component gives no derivatives.
+    step_size
+        Communication step [s]; None for a continuous model.
+    reason
+        Why nothing is known, or what was not searched.
+    """
+
+    stable: bool | None
+    mode: Mode | None = None
+    growing: int = 0
+    zeros: int = 0
+    eigenvalues: int = 0
+    cause: Cause | None = None
+    continuous_growth_rate: float | None = None
+    step_size: float | None = None
+    reason: str = ""
+
+    @property
+    def largest_growth_rate(self) -> float | None:
+        """Largest real part [1/s] of the whole spectrum, zeros left out."""
+        return None if self.mode is None else self.mode.eigenvalue.real
+
+    @property
+    def verdict(self) -> str:
+        return {True: "stable", False: "UNSTABLE", None: "not known"}[self.stable]
+
+    def sentence(self) -> str:
+        """The verdict in words, with its figures."""
+        if self.mode is None or self.stable is None:
+            return f"{self.verdict}: {self.reason or 'there is no eigenvalue but zeros'}"
+        value = self.mode.eigenvalue
+        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
+        tail = f"; {self.reason}" if self.reason else ""
+        if self.stable:
+            return f"stable: the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
+        more = f"; {self.growing} modes grow" if self.growing > 1 else ""
+        return f"UNSTABLE: a mode grows at {where}{more}; cause: {self._why()}{tail}"
+
+    def _why(self) -> str:
+        rate = self.continuous_growth_rate
+        if self.cause is Cause.UNKNOWN:
+            return "not known, as a component gives no derivatives"
+        beside = "" if rate is None else f" (without a communication step: {rate:+.4g} 1/s)"
+        return f"the {self.cause}{beside}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Verdict and figures for a machine."""
+        mode = self.mode
+        return {
+            "stable": self.stable,
+            "largest_growth_rate": self.largest_growth_rate,
+            "frequency_hz": None if mode is None else mode.frequency_hz,
+            "participation": [] if mode is None else [{"state": s, "factor": f} for s, f in mode.participation[:6]],
+            "growing_modes": self.growing,
+            "zero_eigenvalues": self.zeros,
+            "eigenvalues": self.eigenvalues,
+            "cause": None if self.cause is None else str(self.cause),
+            "continuous_growth_rate": self.continuous_growth_rate,
+            "reason": self.reason,
+            "sentence": self.sentence(),
+        }
+
+
+def place(value: complex, step_size: float | None = None) -> str:
+    """Where an eigenvalue [rad/s] is, in words: ``37.4 Hz``, ``no oscillation``."""
+    if not oscillations(np.array([value]))[0]:
+        return "no oscillation"
+    hertz = value.imag / (2 * np.pi)
+    if step_size is not None and hertz > 0.25 / step_size:
+        return f"{hertz:.4g} Hz, or an alias of it, as the step shows no more than {0.5 / step_size:.4g} Hz"
+    return f"{hertz:.4g} Hz"
+
+
+def participants(mode: Mode) -> str:
+    """The states that take part most, with their factors."""
+    return ", ".join(f"{name} {factor:.2f}" for name, factor in mode.participation[:_STATES_NAMED])
+
+
+def whole_spectrum(model: LinearModel) -> Spectrum | None:
+    """All eigenvalues with the rightmost mode, but no other mode; None for a system too large for that."""
+    if len(model.names) > WHOLE:
+        return None
+    if len(model.names) <= _DENSE_VECTORS:
+        return find_spectrum(model, np.inf, np.inf)
+    values = eigenvalues(model)
+    k = index_of_rightmost(values)
+    if k is None:
+        return Spectrum(values, [], None)
+    value, left, right = min(nearest_pairs(model, values[k], 2), key=lambda pair: abs(pair[0] - values[k]))
+    return Spectrum(values, [], make_mode(value, left, right, model.names))
+
+
+def grows(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Which eigenvalues [rad/s] grow, one of each pair, zeros left out."""
+    size = np.abs(values)
+    mask: NDArray[np.bool_] = (values.real > np.maximum(_GROWING, 1e-8 * size)) & (size > ZERO) & (values.imag >= 0)
+    return mask
+
+
+def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> Hidden:
+    """What a frequency range [Hz] does not show of a spectrum."""
+    swinging = values[oscillations(values)]
+    hertz = swinging.imag / (2 * np.pi)
+    outside = swinging[(hertz < lowest_hz) | (hertz > highest_hz)]
+    least = min(outside.tolist(), key=lambda v: -v.real / abs(v), default=None)
+    return Hidden((lowest_hz, highest_hz), len(outside), least)
+
+
+def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearModel | None = None) -> Stability:
+    """The verdict on a step map, or on a continuous model.
+
+    Parameters
+    ----------
+    spectrum
+        All eigenvalues of the model where they are known already.
+    system
+        The continuous model of the same system; None where a component gives no derivatives.
+    """
+    own = _look_at(model, spectrum)
+    if model.step_size is None:
+        return own
+    if system is None:
+        return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
+    continuous = _look_at(system, None)
+    rate = continuous.largest_growth_rate
+    if own.stable is False:
+        return replace(own, cause=_cause(own, rate), continuous_growth_rate=rate)
+    if continuous.stable is False:
+        text = f"the communication step of {model.step_size:g} s hides it: the step map has no growing mode"
+        return replace(continuous, continuous_growth_rate=rate, reason="; ".join(t for t in (own.reason, text) if t))
+    return replace(own, continuous_growth_rate=rate)
+
+
+def _cause(own: Stability, rate: float | None) -> Cause:
+    """Why a step map grows, beside the largest real part [1/s] of the continuous system."""
+    coupled, alone = own.largest_growth_rate or 0.0, rate or 0.0
+    if alone <= _GROWING or coupled > _COUPLING_FACTOR * alone + _COUPLING_RATE:
+        return Cause.COUPLING
+    return Cause.SYSTEM
+
+
+def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
+    """The verdict on one model alone."""
+    spectrum = spectrum or whole_spectrum(model)
+    if spectrum is None:
+        search = find_growing_modes(model)
+        mode = search.modes[0] if search.modes else None
+        n = len(model.names)
+        return Stability(
+            not search.modes, mode, len(search.modes), 0, n, Cause.SYSTEM if mode else None, None, model.step_size,
+            f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
+        )  # fmt: skip
+    growing = int(grows(spectrum.eigenvalues).sum())
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum())
+    cause = Cause.SYSTEM if growing and model.step_size is None else None
+    return Stability(
+        growing == 0, spectrum.rightmost, growing, zeros, len(spectrum.eigenvalues), cause, None, model.step_size
+    )

@@ -1,0 +1,63 @@
+"""The stability verdict in a terminal, and what it does to a command's exit code."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.analysis.stability import Stability
+from orchestrator.study.modes import ModesResult
+
+_COLOURS = {True: "green", False: "red", None: "yellow"}
+
+
+def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
+    """``--fail-unstable``."""
+    parser.add_argument(
+        "--fail-unstable",
+        action="store_true",
+        help="end with exit code 1 unless everything is known to be stable, at any frequency",
+    )
+
+
+def print_stability(
+    console: Console, verdicts: Mapping[str, Stability], outside: Mapping[str, str] | None = None
+) -> None:
+    """The verdict on all, and then on each by its title; what lies outside a frequency range behind it."""
+    for line in stability_lines(verdicts, outside or {}):
+        console.print(line, soft_wrap=True, highlight=False)
+    console.print("")
+
+
+def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str]) -> list[str]:
+    """The lines that `print_stability` prints, as rich markup."""
+    lines = [_headline(verdicts)] if len(verdicts) != 1 else []
+    for title, verdict in verdicts.items():
+        colour = _COLOURS[verdict.stable]
+        word, _, rest = verdict.sentence().partition(":")
+        head = "" if len(verdicts) == 1 else "  "
+        lines.append(f"{head}[bold {colour}]{word}[/]: {escape(title)}:{escape(rest)}")
+        if outside.get(title):
+            lines.append(f"{head}  {escape(outside[title])}")
+    return lines
+
+
+def _headline(verdicts: Mapping[str, Stability]) -> str:
+    """One line on all of them; what is worst comes first."""
+    for wanted, text in ((False, "UNSTABLE"), (None, "stability not known")):
+        found = [title for title, verdict in verdicts.items() if verdict.stable is wanted]
+        if found:
+            return f"[bold {_COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
+    return f"[bold green]stable[/]: all {len(verdicts)}"
+
+
+def print_verdicts(console: Console, results: Sequence[ModesResult]) -> None:
+    """The stability of a case's scenarios."""
+    outside = {r.prepared.title: r.hidden.sentence() for r in results if r.hidden is not None}
+    print_stability(console, {r.prepared.title: r.stability for r in results}, outside)
+
+
+def exit_code(options: argparse.Namespace, verdicts: Sequence[Stability]) -> int:
+    """1 where ``--fail-unstable`` is given and not everything is known to be stable."""
+    return int(options.fail_unstable and not all(verdict.stable for verdict in verdicts))

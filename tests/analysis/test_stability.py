@@ -1,0 +1,138 @@
+"""The verdict over the whole spectrum: growth planted at every frequency, in systems of any size, and its cause."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from orchestrator.analysis import stability
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import find_modes, oscillations
+from orchestrator.analysis.stability import Cause, hidden, judge
+
+STEP = 1e-4
+PLANTED = {0.01: 0.002, 3.0: 0.5, 37.0: 104.0, 900.0: 0.3, 4_999.0: 20.0, 7_300.0: 11.0}
+"""Frequency [Hz] and growth rate [1/s] of what is planted; the last lies beyond half the sampling frequency."""
+
+
+def pair(hertz, rate):
+    omega = 2 * np.pi * hertz
+    return [[rate, omega], [-omega, rate]]
+
+
+def crowd(planted, pairs=70):
+    """A free angle, real poles and many damped oscillations, mixed by a coordinate change, with something planted."""
+    rng = np.random.default_rng(5)
+    hertz = np.geomspace(0.02, 800, pairs)
+    blocks = [pair(f, -0.06 * 2 * np.pi * f) for f in hertz]
+    A = scipy.linalg.block_diag([[0.0]], *blocks, *([[-d]] for d in np.geomspace(0.05, 3e3, 40)), *planted)
+    T = np.eye(len(A)) + 0.02 * rng.standard_normal(A.shape) / math.sqrt(len(A))
+    return T @ A @ np.linalg.inv(T)
+
+
+def model(A, step_size=None):
+    names = tuple(f"device.x{k}" for k in range(len(A)))
+    return LinearModel.from_matrix(A if step_size is None else scipy.linalg.expm(A * step_size), names, step_size)
+
+
+@pytest.mark.parametrize("hertz", PLANTED)
+def test_growth_is_found_at_any_frequency(hertz):
+    verdict = judge(model(crowd([pair(hertz, PLANTED[hertz])]), STEP))
+    assert verdict.stable is False
+    assert verdict.largest_growth_rate == pytest.approx(PLANTED[hertz], rel=1e-4)
+    assert verdict.growing == 1
+    seen = abs(hertz - 1 / STEP) if hertz > 0.5 / STEP else hertz
+    assert verdict.mode.frequency_hz == pytest.approx(seen, rel=1e-6)
+    assert ("alias" in verdict.sentence()) == (seen > 0.25 / STEP)
+    assert verdict.sentence().startswith("UNSTABLE")
+
+
+@pytest.mark.parametrize("rate", [0.02, 5.0, 800.0])
+def test_growth_without_oscillation_is_found(rate):
+    verdict = judge(model(crowd([[[rate]]]), STEP))
+    assert verdict.stable is False
+    assert verdict.largest_growth_rate == pytest.approx(rate, rel=1e-4)
+    assert "no oscillation" in verdict.sentence()
+
+
+def test_several_growing_modes_are_counted_and_the_fastest_is_named():
+    verdict = judge(model(crowd([pair(0.3, 0.1), pair(40.0, 30.0), [[0.5]]]), STEP))
+    assert verdict.growing == 3
+    assert verdict.mode.frequency_hz == pytest.approx(40.0, rel=1e-6)
+    assert "3 modes grow" in verdict.sentence()
+
+
+def test_a_stable_system_is_said_to_be_stable():
+    verdict = judge(model(crowd([]), STEP))
+    assert verdict.stable is True
+    assert verdict.largest_growth_rate == pytest.approx(-0.06 * 2 * np.pi * 0.02, rel=1e-3)
+    assert verdict.zeros == 1
+
+
+def test_a_search_finds_all_that_grows_in_a_system_too_large_for_its_spectrum(monkeypatch):
+    monkeypatch.setattr(stability, "WHOLE", 100)
+    planted = [pair(hertz, rate) for hertz, rate in PLANTED.items()]
+    A = crowd([*planted, [[0.02]], [[5.0]], [[800.0]]])
+    verdict = judge(model(A, STEP))
+    assert verdict.stable is False
+    assert verdict.growing == len(PLANTED) + 3
+    assert verdict.largest_growth_rate == pytest.approx(800.0, rel=1e-4)
+    assert "rad/s were not searched" in verdict.sentence()
+
+
+def test_a_search_finds_nothing_in_a_stable_system_and_says_what_it_did_not_look_at(monkeypatch):
+    monkeypatch.setattr(stability, "WHOLE", 100)
+    verdict = judge(model(crowd([]), STEP))
+    assert verdict.stable is True
+    assert "too large for all 181 eigenvalues" in verdict.sentence()
+    assert "|λ| below 0.0063 rad/s and above 3.14e+04 rad/s were not searched" in verdict.sentence()
+
+
+@pytest.mark.parametrize(("rate", "stable"), [(2e-6, False), (-2e-6, True)])
+def test_either_side_of_the_threshold(rate, stable):
+    assert judge(model(np.array(pair(1.0, rate)))).stable is stable
+
+
+@pytest.mark.parametrize(("size_of_it", "zeros"), [(0.9e-3, 1), (1.1e-3, 0)])
+def test_a_free_angle_is_no_growth(size_of_it, zeros):
+    verdict = judge(model(np.diag([size_of_it, -1.0])))
+    assert verdict.zeros == zeros
+    assert verdict.stable is bool(zeros)
+
+
+def test_the_system_or_the_coupling_is_named():
+    growing, damped = np.array(pair(1.0, 0.2)), np.array(pair(1.0, -0.2))
+    assert judge(model(growing, STEP), system=model(growing)).cause is Cause.SYSTEM
+    verdict = judge(model(growing, STEP), system=model(damped))
+    assert verdict.cause is Cause.COUPLING
+    assert "the coupling (without a communication step: -0.2 1/s)" in verdict.sentence()
+    assert judge(model(np.array(pair(1.0, 50.0)), STEP), system=model(growing)).cause is Cause.COUPLING
+    assert judge(model(growing, STEP)).cause is Cause.UNKNOWN
+
+
+def test_what_the_step_hides_is_said():
+    verdict = judge(model(np.array(pair(1.0, -0.01)), STEP), system=model(np.array(pair(1.0, 0.3))))
+    assert verdict.stable is False
+    assert verdict.largest_growth_rate == pytest.approx(0.3)
+    assert "hides it" in verdict.sentence()
+
+
+def test_modes_outside_a_range_are_counted_and_real_poles_are_none():
+    values = np.linalg.eigvals(scipy.linalg.block_diag(pair(0.05, -0.1), pair(1.0, -0.1), pair(5.0, -0.2), [[-3.0]]))
+    found = hidden(values, 0.1, 2.0)
+    assert found.count == 2
+    assert found.least_damped.imag == pytest.approx(2 * np.pi * 5.0)
+    assert "2 oscillatory modes lie outside 0.1 to 2 Hz; the least damped of them: 5 Hz, 0.64 %" in found.sentence()
+
+
+def test_a_double_real_pole_split_by_rounding_is_no_oscillation():
+    assert oscillations(np.array([-9740 + 21.6j, -9740 - 21.6j, -3.0, 0.5, -10 + 1j, -10 - 1j])).tolist() == [
+        False, False, False, False, True, False,
+    ]  # fmt: skip
+
+
+def test_the_range_does_not_touch_the_verdict():
+    A = crowd([pair(37.0, 104.0)])
+    assert all(mode.damping_ratio > 0 for mode in find_modes(model(A, STEP), 0.1, 2.0))
+    assert judge(model(A, STEP)).stable is False
