@@ -5,12 +5,15 @@ Where an FMU gives directional derivatives, they are the independent way to the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 
+from orchestrator.analysis.derivative_check import check_derivatives
 from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED, Matrix
+from orchestrator.analysis.response_check import ContinuousModel, check_response
 from orchestrator.analysis.state_access import StateAccess
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
@@ -19,6 +22,15 @@ from orchestrator.fmi.linear_model import EmbeddedModel
 
 PERTURBATIONS = (1e-5, 2e-5)
 """Central differences are taken with both, relative to max(1, |value|); they should agree."""
+
+
+class StepMap(NamedTuple):
+    """A, B, C and D of one component over one communication step."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
 
 
 @dataclass(frozen=True)
@@ -39,6 +51,11 @@ class ComponentLinearization:
         Of the continuous model, from the FMU's own derivatives; None where it declares none or they were not asked for.
     disagreement
         Largest difference of an element of A, B, C or D between the two perturbation sizes.
+    source
+        How it was found: ``perturbed``, ``directional``, ``packed`` or ``identified``.
+    variants
+        Other answers to the same question, which should hardly differ: from the other perturbation size, and from
+        perturbing to one side only. None where nothing was perturbed.
     """
 
     name: str
@@ -55,6 +72,8 @@ class ComponentLinearization:
     A_c: Matrix | None
     B_c: Matrix | None
     disagreement: float
+    source: str = PERTURBED
+    variants: tuple[StepMap, ...] = ()
 
 
 def linearize_component(
@@ -80,43 +99,46 @@ def linearize_component(
     component = exchange.component
     StateAccess(component)  # refuses what can be neither perturbed nor looked up
     if (inside := embedded_model(component)) is not None:
-        return _from_inside(exchange, inside, step_size, inputs, observed)
+        return _from_inside(exchange, inside, time, step_size, inputs, observed)
     names = component.description.states
-    rates = [f"der({s})" for s in names] if derivatives else []
-    rates = rates if all(r in component.description.variables for r in rates) else []
+    rates = component.description.rates if derivatives else ()
     n, p = len(names), len(exchange.outputs.names)
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
     # The derivatives need no second size: they are differenced over no step.
-    (after, outputs, slopes), (after_2, outputs_2, _) = (
+    small, large = (
         _differences(component, entries, exits, time, step_size, size, rates if size == PERTURBATIONS[0] else [])
         for size in PERTURBATIONS
     )
-    pairs = ((after, after_2), (outputs, outputs_2))
+
+    def step_map(after: Matrix, outputs: Matrix) -> StepMap:
+        return StepMap(after[:, :n], after[:, n:], outputs[:p, :n], outputs[:p, n:])
+
+    found, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
     return ComponentLinearization(
         component.name,
         names,
         entries,
         exchange.outputs.names,
-        A=after[:, :n],
-        B=after[:, n:],
-        C=outputs[:p, :n],
-        D=outputs[:p, n:],
+        *found,
         observed=tuple(observed),
-        C_o=outputs[p:, :n],
-        D_o=outputs[p:, n:],
-        A_c=slopes[:, :n] if len(rates) == n and derivatives else None,
-        B_c=slopes[:, n:] if len(rates) == n and derivatives else None,
-        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in pairs),
+        C_o=small.outputs[p:, :n],
+        D_o=small.outputs[p:, n:],
+        A_c=small.slopes[:, :n] if len(rates) == n and derivatives else None,
+        B_c=small.slopes[:, n:] if len(rates) == n and derivatives else None,
+        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(found, other, strict=True)),
+        variants=(other, step_map(small.after_up, small.outputs_up)),
     )
 
 
 def linearize_by_derivatives(
-    exchange: Exchange, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
+    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
 ) -> ComponentLinearization:
     """The same from the FMU's own directional derivatives, without a perturbation and without a step.
 
     The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
+    The derivatives are compared with differences of the FMU's own variables, or where its states cannot be set with
+    its response to small steps of its inputs.
 
     Parameters
     ----------
@@ -126,11 +148,11 @@ def linearize_by_derivatives(
     Raises
     ------
     AnalysisError
-        If the FMU gives no directional derivatives, or none of its states.
+        If the FMU gives no directional derivatives, or wrong ones.
     """
     component = exchange.component
     states = component.description.states
-    rates = [f"der({s})" for s in states]
+    rates = component.description.rates
     if not component.description.gives_directional_derivatives:
         raise AnalysisError(
             f"component {component.name!r}: its FMU gives no directional derivatives; native FMUs do (--native), "
@@ -138,15 +160,26 @@ def linearize_by_derivatives(
         )
     n = len(states)
     entries = (*exchange.inputs.names, *inputs)
-    whole = component.jacobian([*rates, *exchange.outputs.names, *observed], [*states, *entries])
+    exits = (*exchange.outputs.names, *observed)
+    whole = component.jacobian([*rates, *exits], [*states, *entries])
     blocks = whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
-    return _over_step(exchange, step_size, states, entries, observed, *blocks)
+    if component.description.states_are_settable:
+        check_derivatives(component, whole, (*rates, *exits), (*states, *entries))
+    else:
+        model = ContinuousModel(states, rates, entries, exits, *blocks)
+        check_response(component, model, "what its FMU gives as directional derivatives", time, step_size)
+    return _over_step(exchange, step_size, DIRECTIONAL, states, entries, observed, *blocks)
 
 
 def _from_inside(
-    exchange: Exchange, model: EmbeddedModel, step_size: float, inputs: Sequence[str], observed: Sequence[str]
+    exchange: Exchange,
+    model: EmbeddedModel,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str],
+    observed: Sequence[str],
 ) -> ComponentLinearization:
-    """The model inside an FMU, taken over one communication step with its inputs held."""
+    """The model inside an FMU, compared with the FMU and taken over one communication step with its inputs held."""
     component = exchange.component
     check_operating_point(component, model)
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
@@ -159,12 +192,16 @@ def _from_inside(
     columns = [list(model.inputs).index(v) for v in entries]
     rows = [list(model.outputs).index(v) for v in exits]
     blocks = model.A, model.B[:, columns], model.C[rows], model.D[np.ix_(rows, columns)]
-    return _over_step(exchange, step_size, tuple(model.states), entries, observed, *blocks)
+    states, rates = component.description.states, component.description.rates
+    compared = ContinuousModel(states, rates, entries, exits, *blocks)
+    check_response(component, compared, "the linear model inside its FMU", time, step_size)
+    return _over_step(exchange, step_size, PACKED, states, entries, observed, *blocks)
 
 
 def _over_step(
     exchange: Exchange,
     step_size: float,
+    source: str,
     states: tuple[str, ...],
     entries: tuple[str, ...],
     observed: Sequence[str],
@@ -191,7 +228,18 @@ def _over_step(
         A_c=A_c,
         B_c=B_c,
         disagreement=0.0,
+        source=source,
     )
+
+
+class _Differences(NamedTuple):
+    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input; ``_up`` from the perturbation upwards only."""
+
+    after: Matrix
+    outputs: Matrix
+    slopes: Matrix
+    after_up: Matrix
+    outputs_up: Matrix
 
 
 def _differences(
@@ -202,15 +250,19 @@ def _differences(
     step_size: float,
     size: float,
     rates: Sequence[str],
-) -> tuple[Matrix, Matrix, Matrix]:
-    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input."""
+) -> _Differences:
     names = (*component.description.states, *inputs)
     z_0 = RealBatch(component, names).read().copy()
     perturbed = [RealBatch(component, [name]) for name in names]
     after, outputs, slopes = (RealBatch(component, group) for group in (component.description.states, exits, rates))
     columns = tuple(np.zeros((len(z_0), len(batch.names))) for batch in (after, outputs, slopes))
+    upwards = tuple(np.zeros_like(column) for column in columns[:2])
     saved = component.save_state()
     try:
+        outputs_0 = outputs.read().copy()
+        component.step(time, step_size)
+        after_0 = after.read().copy()
+        component.restore_state(saved)
         for k, value in enumerate(z_0):
             step = size * max(1.0, abs(value))
             for sign in (+1.0, -1.0):
@@ -220,11 +272,14 @@ def _differences(
                     column[k] += sign * batch.read()
                 component.step(time, step_size)
                 columns[0][k] += sign * after.read()
+                if sign > 0:
+                    upwards[0][k], upwards[1][k] = after.values - after_0, outputs.values - outputs_0
                 component.restore_state(saved)
             for column in columns:
                 column[k] /= 2 * step
+            for column in upwards:
+                column[k] /= step
     finally:
         component.restore_state(saved)
         component.free_state(saved)
-    after_columns, output_columns, slope_columns = (column.T for column in columns)
-    return after_columns, output_columns, slope_columns
+    return _Differences(*(column.T for column in (*columns, *upwards)))

@@ -5,8 +5,8 @@ their way between components. The matrix A = F + G·(I − K)⁻¹·H that this 
 the equations are not, which is what a search for a few eigenvalues of a large system lives on.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self
 
@@ -19,6 +19,10 @@ Matrix = NDArray[np.float64]
 Vector = NDArray[Any]
 
 HELD = " (held)"
+
+PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
+"""How the linear model of a component was found: by perturbing its running FMU, from the FMU's own directional
+derivatives, taken from the file of the FMU, or fitted to what was measured at its inputs and outputs."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,8 @@ class LinearModel:
         Communication step [s]; None for a continuous model, whose A is in 1/s.
     disagreement
         Largest difference between the two perturbation sizes, in elements of the components' matrices.
+    sources
+        How the linear model of every component was found.
     """
 
     F: sp.csr_array
@@ -52,6 +58,7 @@ class LinearModel:
     names: tuple[str, ...]
     step_size: float | None
     disagreement: float
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:

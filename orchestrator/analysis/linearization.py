@@ -68,7 +68,7 @@ class Blocks:
         self.components = {
             name: known.get(name)
             or (
-                linearize_by_derivatives(exchange, self.step_size, driven[name], observed[name])
+                linearize_by_derivatives(exchange, master.time, self.step_size, driven[name], observed[name])
                 if directional
                 else linearize_component(
                     exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
@@ -91,6 +91,11 @@ class Blocks:
         for name, exchange in master.exchanges.items():
             self.window[name] = slice(first, first + len(exchange.outputs.names))
             first += len(exchange.outputs.names)
+
+    @property
+    def how(self) -> dict[str, str]:
+        """How the linear model of every component was found."""
+        return {name: c.source for name, c in self.components.items()}
 
     @property
     def disagreement(self) -> float:
@@ -156,7 +161,7 @@ def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
     for k, i in enumerate(memory):
         equations.next_state(slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1))
     all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in memory))
-    return equations.model(all_names, blocks.step_size, blocks.disagreement)
+    return equations.model(blocks, all_names, blocks.step_size)
 
 
 def continuous(blocks: Blocks) -> LinearModel:
@@ -180,7 +185,7 @@ def continuous(blocks: Blocks) -> LinearModel:
             equations.next_state(windows[name], windows[name], c.A_c, blocks.sources[name], c.B_c)
         own = np.arange(len(blocks.output_names))[blocks.window[name]]
         equations.output(own, windows[name], c.C, blocks.sources[name], c.D)
-    return equations.model(names, None, blocks.disagreement)
+    return equations.model(blocks, names, None)
 
 
 def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
@@ -231,9 +236,9 @@ class _Equations:
         i, k = np.nonzero(block)
         self._parts[name].append((rows[i], columns[k], block[i, k]))
 
-    def model(self, names: Iterable[str], step_size: float | None, disagreement: float) -> LinearModel:
+    def model(self, blocks: Blocks, names: Iterable[str], step_size: float | None) -> LinearModel:
         F, G, H, K = (self._matrix(name) for name in self._shapes)
-        return LinearModel(F, G, H, K, tuple(names), step_size, disagreement)
+        return LinearModel(F, G, H, K, tuple(names), step_size, blocks.disagreement, blocks.how)
 
     def _matrix(self, name: str) -> sp.csr_array:
         rows, columns, values = (np.concatenate(part) for part in zip(*self._parts[name], strict=True))

@@ -5,6 +5,11 @@ from orchestrator.analysis.linear_model import Matrix
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 
+_MEASURE = (
+    "`gfor modes CASE --black-box` identifies it from its inputs and outputs, and `gfor black-box CASE --component {}` "
+    "shows that in detail"
+)
+
 
 def obstacle(component: Component) -> str | None:
     """Why a component can neither be perturbed and put back, nor has a linear model inside; None where it can."""
@@ -12,14 +17,15 @@ def obstacle(component: Component) -> str | None:
     if not description.can_save_state:
         return (
             f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-            "so it cannot be perturbed and put back; ask for an export that can"
+            f"so it cannot be perturbed and put back; {_MEASURE.format(component.name)}, or ask for an export that can"
         )
     # An FMU may also hide its states: taken for one without any, it would give wrong modes.
     if not description.states_are_settable and embedded_model(component) is None:
         return (
             f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
-            "linearisation by perturbation needs, and has no linear model inside; our FMUs declare the one under "
-            "VendorAnnotations, and `gfor build --with-linear-model` packs the other"
+            "linearisation by perturbation needs, and has no linear model inside; "
+            f"{_MEASURE.format(component.name)}. (An FMU declares settable states under VendorAnnotations, as "
+            "fmus/toolchain/README.md has it; `gfor build --with-linear-model` packs a model of ours)"
         )
     return None
 

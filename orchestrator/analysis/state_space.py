@@ -1,6 +1,7 @@
 """The linear model with inputs and outputs: what a disturbance does, and what other tools can import."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ class StateSpace:
         Names ``component.variable``; among the states may be ``component.output (held)``.
     step_size
         Communication step [s]; None for a continuous model, ẋ for x⁺.
+    sources
+        How the linear model of every component was found.
     """
 
     A: Matrix
@@ -36,6 +39,7 @@ class StateSpace:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     step_size: float | None
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def step_response(self, change: Matrix, times: Matrix) -> Matrix:
         """Outputs after a step of the inputs at t = 0.
@@ -115,4 +119,5 @@ def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
         C[rows] = c.D_o @ by_state[w]
         C[rows, windows[name]] += c.C_o
         D[rows] = c.D_o @ by_input[w]
-    return StateSpace(model.A, model.G @ by_input, C, D, model.names, blocks.inputs, blocks.outputs, model.step_size)
+    names = (model.names, blocks.inputs, blocks.outputs)
+    return StateSpace(model.A, model.G @ by_input, C, D, *names, model.step_size, model.sources)

@@ -18,6 +18,9 @@ from orchestrator.errors import AnalysisError
 _SHIFT = 1e-7
 """Far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode."""
 
+_SHORT = 1e-4
+"""Over steps shorter than this [s] what may change is judged per second."""
+
 
 @dataclass(frozen=True)
 class OperatingPoint:
@@ -54,7 +57,8 @@ def find_operating_point(
     master
         Initialised; it is left at the operating point.
     tolerance
-        Largest accepted change of a state over one communication step.
+        Largest accepted change of a state over one communication step of 100 µs or more; over a shorter one,
+        accordingly less.
     accept
         Below this nothing is solved for; between the two a better point is looked for and kept if it is one.
     max_iterations
@@ -80,6 +84,7 @@ def find_operating_point(
         x, change, residual = candidate, new_change, _largest(new_change)
         iterations += 1
     names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
+    tolerance *= min(1.0, master.clock.step_size / _SHORT)  # however short the step is, the same drift counts
     if not residual <= tolerance:
         worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
         raise AnalysisError(

@@ -5,24 +5,33 @@ communication step is fitted to it. All other components are perturbed where the
 always; the box's states in it are those of the fitted model and mean nothing one by one, only together.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
-from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
+from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.state_access import StateAccess, obstacle
+from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component
+from orchestrator.study.modes import ModesResult, modes_from, modes_of
 
 STEADY = 1e-6
-"""Largest change of a state or of the box's current in one communication step that passes for a steady state."""
+"""Largest difference of the box's current [pu] at the ideal bus from the power flow's."""
+
+STILL = 1e-9
+"""Largest change of a known component's state in one communication step, as where all components are known."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +45,8 @@ class BoxedSystem:
     residual
         Largest change of a known component's state in one communication step, and of the box's current between what
         it starts with and what it settles to at the ideal bus.
+    warnings
+        Why the modes from 0.1 to 2 Hz are in doubt, as far as the other components are the reason.
     """
 
     component: str
@@ -43,6 +54,7 @@ class BoxedSystem:
     identified: IdentifiedModel
     model: LinearModel
     residual: float
+    warnings: tuple[str, ...] = ()
 
     def modes(self, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
         """Modes of a range of frequencies, least damped first."""
@@ -91,7 +103,50 @@ def linearize_with_box(
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
-    exchange, plan = master.exchanges[component], master.system.components[component]
+    residual = _check_still(master, [component])
+    response, moved = _respond(master, component, excitation or Excitation(), restore=restore)
+    identified = fit(response)
+    blocks = Blocks(master, known={component: _as_component(component, identified)})
+    model = compose(blocks, master.schedule)
+    doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
+    return BoxedSystem(
+        component, response, identified, model, max(moved, residual), tuple(str(doubt) for doubt in doubtful)
+    )
+
+
+def modes_with_boxes(
+    case: Case,
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    excitation: Excitation | None = None,
+) -> ModesResult:
+    """As `modes_of`, but what hides its states is identified; nothing is, where all components show theirs.
+
+    Raises
+    ------
+    AnalysisError
+        As `linearize_with_box`.
+    """
+    boxes = [name for name, component in master.components.items() if is_black_box(component)]
+    if not boxes:
+        return modes_of(case, prepared, master, frequency_range, critical)
+    residual = _check_still(master, boxes)
+    known = {}
+    for name in boxes:
+        response, moved = _respond(master, name, excitation or Excitation())
+        known[name] = _as_component(name, fit(response))
+        residual = max(residual, moved)
+    point = OperatingPoint(residual, residual / master.clock.step_size, residual, 0, {})
+    return modes_from(case, prepared, master, point, Blocks(master, known=known), frequency_range, critical)
+
+
+def _respond(
+    master: Master, name: str, excitation: Excitation, *, restore: bool | None = None
+) -> tuple[FrequencyResponse, float]:
+    """Measure one component at an ideal bus; how far its current moves there from the power flow's, as well."""
+    exchange, plan = master.exchanges[name], master.system.components[name]
     bench = Bench(
         plan.description,
         plan.parameters,
@@ -103,18 +158,30 @@ def linearize_with_box(
         restore=restore,
         isolated=plan.isolated,
     )
-    response = measure(bench, excitation or Excitation())
+    response = measure(bench, excitation)
     moved = float(np.abs(response.operating_point - exchange.outputs.values).max())
-    residual = max(moved, *(_movement(master, name) for name in master.components if name != component))
-    if residual > STEADY:
+    if not moved <= STEADY:
         raise AnalysisError(
-            f"no steady state: from the power flow's start, {component!r} alone moves its current by {moved:.3g} pu, "
-            f"and the other components' states move by up to {residual:.3g} in a step; check that {component!r} "
-            "starts at the P_0, Q_0, v_0 and theta_0 that it is given"
+            f"no steady state: alone at an ideal bus, component {name!r} moves its current by {moved:.3g} pu from the "
+            f"power flow's, where {STEADY:g} is allowed; check that it starts at the P_0, Q_0, v_0 and theta_0 that it "
+            "is given"
         )
-    identified = fit(response)
-    blocks = Blocks(master, known={component: _as_component(component, identified)})
-    return BoxedSystem(component, response, identified, compose(blocks, master.schedule), residual)
+    return response, moved
+
+
+def _check_still(master: Master, boxes: Sequence[str]) -> float:
+    """Largest change of a state that is known in one communication step; nothing can be solved for beside a box."""
+    moves = {name: _movement(master, name) for name in master.components if name not in boxes}
+    worst = max(moves, key=lambda name: moves[name], default=None)
+    if worst is None:
+        return 0.0
+    if not moves[worst] <= STILL:
+        raise AnalysisError(
+            f"no steady state: from the power flow's start, a communication step changes a state of component "
+            f"{worst!r} by {moves[worst]:.3g}, where {STILL:g} is allowed; check its start values, and that generation "
+            "and load balance at rated frequency"
+        )
+    return moves[worst]
 
 
 def _movement(master: Master, name: str) -> float:
@@ -136,5 +203,5 @@ def _as_component(name: str, model: IdentifiedModel) -> ComponentLinearization:
     none = np.zeros((0, n)), np.zeros((0, len(model.inputs)))
     return ComponentLinearization(
         name, tuple(f"identified.{k + 1}" for k in range(n)), model.inputs, model.outputs, model.A, model.B, model.C,
-        model.D, (), *none, None, None, model.error,
+        model.D, (), *none, None, None, model.error, IDENTIFIED,
     )  # fmt: skip

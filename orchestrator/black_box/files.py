@@ -9,6 +9,7 @@ import numpy as np
 import scipy.io
 from matplotlib.figure import Figure
 
+from orchestrator.analysis.linear_model import IDENTIFIED
 from orchestrator.black_box.fitting import IdentifiedModel
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.black_box.passivity import Passivity
@@ -37,6 +38,7 @@ def identification_json(response: FrequencyResponse, model: IdentifiedModel, pas
     slowest_first = sorted(model.poles.tolist(), key=abs)
     return {
         "method": response.method,
+        "linearised": IDENTIFIED,
         "step_size_s": response.step_size,
         "simulated_s": response.seconds,
         "lines": len(response.frequencies),

@@ -36,6 +36,8 @@ def certification_json(c: Certification) -> dict[str, Any]:
         "values": dict(c.request.values),
         "pod": c.pod,
         "signal": c.signal,
+        "linearised": c.linearised,
+        "fit_errors": c.fit_errors,
         "passed": c.passed,
         "sentence": c.sentence(),
         "points": [_point_json(c, v) for v in c.verdicts],

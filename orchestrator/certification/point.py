@@ -74,6 +74,10 @@ class PointResult:
         Of the steady state.
     identified
         Order of the model that stands for the converter in the modes; None where its own states do.
+    linearised
+        How the linear model of every component was found: perturbed, directional, packed or identified.
+    fit_errors
+        Of the components that were identified: largest relative difference of model and measured response.
     signals
         By name, each of the shape of ``times``.
     failure
@@ -87,6 +91,8 @@ class PointResult:
     growth: float = float("nan")
     residual: float = float("nan")
     identified: int | None = None
+    linearised: dict[str, str] = field(default_factory=dict)
+    fit_errors: dict[str, float] = field(default_factory=dict)
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -152,6 +158,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
         if converter is not None and (task.black_box or is_black_box(converter)):
             boxed = linearize_with_box(master, CONVERTER)
             result.residual, result.identified = boxed.residual, len(boxed.identified.A)
+            result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
             _keep_modes(result, boxed.model)
         else:
             found = modes_of(case, prepared, master, COMPUTED)
@@ -167,6 +174,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
 def _keep_modes(result: PointResult, model: LinearModel) -> None:
     spectrum = find_spectrum(model, *COMPUTED)
     result.modes = ModeSet.of(spectrum.modes, model.names)
+    result.linearised = dict(model.sources)
     result.components = [_in_words(mode) for mode in spectrum.modes]
     result.growth = spectrum.growth_rate
 

@@ -14,6 +14,7 @@ from orchestrator.certification.study import WITH, WITHOUT, Certification, Point
 from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
+from orchestrator.report.linearised import exceptions_in_words
 
 _SHOWN = 30.0
 """Part of the response that is drawn, from the event on [s]; all of it is judged."""
@@ -66,6 +67,8 @@ def _tested(c: Certification) -> str:
     orders = [str(p.identified) for p in c.points.values() if p.identified is not None]
     if orders:
         given["In the modes"] = f"a model identified at its port, of order {', '.join(dict.fromkeys(orders))}"
+    all_perturbed = "all by perturbing the running FMUs" if c.linearised else "not recorded"
+    given["Linear models"] = exceptions_in_words(c.linearised, c.fit_errors) or all_perturbed
     rows = [[escape(name), escape(str(value))] for name, value in given.items()]
     return table("The converter", ["", ""], rows, left=2) + texts.STUDY
 

@@ -137,6 +137,21 @@ class Certification:
         return bool(self.verdicts) and all(v.accepted for v in self.verdicts)
 
     @property
+    def linearised(self) -> dict[str, str]:
+        """How the linear model of every component was found at the points with the converter."""
+        having = [point for (name, _), point in self.points.items() if name == WITH]
+        return {component: how for point in having for component, how in point.linearised.items()}
+
+    @property
+    def fit_errors(self) -> dict[str, float]:
+        """Largest of all points, of the components that were identified."""
+        found: dict[str, float] = {}
+        for point in self.points.values():
+            for component, error in point.fit_errors.items():
+                found[component] = max(error, found.get(component, 0.0))
+        return found
+
+    @property
     def signal(self) -> str:
         """What the time-domain criterion watches."""
         return watched(self.pod)

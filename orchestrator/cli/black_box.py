@@ -20,7 +20,7 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.terminal import made_folder, make_console, make_errors
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.study.modes import modes_of, running
@@ -57,6 +57,8 @@ def run(options: argparse.Namespace) -> int:
         verdicts[prepared.title] = judge(system.model)
         passive = passivity(system.response)
         save_identification(system.response, system.identified, passive, folder / prepared.name)
+        for text in system.warnings:
+            make_errors().print(f"[bold yellow]warning:[/bold yellow] scenario {prepared.name!r}: {escape(text)}")
         if options.json:
             output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
         else:
@@ -102,5 +104,6 @@ def _system_json(
     return {"scenario": name, "component": system.component, "residual": system.residual,
             "stable": stability.stable, "largest_growth_rate": stability.largest_growth_rate,
             "stability": stability.as_json(),
+            "linearised": dict(system.model.sources), "warnings": list(system.warnings),
             "identification": identification_json(system.response, system.identified, passive),
             "modes": [figures(m) for m in system.modes()], "white_box_modes": [figures(m) for m in white]}  # fmt: skip

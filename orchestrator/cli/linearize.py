@@ -8,6 +8,7 @@ from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linear_model_files import save_linear_model
+from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
 
 
@@ -47,6 +48,8 @@ def run(options: argparse.Namespace) -> int:
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         lines.append(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
+        if exceptions := exceptions_in_words(model.sources):
+            lines.append(exceptions)
     print_stability(make_console(), verdicts)
     print("\n".join(lines))
     return exit_code(options, list(verdicts.values()))

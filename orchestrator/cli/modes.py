@@ -4,13 +4,15 @@ import argparse
 import json
 from pathlib import Path
 
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_warnings
+from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_sources, print_warnings
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.report import tables
-from orchestrator.study.modes import compute_modes, modes_json
+from orchestrator.study.modes import ModesResult, compute_modes, modes_json, running
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
+    parser.add_argument(
+        "--black-box",
+        action="store_true",
+        help="identify the components that hide their states from their inputs and outputs",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     parser.add_argument("--json", action="store_true", help="print JSON")
     add_verdict_argument(parser)
@@ -47,10 +54,7 @@ def run(options: argparse.Namespace) -> int:
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = made_folder(options.out) if options.out else None
-    results = [
-        compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
-        for prepared in scenarios
-    ]
+    results = [_modes(case, prepared, options) for prepared in scenarios]
     written = []
     if folder:
         from orchestrator.report.study_files import save_modes  # noqa: PLC0415 - plots: a second to import
@@ -65,7 +69,19 @@ def run(options: argparse.Namespace) -> int:
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, case, results)
+    print_sources(console, results)
     if folder:
         console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
     print_warnings(results)
     return exit_code(options, [r.stability for r in results])
+
+
+def _modes(case: Case, prepared: PreparedScenario, options: argparse.Namespace) -> ModesResult:
+    if not options.black_box:
+        return compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+    from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - fitting: a second to import
+
+    if options.directional:
+        raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
+    with running(prepared) as master:
+        return modes_with_boxes(case, prepared, master, options.range, options.critical)

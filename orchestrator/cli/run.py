@@ -18,6 +18,7 @@ from orchestrator.cli.terminal import (
     make_console,
     make_errors,
     print_named_modes,
+    print_sources,
     print_warnings,
     progress_bar,
 )
@@ -95,6 +96,7 @@ def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
     print_verdicts(console, modes)
     console.print(tables.steady_states(modes), "")
     print_named_modes(console, case, modes)
+    print_sources(console, modes)
     if any(r.ring_down for r in results):
         console.print("", tables.ring_downs(results))
     if any(r.shifts for r in results):

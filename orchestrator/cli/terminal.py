@@ -11,6 +11,7 @@ from rich.progress import Progress as ProgressBar
 
 from orchestrator.errors import InputError
 from orchestrator.report import tables
+from orchestrator.report.linearised import exceptions_in_words
 
 if TYPE_CHECKING:
     from orchestrator.cases.case import Case
@@ -48,6 +49,15 @@ def print_named_modes(console: Console, case: "Case", results: "Sequence[ModesRe
             console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
     if any(r.swing and (r.named or r.modes) for r in results):
         console.print("", tables.mode_shapes(results), "")
+
+
+def print_sources(console: Console, results: "Sequence[ModesResult]") -> None:
+    """Which linear models do not come from perturbing the running FMUs; nothing where all do."""
+    said = {r.prepared.title: text for r in results if (text := exceptions_in_words(r.linearised, r.fit_errors))}
+    if len(set(said.values())) == 1 and len(said) == len(results):
+        said = {"": next(iter(said.values()))}
+    for title, text in said.items():
+        console.print(f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False)
 
 
 def print_warnings(results: "Sequence[ModesResult]") -> None:

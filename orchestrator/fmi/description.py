@@ -65,6 +65,8 @@ class FmuDescription:
         By name.
     states
         Names of the continuous states, in the order of ``ModelStructure/Derivatives``.
+    rates
+        Names of their derivatives, in the same order.
     states_are_settable
         Whether the FMU declares that a master may set its states at communication points. That is
         an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
@@ -104,6 +106,7 @@ class FmuDescription:
     needs_tool: bool = False
     stop_time: float | None = None
     fmi_version: str = "2.0"
+    rates: tuple[str, ...] = ()
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -218,6 +221,7 @@ def _describe(
         units=_units(root),
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
         fmi_version=version,
+        rates=tuple(unknown.variable.name for unknown in md.derivatives),
     )
 
 

@@ -141,6 +141,7 @@ class BoundDescription(FmuDescription):
         shared |= {
             "variables": variables,
             "states": tuple(renamed.get(s, s) for s in native.states) if set(native.states) <= set(renamed) else (),
+            "rates": tuple(renamed.get(s, s) for s in native.rates) if set(native.rates) <= set(renamed) else (),
             "output_dependencies": _dependencies(native, port, renamed),
             "gives_directional_derivatives": False,  # they are the FMU's own variables', not the port's
         }

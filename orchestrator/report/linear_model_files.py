@@ -36,7 +36,7 @@ def save_linear_model(
             "step_size": model.step_size or 0.0,  # as MATLAB's ss: 0 is continuous
             "operating_point": np.array(operating_point).reshape(-1, 1),
             "stability": json.dumps(stability.as_json()),
-            "provenance": json.dumps(provenance(case, prepared)),
+            "provenance": json.dumps({**provenance(case, prepared), "linearised": dict(model.sources)}),
         },
     )
     entries = {

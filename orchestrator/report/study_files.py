@@ -165,6 +165,8 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
         "schedule": modes.prepared.schedule.name,
         "events": [str(event) for event in modes.prepared.events],
         "power_flow": _power_flow(modes.prepared),
+        "linearised": modes.linearised,
+        "fit_errors": modes.fit_errors,
         "warnings": list(modes.warnings),
         "failure": str(result.failure) if result.failure else None,
     }

@@ -33,7 +33,7 @@ def component_model(case: str, prepared: PreparedScenario, name: str) -> Embedde
         exact = plan.description.gives_directional_derivatives
         with as_if_told(master, 0.0):
             c = (
-                linearize_by_derivatives(exchange, prepared.step_size, open_inputs, outputs)
+                linearize_by_derivatives(exchange, master.time, prepared.step_size, open_inputs, outputs)
                 if exact
                 else linearize_component(
                     exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True

@@ -4,13 +4,14 @@ import fnmatch
 import math
 from cmath import phase
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.critical_modes import find_critical_modes
-from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
+from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed, oscillations
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
@@ -47,6 +48,8 @@ class ModesResult:
         The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
     system
         The continuous model, without a communication step; None where a component gives no derivatives.
+    fit_errors
+        Of the components that were identified: largest relative difference of model and measured response.
     """
 
     prepared: PreparedScenario
@@ -61,6 +64,7 @@ class ModesResult:
     stability: Stability
     hidden: Hidden | None
     system: LinearModel | None
+    fit_errors: dict[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -74,6 +78,11 @@ class ModesResult:
     def electromechanical(self) -> Mode | None:
         """The first of the named modes."""
         return next(iter(self.named.values()), None)
+
+    @property
+    def linearised(self) -> dict[str, str]:
+        """How the linear model of every component was found: perturbed, directional, packed or identified."""
+        return dict(self.model.sources)
 
     def name_of(self, mode: Mode) -> str | None:
         """Name of a mode, if it has one."""
@@ -131,7 +140,21 @@ def modes_of(
     point = find_operating_point(master)
     step_aware = any(told_parameters(master, name) for name in master.components)
     blocks = Blocks(master, derivatives=not step_aware, directional=directional)
+    return modes_from(case, prepared, master, point, blocks, frequency_range, critical)
+
+
+def modes_from(
+    case: Case,
+    prepared: PreparedScenario,
+    master: Master,
+    point: OperatingPoint,
+    blocks: Blocks,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+) -> ModesResult:
+    """The modes of components that were linearised at an operating point."""
     model = compose(blocks, master.schedule)
+    step_aware = any(told_parameters(master, name) for name in master.components)
     system = continuous_model(master, None if step_aware else blocks)
     low, high = frequency_range
     if critical is None:
@@ -153,12 +176,13 @@ def modes_of(
         modes=[mode for mode in shown if oscillations(np.array([mode.eigenvalue]))[0]],
         named=named,
         references=_references(case, prepared),
-        warnings=_warnings(stability),
+        warnings=(*_warnings(stability), *map(str, doubts(blocks, master.schedule, model, shown))),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
         stability=stability,
         hidden=None if spectrum is None else hidden(spectrum.eigenvalues, low, high),
         system=system,
+        fit_errors={name: c.disagreement for name, c in blocks.components.items() if c.source == IDENTIFIED},
     )
 
 
@@ -251,6 +275,8 @@ def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> 
                 "largest_growth_rate": r.stability.largest_growth_rate,
                 "stability": r.stability.as_json(),
                 "outside_range": None if r.hidden is None else r.hidden.as_json(),
+                "linearised": r.linearised,
+                "fit_errors": r.fit_errors,
                 "warnings": list(r.warnings),
                 "modes": [
                     {

@@ -64,6 +64,8 @@ class PointRecord:
         Whether the same would come out again: not so where a worker, the machine or an FMU was at fault.
     residual
         Of the steady state, as in `OperatingPoint`.
+    linearised
+        How the linear model of every component was found.
     stability
         The verdict over the whole spectrum, as `Stability.as_json` gives it; empty where the point failed.
     """
@@ -74,6 +76,7 @@ class PointRecord:
     lasting: bool = True
     residual: float = float("nan")
     warnings: tuple[str, ...] = ()
+    linearised: dict[str, str] = field(default_factory=dict)
     stability: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -162,5 +165,6 @@ def _record(result: ModesResult) -> PointRecord:
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
         residual=result.operating_point.residual,
         warnings=result.warnings,
+        linearised=result.linearised,
         stability=result.stability.as_json(),
     )

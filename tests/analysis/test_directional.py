@@ -1,14 +1,25 @@
 """Native FMUs: modes by perturbation against modes from the FMUs' own directional derivatives."""
 
+import zipfile
+
+import casadi as ca
 import numpy as np
 import pytest
 
+from fmus.toolchain import native_source
+from fmus.toolchain.compiler import host_platform
+from fmus.toolchain.native_fmu import export_native
+from orchestrator.analysis.component_linearization import linearize_by_derivatives
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import eigenvalues
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.schedule import gauss_seidel
+from orchestrator.coupling.system import System
 from orchestrator.errors import AnalysisError
+from orchestrator.fmi.description import read_description
 from orchestrator.study.modes import compute_modes
+from tests.coupling import small_fmus
 
 
 @pytest.fixture(params=["base", "pod_pq"])
@@ -54,3 +65,67 @@ def test_a_kind_without_derivatives_is_refused_with_the_remedy():
         pytest.raises(AnalysisError, match=r"component 'sg2'.*no directional derivatives.*--native"),
     ):
         Blocks(master, directional=True)
+
+
+# -- derivatives that are wrong --------------------------------------------------------------------
+
+
+def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, settable=True):
+    """A native lag whose directional derivatives along its state and its input are scaled; all else is right."""
+    model = small_fmus.lag()
+    right = native_source.derivative_functions
+
+    def wrong(of):
+        functions = right(of)
+        known = [ca.SX.sym(f"k{i}", *functions["direction"].size_in(i)) for i in range(functions["direction"].n_in())]
+        scaled = list(known)
+        scaled[4], scaled[5] = state * known[4], entry * known[5]  # x, u, p, c, then the same as directions
+        return functions | {"direction": ca.Function("direction", known, functions["direction"].call(scaled))}
+
+    monkeypatch.setattr(native_source, "derivative_functions", wrong)
+    path = export_native(model, folder / "made", (host_platform(),))
+    if not settable:
+        closed = folder / "closed.fmu"
+        with zipfile.ZipFile(path) as old, zipfile.ZipFile(closed, "w") as new:
+            for name in old.namelist():
+                new.writestr(name, old.read(name).replace(b'settable="true"', b'settable="false"')
+                             if name == "modelDescription.xml" else old.read(name))  # fmt: skip
+        path = closed
+    system = System()
+    system.add("lag", read_description(path), {"T": 0.5})
+    system.add("source", small_fmus.small_fmu("integrator"), {"gain": -1.0})
+    system.connect("lag.y", "source.u")
+    system.connect("source.y", "lag.u")
+    return Master(system, gauss_seidel((("lag",), ("source",))), 1e-3)
+
+
+def by_derivatives(master):
+    return linearize_by_derivatives(master.exchanges["lag"], master.time, 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("state", "entry", "of", "n"), [(-1.0, 1.0, "x", 2), (1.001, 1.0, "x", 2), (1.0, 1.01, "u", 1)]
+)
+def test_wrong_derivatives_are_refused_with_their_name(tmp_path, monkeypatch, state, entry, of, n):
+    with (
+        lag_with_wrong_derivatives(tmp_path, monkeypatch, state, entry) as master,
+        pytest.raises(AnalysisError, match=rf"component 'lag'.*wrong in {n} of 4.*(der\(x\)|y) by {of} is given as"),
+    ):
+        by_derivatives(master)
+
+
+@pytest.mark.parametrize("state", [1.0, -1.0])
+def test_where_states_cannot_be_set_the_response_tells(tmp_path, monkeypatch, state):
+    with lag_with_wrong_derivatives(tmp_path, monkeypatch, state, settable=False) as master:
+        if state == 1.0:
+            found = by_derivatives(master)
+            assert found.source == "directional"
+            assert found.A[0, 0] == pytest.approx(np.exp(-1e-3 / 0.5), rel=1e-12)
+        else:
+            with pytest.raises(AnalysisError, match="directional derivatives is not what the FMU does"):
+                by_derivatives(master)
+
+
+def test_directional_derivatives_are_said_to_be_the_source(prepared):
+    result = compute_modes(load_case("two_area"), prepared, directional=True)
+    assert set(result.linearised.values()) == {"directional"}

@@ -243,6 +243,7 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
     content = json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))
     (verdict,) = content["points"]
     assert content["passed"]
+    assert set(content["linearised"].values()) == {"perturbed"}
     assert content["pod"] == "p"
     assert content["signal"] == FREQUENCY
     values = {"converter.pod_p.enabled": True}
@@ -253,7 +254,14 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
     base = verdict["time_without"]["modal"]["modes"][0]
     assert base["damping_percent"] > 5
     page = (tmp_path / "certificate.html").read_text(encoding="utf-8")
-    for text in ("Damping test of", "Eigenvalue criterion", "the frequency at bus 2", "Left out: the", "Guid"):
+    for text in (
+        "all by perturbing the running FMUs",
+        "Damping test of",
+        "Eigenvalue criterion",
+        "the frequency at bus 2",
+        "Left out: the",
+        "Guid",
+    ):
         assert text in page
     for swing in verdict["time"]["swings"]["swings"]:
         (t0, p0), (t, m), (t1, p1) = swing["P"], swing["M"], swing["P_next"]
@@ -286,14 +294,20 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
 
 @pytest.mark.slow
 def test_a_converter_that_hides_its_states_gets_the_same_verdict(tmp_path, executor, fmu_path):
-    shown, hidden = (
+    results = [
         certify(
             CertificationRequest(cached(build_model("gfor")), reactances=(0.2,), black_box=black_box),
             executor,
             tmp_path,
-        ).verdicts[0]
+        )
         for black_box in (False, True)
-    )
+    ]
+    assert [result.linearised["converter"] for result in results] == ["perturbed", "identified"]
+    assert certification_json(results[1])["linearised"] == results[1].linearised
+    assert 0 < results[1].fit_errors["converter"] < 1e-3
+    save(results[1], tmp_path)
+    assert "converter (fitting error" in (tmp_path / "certificate.html").read_text(encoding="utf-8")
+    shown, hidden = (result.verdicts[0] for result in results)
     assert shown.accepted
     assert hidden.accepted
     for mode in shown.modes:

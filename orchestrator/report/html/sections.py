@@ -9,6 +9,7 @@ import xarray as xr
 from orchestrator.report.html.charts import Curve, Mark, bar_chart, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
+from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.report.signals import relative_difference, signal
 
 _BARS = 8
@@ -76,12 +77,29 @@ def studied(results: Results) -> str:
     first = results.scenarios[0]
     solver = (
         f"Coupled as FMUs with a communication step of {1e6 * first['step_size']:g} µs ({escape(first['schedule'])}), "
-        f"simulated for {first['stop_time']:g} s. Modes come from perturbing the running FMUs around the coupled "
-        "steady state: the linear model is that of the FMUs that were simulated."
+        f"simulated for {first['stop_time']:g} s. {_linearised(results)}"
     )
     source = f"<p>{escape(case.source)}</p>" if case.source else ""
     return f"{source}<p>{solver}</p>" + table(
         "Scenarios", ["Scenario", "What differs", "Events", "States"], rows, left=3
+    )
+
+
+def _linearised(results: Results) -> str:
+    """Where the linear models behind the modes come from."""
+    sources: dict[str, str] = {}
+    errors: dict[str, float] = {}
+    for s in results.scenarios:
+        sources |= s.get("linearised", {})
+        errors |= s.get("fit_errors", {})
+    if not sources:
+        return "How the linear models were found was not recorded."
+    exceptions = exceptions_in_words(sources, errors)
+    if exceptions is not None:
+        return escape(exceptions)
+    return (
+        "Modes come from perturbing the running FMUs around the coupled steady state: the linear model is that of the "
+        "FMUs that were simulated."
     )
 
 

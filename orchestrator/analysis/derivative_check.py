@@ -1,0 +1,71 @@
+"""Whether an FMU's directional derivatives are those of its own variables, by differences of these."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.errors import AnalysisError
+from orchestrator.fmi.component import Component, RealBatch
+
+SIZES = (1e-5, 2e-5)
+"""Central differences are taken with both, relative to max(1, |value|): their disagreement says how good they are."""
+
+AGREES = 1e-4
+"""Largest difference of an element from its central difference, relative to it: a hundredth of a point of damping."""
+
+_ROUNDING = 1e-8
+"""The same relative to the largest element of its row: rounding in the row's terms, over the size of a difference."""
+
+
+def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
+    """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back.
+
+    Parameters
+    ----------
+    component
+        Lets its states be set, and saves and restores its state.
+    given
+        Shape (unknowns, knowns).
+
+    Raises
+    ------
+    AnalysisError
+        Naming the derivative that is farthest off.
+    """
+    one, two = _central_differences(component, unknowns, knowns)
+    allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]
+    differs = np.abs(given - one)
+    wrong = ~(differs <= allowed)
+    if not wrong.any():
+        return
+    part = np.where(wrong, differs / np.maximum(np.abs(one), np.finfo(float).tiny), 0.0)
+    i, k = divmod(int(np.nanargmax(part)), part.shape[1])
+    raise AnalysisError(
+        f"component {component.name!r}: its FMU's directional derivatives are wrong in {wrong.sum()} of {wrong.size} "
+        f"elements: that of {unknowns[i]} by {knowns[k]} is given as {given[i, k]:.6g}, but changing {knowns[k]} by "
+        f"{SIZES[0]:g} changes {unknowns[i]} by {one[i, k]:.6g} per unit; linearise by perturbation (without "
+        "--directional), and have the FMU's derivatives corrected"
+    )
+
+
+def _central_differences(component: Component, unknowns: Sequence[str], knowns: Sequence[str]) -> list[Matrix]:
+    """With each size, shape (unknowns, knowns)."""
+    before = RealBatch(component, knowns).read().copy()
+    perturbed, follows = [RealBatch(component, [name]) for name in knowns], RealBatch(component, unknowns)
+    found = [np.zeros((len(unknowns), len(knowns))) for _ in SIZES]
+    saved = component.save_state()
+    try:
+        for k, value in enumerate(before):
+            for size, columns in zip(SIZES, found, strict=True):
+                step = size * max(1.0, abs(value))
+                for sign in (+1.0, -1.0):
+                    perturbed[k].values[0] = value + sign * step
+                    perturbed[k].write()
+                    columns[:, k] += sign * follows.read() / (2 * step)
+            perturbed[k].values[0] = value
+            perturbed[k].write()
+    finally:
+        component.restore_state(saved)
+        component.free_state(saved)
+    return found

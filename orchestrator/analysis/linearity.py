@@ -1,0 +1,109 @@
+"""Whether the modes depend on how the FMUs were perturbed, which the modes of a linear model must not.
+
+Every component was perturbed with two sizes, and up as well as down. At the edge of a limit, inside a dead band that is
+smaller than the perturbation, or in noise these answers differ, and what was found describes none of them. How far the
+difference moves each mode follows from its eigenvectors, to first order.
+"""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import Mode
+from orchestrator.coupling.schedule import Schedule
+
+LARGEST_SHIFT = 1e-3
+"""Of |λ|: a tenth of a point of damping. In smooth systems, up to the IEEE 118-bus one, it is at most 1.5e-4."""
+
+_SLOWEST = 0.5
+"""Shifts of modes slower than this [rad/s] are taken relative to it."""
+
+_WHY = (
+    "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
+    "integrator, or a limit or dead band close by",
+    "it answers differently up and down: it stands at the edge of a limit or of a dead band",
+)
+"""What it means that a variant of `ComponentLinearization.variants` differs, in their order."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A component for which the modes depend on how it was perturbed.
+
+    Attributes
+    ----------
+    mode
+        The one that it moves most.
+    shift
+        By how much, relative to |λ|.
+    """
+
+    component: str
+    mode: Mode
+    shift: float
+    why: str
+
+    def __str__(self) -> str:
+        m = self.mode
+        return (
+            f"component {self.component!r} is not linear at the operating point: {self.why}. That moves the mode at "
+            f"{m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by {100 * self.shift:.2g} % of its "
+            f"eigenvalue, so its damping by up to as many points; {100 * LARGEST_SHIFT:g} is trusted"
+        )
+
+
+def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]) -> list[Doubt]:
+    """Components whose perturbation leaves the modes in doubt; none, where all is smooth.
+
+    Parameters
+    ----------
+    model
+        The step map composed of the blocks.
+    modes
+        Those that are to be trusted.
+    """
+    found = []
+    for kind, why in enumerate(_WHY):
+        perturbed = [name for name, c in blocks.components.items() if c.variants]
+        if not perturbed or not modes or _largest(blocks, schedule, model, modes, perturbed, kind)[0] <= LARGEST_SHIFT:
+            continue
+        each = {name: _largest(blocks, schedule, model, modes, [name], kind) for name in perturbed}
+        most = max(each, key=lambda name: each[name][0])
+        # One alone may do less than all together.
+        guilty = [name for name, (shift, _) in each.items() if shift > LARGEST_SHIFT] or [most]
+        found += [Doubt(name, modes[each[name][1]], each[name][0], why) for name in guilty]
+    return found
+
+
+def _largest(
+    blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode], names: Sequence[str], kind: int
+) -> tuple[float, int]:
+    """Largest relative shift of a mode when some components are as their variant has them, and of which mode."""
+    other = copy.copy(blocks)
+    other.components = dict(blocks.components)
+    for name in names:
+        component = blocks.components[name]
+        other.components[name] = replace(component, **component.variants[kind]._asdict())
+    varied = compose(other, schedule)
+    if varied.names != model.names:  # even what depends on what directly is another
+        return np.inf, 0
+    shifts = [_shift(model, varied, mode) for mode in modes]
+    return max(shifts), int(np.argmax(shifts))
+
+
+def _shift(model: LinearModel, varied: LinearModel, mode: Mode) -> float:
+    right, left = (np.array([vector[name] for name in model.names]) for vector in (mode.shape, mode.left))
+    change = np.vdot(left, _apply(varied, right) - _apply(model, right))
+    if model.step_size is not None:
+        change /= np.exp(mode.eigenvalue * model.step_size) * model.step_size
+    return float(abs(change)) / max(abs(mode.eigenvalue), _SLOWEST)
+
+
+def _apply(model: LinearModel, z: Vector) -> Vector:
+    """A·z for a complex z: the factors inside are real."""
+    result: Vector = model.apply(z.real.copy()) + 1j * model.apply(z.imag.copy())
+    return result

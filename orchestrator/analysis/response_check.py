@@ -1,0 +1,305 @@
+"""Whether a linear model is the FMU's: what it says of small changes of the inputs, beside what the FMU does.
+
+The inputs are stepped up and down between communication points, all at once and each in an order of its own, and the
+FMU is put back. A model over states passes where three things hold at every time that is looked at: the derivatives
+that the FMU gives are A·x + B·u of its own states, its outputs are C·x + D·u of them, and states and outputs go where
+the model alone would have gone. The first two see a single element of a slow state that has hardly moved; the third
+sees what the FMU does not show.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from orchestrator.analysis.linear_model import Matrix
+from orchestrator.errors import AnalysisError
+from orchestrator.fmi.component import Component, RealBatch
+
+SIZES = (2e-4, 2e-3, 2e-5)
+"""Sizes of the steps that are tried in turn, relative to max(1, |value|), until half of one has half the effect. The
+second is for an FMU whose integration is coarse, the third for one that is strongly nonlinear."""
+
+EQUATIONS = 3e-6
+"""Largest part of a derivative or an output that the equations may miss. The operating point is compared to 1e-6, which
+moves derivatives by so much and their matrices by a few times that; what is let through moves a mode of 0.1 to 2 Hz by
+about as small a part."""
+
+COURSE = 1e-2
+"""Largest part of a state or an output by which its course may differ from the model's own. The model is taken over the
+steps exactly; an FMU's integrator is not exact in what decays within a few of its steps."""
+
+PROPORTIONAL = 1e-3
+"""Half a step may have so much more or less than half the effect, relative to the largest; more is not linear."""
+
+ONE_SIDED = 0.1
+"""Steps up and down may have effects that differ by this part; more is a limit or a dead band at its edge."""
+
+DURATION = 0.1
+"""How long the FMU is watched [s]."""
+
+MOST_STEPS = 1000
+"""Communication steps at most in one course."""
+
+_HOLDS = (1, 1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144)
+"""For how many communication steps an input is held, in turn: fast parts and slow ones are both excited."""
+
+_ROUNDING = 1e-11
+"""Relative error of what an FMU computes, before it is divided by the size of a step."""
+
+
+@dataclass(frozen=True)
+class ContinuousModel:
+    """ẋ = A·x + B·u, y = C·x + D·u, with names.
+
+    Attributes
+    ----------
+    states, rates, inputs, outputs
+        Names of the FMU's variables; rates are the derivatives of the states.
+    """
+
+    states: tuple[str, ...]
+    rates: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """All that is looked at."""
+        return (*self.states, *self.rates, *self.outputs)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Steps of the inputs: each row of ``levels``, shape (k, m), is held for so many communication steps."""
+
+    holds: tuple[int, ...]
+    levels: Matrix
+
+    @classmethod
+    def of(cls, step_size: float, scales: Matrix) -> "_Plan":
+        count = min(MOST_STEPS, max(len(_HOLDS), round(DURATION / step_size)))
+        holds: list[int] = []
+        while sum(holds) < count:
+            holds.append(_HOLDS[len(holds) % len(_HOLDS)])
+        # The same signs in every check, so that an answer can be repeated.
+        signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(len(holds), len(scales)))
+        return cls(tuple(holds), signs * scales)
+
+    @property
+    def ends(self) -> Matrix:
+        """Number of communication steps done at the end of each hold."""
+        return np.cumsum(self.holds)
+
+
+@dataclass(frozen=True)
+class _Response:
+    """What the FMU did, per unit of the steps' size.
+
+    Attributes
+    ----------
+    course
+        Half the difference between steps up and down, shape (k, signals).
+    peaks, curved, one_sided
+        Of every signal: its largest value, by how much half a step differs, and by how much up differs from down.
+    floors
+        What rounding alone may do.
+    """
+
+    course: Matrix
+    peaks: Matrix
+    curved: Matrix
+    one_sided: Matrix
+    floors: Matrix
+
+    @property
+    def too_curved(self) -> NDArray[np.bool_]:
+        return self.curved > PROPORTIONAL * self.peaks + self.floors
+
+
+_AGREED: WeakKeyDictionary[Component, set[bytes]] = WeakKeyDictionary()
+"""What was found to agree already: a study linearises the same instance at the same place many times."""
+
+
+def check_response(component: Component, model: ContinuousModel, what: str, time: float, step_size: float) -> None:
+    """Compare a linear model with the FMU that it is said to be of, and put that back.
+
+    Parameters
+    ----------
+    component
+        At the model's operating point; it can save and restore its state.
+    what
+        What the model is, for the error: ``the linear model inside its FMU``.
+
+    Raises
+    ------
+    AnalysisError
+        Naming the signal that differs most, when, and by how much; or that the FMU is not linear there.
+    """
+    values = RealBatch(component, (*model.states, *model.inputs, *model.outputs)).read().copy()
+    key = _digest(model, values, step_size)
+    agreed = _AGREED.setdefault(component, set())
+    if key in agreed:
+        return
+    at_rest = values[len(model.states) : len(model.states) + len(model.inputs)]
+    plan = _Plan.of(step_size, np.maximum(1.0, np.abs(at_rest)))
+    response = _measure(component, model, plan, at_rest, time, step_size)
+    _refuse_edges(component, model, response)
+    _Comparison(component, model, what, plan, response, step_size).judge()
+    agreed.add(key)
+
+
+def _digest(model: ContinuousModel, values: Matrix, step_size: float) -> bytes:
+    text = repr((model.signals, model.inputs, step_size)).encode()
+    matrices = (model.A, model.B, model.C, model.D, values)
+    return hashlib.sha256(text + b"".join(np.ascontiguousarray(m).tobytes() for m in matrices)).digest()
+
+
+# -- what the FMU does -----------------------------------------------------------------------------
+
+
+def _measure(
+    component: Component, model: ContinuousModel, plan: _Plan, at_rest: Matrix, time: float, step_size: float
+) -> _Response:
+    """With the first of `SIZES` to whose half the FMU answers with half."""
+    bench = _Courses(component, model, plan, at_rest, time, step_size)
+    undisturbed = bench.course(0.0)
+    for size in SIZES:
+        response = bench.response(size, undisturbed)
+        if not response.too_curved.any():
+            return response
+    worst = int(np.argmax(response.curved / (response.peaks + response.floors)))
+    raise AnalysisError(
+        f"component {component.name!r}: half a step of its inputs does not have half the effect on "
+        f"{model.signals[worst]}, but {100 * response.curved[worst] / response.peaks[worst]:.3g} % of the largest more "
+        f"or less, for every size from {max(SIZES):g} to {min(SIZES):g}; no linear model holds there: look for noise, "
+        "a coarse tolerance of its integrator, or a limit that is active at the operating point"
+    )
+
+
+@dataclass(frozen=True)
+class _Courses:
+    """Runs the same steps of the inputs in several sizes, each from the same state."""
+
+    component: Component
+    model: ContinuousModel
+    plan: _Plan
+    at_rest: Matrix
+    time: float
+    step_size: float
+
+    def response(self, size: float, undisturbed: Matrix) -> _Response:
+        up, down, half_up, half_down = (self.course(s) for s in (size, -size, size / 2, -size / 2))
+        course = (half_up - half_down) / size
+        return _Response(
+            course,
+            np.abs(course).max(axis=0),
+            np.abs((up - down) / (2 * size) - course).max(axis=0),
+            np.abs((half_up + half_down) / 2 - undisturbed).max(axis=0) / (size / 2),
+            _ROUNDING * np.maximum(1.0, np.abs(undisturbed).max(axis=0)) / size,
+        )
+
+    def course(self, size: float) -> Matrix:
+        """All signals at the end of each hold, shape (k, signals)."""
+        component = self.component
+        inputs, signals = (RealBatch(component, names) for names in (self.model.inputs, self.model.signals))
+        rows = np.empty((len(self.plan.holds), len(signals.names)))
+        done = 0
+        saved = component.save_state()
+        try:
+            for k, (hold, level) in enumerate(zip(self.plan.holds, self.plan.levels, strict=True)):
+                inputs.values[:] = self.at_rest + size * level
+                inputs.write()
+                for _ in range(hold):
+                    component.step(self.time + done * self.step_size, self.step_size)
+                    done += 1
+                rows[k] = signals.read()
+        finally:
+            component.restore_state(saved)
+            component.free_state(saved)
+        return rows
+
+
+def _refuse_edges(component: Component, model: ContinuousModel, response: _Response) -> None:
+    """Where steps up and down do different things, half their difference describes neither."""
+    part = response.one_sided / (response.peaks + response.floors)
+    part[response.one_sided <= ONE_SIDED * response.peaks + 10 * response.floors] = 0.0
+    worst = int(np.argmax(part))
+    if part[worst] > 0:
+        raise AnalysisError(
+            f"component {component.name!r}: small steps of its inputs up and down have effects on "
+            f"{model.signals[worst]} that differ by {200 * part[worst]:.3g} % of each other; no linear model holds at "
+            "the edge of a limit or a dead band: move the operating point off it"
+        )
+
+
+# -- what the model says ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    component: Component
+    model: ContinuousModel
+    what: str
+    plan: _Plan
+    response: _Response
+    step_size: float
+
+    def judge(self) -> None:
+        """Raise where the FMU and the model part."""
+        n = len(self.model.states)
+        course = self.response.course
+        follow = range(n, course.shape[1])
+        self._refuse(follow, self._by_equations(), EQUATIONS, "computed from the FMU's own states")
+        shown = [*range(n), *range(2 * n, course.shape[1])]
+        with np.errstate(over="ignore", invalid="ignore"):  # a wrong model may grow beyond all numbers
+            by_itself = self._by_itself()[:, shown]
+        self._refuse(shown, by_itself, COURSE, "computed from the inputs alone")
+
+    def _by_equations(self) -> Matrix:
+        """Derivatives and outputs from the states that the FMU itself shows."""
+        m, n = self.model, len(self.model.states)
+        x, u = self.response.course[:, :n], self.plan.levels
+        return np.hstack([x @ m.A.T + u @ m.B.T, x @ m.C.T + u @ m.D.T])
+
+    def _by_itself(self) -> Matrix:
+        """All signals, from the inputs alone."""
+        m = self.model
+        n, count = m.B.shape
+        whole = np.block([[m.A, m.B], [np.zeros((count, n + count))]])
+        over = {k: scipy.linalg.expm(k * self.step_size * whole) for k in set(self.plan.holds)}
+        x = np.zeros(n)
+        rows = []
+        for hold, u in zip(self.plan.holds, self.plan.levels, strict=True):
+            x = over[hold][:n, :n] @ x + over[hold][:n, n:] @ u
+            rows.append(np.concatenate([x, m.A @ x + m.B @ u, m.C @ x + m.D @ u]))
+        return np.array(rows)
+
+    def _refuse(self, columns: Sequence[int], said: Matrix, part: float, how: str) -> None:
+        response, columns = self.response, list(columns)
+        found, peaks = response.course[:, columns], response.peaks[columns]
+        differs = np.where(np.isfinite(said), np.abs(found - said), np.inf)
+        with np.errstate(invalid="ignore"):
+            largest = np.maximum(peaks, np.abs(said).max(axis=0))
+        allowed = part * peaks + 2 * response.curved[columns] + response.floors[columns]
+        excess = differs / allowed
+        k, worst = divmod(int(np.argmax(excess)), excess.shape[1])
+        if not excess[k, worst] > 1:
+            return
+        share = differs[k, worst] / max(largest[worst], response.floors[columns[worst]])
+        raise AnalysisError(
+            f"component {self.component.name!r}: {self.what} is not what the FMU does: "
+            f"{self.plan.ends[k] * self.step_size:.4g} s into small steps of {', '.join(self.model.inputs)}, "
+            f"{self.model.signals[columns[worst]]} is {found[k, worst]:.6g} per unit of them, where it should be "
+            f"{said[k, worst]:.6g} ({how}): off by {100 * share:.3g} % of its largest value, and {100 * part:g} % is "
+            "allowed; pack the model of this FMU anew (`gfor build --with-linear-model`), or have the FMU measured "
+            "instead (`gfor black-box`)"
+        )

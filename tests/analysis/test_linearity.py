@@ -1,0 +1,106 @@
+"""FMUs that are not linear where they are linearised: the modes that they move are questioned, with the component."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.python_fmu import cached
+from orchestrator.analysis.linearity import doubts
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import find_modes
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.schedule import gauss_seidel
+from orchestrator.coupling.system import System
+from orchestrator.errors import AnalysisError
+from orchestrator.fmi.description import read_description
+from tests.coupling.small_fmus import small_fmu
+
+H = 1e-3
+
+SHAPES = {
+    "straight": lambda u: u,
+    "smooth": lambda u: u + 3 * u**2 - 5 * u**3,
+    "limit": lambda u: ca.fmin(u, 0.0),
+    "dead_band": lambda u: u - ca.fmax(-1.5e-5, ca.fmin(1.5e-5, u)),
+    "rough": lambda u: u + 1e-7 * ca.sin(1e6 * u),
+    "one_way_lead": lambda u: u + 0.02 * ca.fabs(u),
+}
+
+
+def shaped(name):
+    """ẋ = gain·f(u), y = x, with one of `SHAPES` for f."""
+    m = ModelBuilder(f"small_{name}", "Integrator behind a characteristic")
+    gain = m.parameter("gain", 1.0, "1/s", "Gain")
+    u = m.input("u", "1", "Input")
+    x = m.state("x", 0.0, "1", "Integral")
+    m.derivative(x, gain * SHAPES[name](u))
+    m.output("y", x, "1", "Integral")
+    return read_description(cached(m.build()))
+
+
+def judged(shape):
+    """What is said of a ring of two integrators, f ≈ 0.5 Hz, one of them behind a characteristic."""
+    system = System()
+    system.add("shaped", shaped(shape), {"gain": 3.0})
+    system.add("plain", small_fmu("integrator"), {"gain": -3.0})
+    system.connect("shaped.y", "plain.u")
+    system.connect("plain.y", "shaped.u")
+    schedule = gauss_seidel((("shaped",), ("plain",)))
+    with Master(system, schedule, H) as master:
+        blocks = Blocks(master)
+        model = compose(blocks, schedule)
+        modes = find_modes(model, 0.0, 2.0)
+        return doubts(blocks, schedule, model, modes), modes
+
+
+@pytest.mark.parametrize("shape", ["straight", "smooth"])
+def test_what_is_smooth_is_trusted(shape):
+    found, modes = judged(shape)
+    assert found == []
+    assert modes[0].frequency_hz == pytest.approx(3 / (2 * np.pi), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "why"),
+    [
+        ("limit", "answers differently up and down"),
+        ("one_way_lead", "answers differently up and down"),
+        ("dead_band", "twice the size"),
+        ("rough", "twice the size"),
+    ],
+)
+def test_what_depends_on_the_perturbation_is_questioned_by_name(shape, why):
+    found, _ = judged(shape)
+    assert {doubt.component for doubt in found} == {"shaped"}
+    assert why in " ".join(map(str, found))
+    assert all(doubt.shift > 1e-3 for doubt in found)
+
+
+def test_a_shift_is_what_the_other_answer_makes_of_the_mode():
+    """Upwards the limit has no slope at all: ±j·3/√2 becomes 0; to first order, half the way."""
+    (doubt,), modes = judged("limit")
+    assert modes[0].eigenvalue == pytest.approx(3j / np.sqrt(2), abs=0.01)
+    assert doubt.shift == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_drift_counts_by_the_second_however_short_the_step():
+    """1e-4 per second is 1e-10 in a step of 1 µs."""
+    system = System()
+    system.add("a", small_fmu("integrator"), {"gain": 1.0}, {"u": 1e-4})
+    with (
+        Master(system, gauss_seidel((("a",),)), 1e-6) as master,
+        pytest.raises(AnalysisError, match="no steady state"),
+    ):
+        find_operating_point(master)
+
+
+def test_modes_at_a_limit_s_edge_are_shown_with_a_warning(gfor):
+    """The power flow asks for 0.896769 of a current that may be 0.896770: 12.6 % of damping, where 10.6 % are right."""
+    code, shown, said = gfor("modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.89677")
+    assert code == 0
+    assert "electromechanical" in shown
+    assert "component 'gfor' is not linear at the operating point" in " ".join(said.split())
+    _, _, said = gfor("modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.9")
+    assert said == ""
