@@ -2,11 +2,17 @@
 
 Each axis is a magnetising reactance with two rotor branches beside it: branch 1 slow (field, or first
 q damper), branch 2 fast (damper). Reactances and resistances are per unit on the stator base.
+
+X' = X says that the slow branch is not there, X'' = X' that the fast one is not: its reactance is then 1/`_NOTHING`
+times X_m, so that its state is there and has no effect.
 """
 
 from dataclasses import dataclass
 
 import casadi as ca
+
+_NOTHING = 1e-9
+"""Admittance of a branch that is not there, in parts of 1/X_m."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +40,10 @@ class RotorBranches:
 def classical(a: AxisData, omega_b: ca.SX) -> RotorBranches:
     """Textbook formulas: the branches are taken as active one after the other."""
     X_m = a.X - a.X_l
-    X_1 = X_m * (a.X1 - a.X_l) / (X_m - a.X1 + a.X_l)
+    X_1 = X_m * (a.X1 - a.X_l) / ca.fmax(X_m - a.X1 + a.X_l, _NOTHING * (a.X1 - a.X_l))
     R_1 = (X_m + X_1) / (omega_b * a.T10)
-    X_2 = (a.X2 - a.X_l) * X_m * X_1 / (X_m * X_1 - (X_m + X_1) * (a.X2 - a.X_l))
+    left = X_m * X_1 - (X_m + X_1) * (a.X2 - a.X_l)
+    X_2 = (a.X2 - a.X_l) * X_m * X_1 / ca.fmax(left, _NOTHING * (a.X2 - a.X_l) * X_1)
     R_2 = (X_2 + X_m * X_1 / (X_m + X_1)) / (omega_b * a.T20)
     return RotorBranches(X_1, R_1, X_2, R_2)
 
@@ -48,20 +55,24 @@ def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
     X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each.
     """
     X_m = a.X - a.X_l
-    T1, T2 = a.T10 * a.X1 / a.X, a.T20 * a.X2 / a.X1
+    # The time constant of a fast branch that is not there means nothing, and must not pass for the slow one's.
+    T20 = ca.if_else(a.X1 - a.X2 <= _NOTHING * a.X, ca.fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)
+    T1, T2 = a.T10 * a.X1 / a.X, T20 * a.X2 / a.X1
     # X(s) − X_l = (X_m + n1·s + n2·s²) / ((1 + s·T'_0)(1 + s·T''_0))
-    n1 = a.X * (T1 + T2) - a.X_l * (a.T10 + a.T20)
-    n2 = a.X * T1 * T2 - a.X_l * a.T10 * a.T20
+    n1 = a.X * (T1 + T2) - a.X_l * (a.T10 + T20)
+    n2 = a.X * T1 * T2 - a.X_l * a.T10 * T20
     root = ca.sqrt(ca.fmax(n1**2 - 4 * n2 * X_m, 1e-12))
     slow, fast = (-n1 + root) / (2 * n2), (-n1 - root) / (2 * n2)
-    b1 = a.X * (a.T10 + a.T20 - T1 - T2)
-    b2 = a.X * (a.T10 * a.T20 - T1 * T2)
+    b1 = a.X * (a.T10 + T20 - T1 - T2)
+    b2 = a.X * (a.T10 * T20 - T1 * T2)
 
-    def branch(pole: ca.SX, other: ca.SX) -> tuple[ca.SX, ca.SX]:
-        X = X_m * n2 * (pole - other) / (b1 + b2 * pole)
+    def branch(pole: ca.SX, other: ca.SX, sign: int) -> tuple[ca.SX, ca.SX]:
+        residue, least = b1 + b2 * pole, _NOTHING * a.X * a.T10
+        residue = ca.if_else(ca.fabs(residue) <= least, sign * least, residue)
+        X = X_m * n2 * (pole - other) / residue
         return X, -pole * X / omega_b
 
-    return RotorBranches(*branch(slow, fast), *branch(fast, slow))
+    return RotorBranches(*branch(slow, fast, 1), *branch(fast, slow, -1))
 
 
 def convert(a: AxisData, omega_b: ca.SX, use_exact: ca.SX) -> RotorBranches:

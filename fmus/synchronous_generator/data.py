@@ -32,7 +32,6 @@ class MachineData:
     s_12: float
     R_t: float
     X_t: float
-    exact_conversion: bool
     source: str
 
 
@@ -40,22 +39,22 @@ SG1 = MachineData(
     S_n=1500, P_0=0.9, H=6.3,
     X_d=2.135, X_q=2.046, X_d1=0.34, X_q1=0.573, X_d2=0.269, X_q2=0.269, X_l=0.234,
     T_d10=6.47, T_d20=0.022, T_q10=0.61, T_q20=0.034,
-    s_10=0.1275, s_12=0.2706, R_t=0.0, X_t=0.15, exact_conversion=False, source=NTS631,
+    s_10=0.1275, s_12=0.2706, R_t=0.0, X_t=0.15, source=NTS631,
 )  # fmt: skip
 
 SG2 = MachineData(
     S_n=5000, P_0=0.78, H=6.175,
     X_d=1.8, X_q=1.7, X_d1=0.3, X_q1=0.55, X_d2=0.25, X_q2=0.25, X_l=0.2,
     T_d10=8.0, T_d20=0.03, T_q10=0.4, T_q20=0.05,
-    s_10=0.0392, s_12=0.2227, R_t=0.0, X_t=0.15, exact_conversion=False, source=NTS631,
+    s_10=0.0392, s_12=0.2227, R_t=0.0, X_t=0.15, source=NTS631,
 )  # fmt: skip
 
 IEEE118 = MachineData(
     S_n=100, P_0=0.8, H=6.5,
     X_d=1.8, X_q=1.7, X_d1=0.3, X_q1=0.55, X_d2=0.25, X_q2=0.25, X_l=0.2,
     T_d10=8.0, T_d20=0.03, T_q10=0.4, T_q20=0.05,
-    s_10=0.0392, s_12=0.2227, R_t=0.002, X_t=0.1, exact_conversion=True,
-    source=f"{PAPER}; H and conversion: {STAMP}",
+    s_10=0.0392, s_12=0.2227, R_t=0.002, X_t=0.1,
+    source=f"{PAPER}; H: {STAMP}",
 )  # fmt: skip
 
 

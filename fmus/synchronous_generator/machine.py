@@ -138,9 +138,7 @@ def declare_machine(
         H = m.parameter("H", data.H, "s", "Inertia constant", minimum=0.01, source=data.source)
         D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_n", minimum=0, source=STAMP)
         d_data, q_data = _axis_parameters(m, data)
-        use_exact = m.switch(
-            "exact_conversion", data.exact_conversion, "Standard data to circuit: exact, not classical"
-        )
+        use_exact = m.switch("exact_conversion", False, "Standard data to circuit: exact, not classical")
         saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
         start, d, q, delta_0 = _operating_point(
             m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation, stator_flux
@@ -217,9 +215,13 @@ def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, Axis
         X2 = reactance(f"X_{axis}2", values[2], f"Subtransient reactance X''_{axis}")
         T10 = time(f"T_{axis}10", values[3], f"Open-circuit transient time constant T'_{axis}0")
         T20 = time(f"T_{axis}20", values[4], f"Open-circuit subtransient time constant T''_{axis}0")
-        m.require(X - X1, f"machine.X_{axis} must exceed machine.X_{axis}1")
-        m.require(X1 - X2, f"machine.X_{axis}1 must exceed machine.X_{axis}2")
+        if axis == "d":  # without a field winding nothing could excite the machine
+            m.require(X - X1, "machine.X_d must exceed machine.X_d1")
+        else:
+            m.require(ca.if_else(X1 <= X, 1, -1), "machine.X_q1 must not exceed machine.X_q")
+        m.require(ca.if_else(X2 <= X1, 1, -1), f"machine.X_{axis}2 must not exceed machine.X_{axis}1")
         m.require(X2 - X_l, f"machine.X_{axis}2 must exceed machine.X_l")
+        m.require(T10 - T20, f"machine.T_{axis}10 must exceed machine.T_{axis}20")
         axes[axis] = AxisData(X, X1, X2, X_l, T10, T20)
     return axes["d"], axes["q"]
 

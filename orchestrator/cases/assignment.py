@@ -18,7 +18,7 @@ def assign_values(draft: Draft) -> None:
     for name, table in draft.tables.items():
         for group in ("parameters", "inputs"):
             for path, value in flatten(getattr(table, group)):
-                _assign(draft, name, ".".join(path), value, draft.place("components", name, group, *path))
+                _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
     for layer in draft.layers:
         for key, value in layer.values.items():
             _assign_key(draft, key, value, layer.place(key))
@@ -37,9 +37,10 @@ def _assign_frequency(draft: Draft) -> None:
     """The network's frequency goes to everything that has a rated one."""
     if draft.data is None or draft.data.frequency is None:
         return
-    for plan in draft.system.components.values():
+    for name, plan in draft.system.components.items():
         if "f_n" in plan.description.parameters:
             plan.parameters["f_n"] = draft.data.frequency
+            draft.places[f"{name}.f_n"] = draft.place("network", "frequency")
 
 
 def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
@@ -73,3 +74,4 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
     if converted is not None:
         target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
         target[variable] = converted
+        draft.places[f"{name}.{variable}"] = where

@@ -96,13 +96,15 @@ class Case:
         ]
         if unknown:
             raise CaseError(str(self.path), problems)
-        prepared = []
+        prepared, questions = [], []
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
             prepared.append(preparer.prepare(step_size, stop_time))
             problems += [p for p in preparer.problems if p not in problems]
-        if problems:
-            raise CaseError(str(self.path), problems)
+            questions += [q for q in preparer.draft.questions if q not in questions]
+        if problems:  # what is most unusual may well be why
+            asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]
+            raise CaseError(str(self.path), [*problems, *asked])
         return [p for p in prepared if p is not None]
 
     def components_of(

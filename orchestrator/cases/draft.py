@@ -1,6 +1,6 @@
 """A scenario on its way to be ready: the case's tables, what has been made of them, and what is wrong."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,6 +20,25 @@ class Layer:
 
     values: Mapping[str, Value]
     place: Callable[[str], str]
+
+
+@dataclass(frozen=True)
+class UnitOrigin:
+    """Where a component of the units table stands.
+
+    Attributes
+    ----------
+    row
+        The row of the units' file, or what else it comes from.
+    own
+        Parameters that this row has.
+    common
+        Key of ``[units]`` with the parameters of all of its kind.
+    """
+
+    row: str
+    own: frozenset[str]
+    common: str
 
 
 @dataclass
@@ -42,6 +61,12 @@ class Draft:
         Names of all components there can be, and the tables of those that this scenario has.
     system
         Components and connections.
+    places
+        Where each ``component.variable`` that is set was set last.
+    origins
+        Where each component of the units table stands, by its name.
+    questions
+        What is most unusual about the data.
     """
 
     case: CaseTable
@@ -57,6 +82,9 @@ class Draft:
     tables: dict[str, ComponentTable] = field(default_factory=dict)
     system: System = field(default_factory=System)
     network_failed: bool = False
+    places: dict[str, str] = field(default_factory=dict)
+    origins: dict[str, UnitOrigin] = field(default_factory=dict)
+    questions: list[Problem] = field(default_factory=list)
 
     def note(self, place: str, text: str) -> None:
         """Add a problem, once."""
@@ -68,6 +96,16 @@ class Draft:
         """Add a problem that leaves no network, so that what follows from its lack is not noted as well."""
         self.network_failed = True
         self.note(place, text)
+
+    def place_of_value(self, name: str, group: str, path: Sequence[str]) -> str:
+        """Where a value of a component's table is written: the table, or the row and the table of its unit."""
+        origin = self.origins.get(name)
+        if origin is None or group != "parameters":
+            return self.place("components", name, group, *path)
+        common = getattr(self.case.units, origin.common)
+        if ".".join(path) not in origin.own and path[0] in common:
+            return self.place("units", origin.common, *path)
+        return f"{origin.row}, {name}.{'.'.join(path)}"
 
     @property
     def grid(self) -> str | None:

@@ -1,11 +1,10 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from fmus.grid.network import Line, Load, Shunt
-from orchestrator.cases.csv_rows import number, optional_number, rows_of
+from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
 from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.schema import NetworkTable
@@ -23,6 +22,8 @@ class NetworkData:
         Reference bus of the source.
     frequency
         Rated frequency [Hz]; None leaves every model's own.
+    places
+        File and line of the lines that a file holds, by name.
     """
 
     buses: tuple[str, ...]
@@ -33,6 +34,7 @@ class NetworkData:
     slack: str | None = None
     frequency: float | None = None
     stray_B: float = 0.0
+    places: dict[str, str] = field(default_factory=dict)
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -48,8 +50,8 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift) for n, t in table.lines.items()]
     loads = [Load(n, t.bus, t.p, t.q, t.active) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
-    if table.lines_file is not None:
-        lines += _lines_of_file(directory / table.lines_file)
+    in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
+    lines += [line for line, _ in in_file]
     if table.loads_file is not None:
         for row in rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
             bus = bus_name(row["bus"])
@@ -66,6 +68,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         source.slack,
         table.frequency if table.frequency is not None else source.frequency,
         table.stray_B,
+        {line.name: place for line, place in in_file},
     )
 
 
@@ -83,11 +86,13 @@ def _source(table: NetworkTable, directory: Path) -> ImportedNetwork:
     return imported
 
 
-def _lines_of_file(path: Path) -> Sequence[Line]:
+def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
+    """The lines of a file, each with its place."""
     lines = []
     for row in rows_of(path, ("from", "to", "R", "X", "B")):
         name = f"line_{row['from']}_{row['to']}"
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
-        lines.append(Line(name, *ends, number(row, "X"), number(row, "R"), number(row, "B"), tap, shift))
+        line = Line(name, *ends, number(row, "X"), number(row, "R"), number(row, "B"), tap, shift)
+        lines.append((line, place_of(row)))
     return lines

@@ -17,6 +17,7 @@ from orchestrator.cases.layers import value_layers
 from orchestrator.cases.native import is_native
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.plausibility import check_plausibility
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
@@ -44,6 +45,8 @@ class PreparedScenario:
         What the components start from; None where the case has no network.
     values
         Every value that was set, by ``component.variable``.
+    questions
+        Data that are most unusual, each with its place: see `plausibility`.
     """
 
     name: str
@@ -57,6 +60,7 @@ class PreparedScenario:
     events: tuple[Event, ...]
     power_flow: PowerFlow | None
     values: dict[str, float | bool]
+    questions: tuple[Problem, ...] = ()
 
 
 def _takes_network(table: ComponentTable) -> bool:
@@ -114,6 +118,7 @@ class Preparer:
         self.assemble()
         connect(draft)
         check_inputs(draft)
+        check_plausibility(draft)
         flow = None if draft.problems else self._power_flow()
         clock = self._clock(step_size)
         if clock is not None:
@@ -135,6 +140,7 @@ class Preparer:
             events=events,
             power_flow=flow,
             values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()},
+            questions=tuple(draft.questions),
         )
 
     # -- network and components ------------------------------------------------------------------

@@ -267,11 +267,12 @@ class PlotTable(Table):
 
 
 class CaseTable(Table):
-    """A whole case file."""
+    """A whole case file; ``meant`` names values ``component.variable`` that are unusual and meant so."""
 
     name: str
     title: str = ""
     source: str = ""
+    meant: list[str] = []
     solver: SolverTable = SolverTable()
     components: dict[str, ComponentTable] = Field(min_length=1)
     network: NetworkTable | None = None

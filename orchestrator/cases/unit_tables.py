@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.csv_rows import Row, optional_number, place_of, rows_of
-from orchestrator.cases.draft import Draft
+from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
@@ -32,6 +32,8 @@ class UnitRow:
         The converter's share where the row has its own.
     parameters
         Of its generator and its converter, by kind.
+    place
+        File and line of the row; empty where the unit comes from the network's source.
     """
 
     label: str
@@ -41,6 +43,7 @@ class UnitRow:
     v_pu: float
     alpha: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    place: str = ""
 
 
 def sets_alpha(key: str) -> bool:
@@ -66,15 +69,21 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     alphas = _alphas(draft, table, rows)
-    models = ((table.generator, table.generator_parameters), (table.converter, table.converter_parameters))
+    models = (
+        (table.generator, "generator_parameters", table.generator_parameters),
+        (table.converter, "converter_parameters", table.converter_parameters),
+    )
     components = {}
-    for kind, (model, common) in zip(UNIT_KINDS, models, strict=True):
+    for kind, (model, key, common) in zip(UNIT_KINDS, models, strict=True):
         for row in rows:
             share = alphas[row.label] if kind == "gfor" else 1 - alphas[row.label]
             if share > 0:
                 own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
                 values = {**common, **row.parameters.get(kind, {}), **own}
-                components[f"{kind}{row.label}"] = ComponentTable(model=model, bus=row.bus, parameters=values)
+                name = f"{kind}{row.label}"
+                components[name] = ComponentTable(model=model, bus=row.bus, parameters=values)
+                of_row = frozenset((*row.parameters.get(kind, {}), *own))
+                draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key)
     return components
 
 
@@ -109,7 +118,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         if alpha is not None and not 0 <= alpha <= 1:
             raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
-        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own)  # type: ignore[arg-type]
+        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry))  # type: ignore[arg-type]
         rows.append(_checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:

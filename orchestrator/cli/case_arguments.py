@@ -7,6 +7,7 @@ from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import assignment, seconds
+from orchestrator.cli.terminal import print_questions
 
 
 def add_case_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +48,9 @@ def prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
     """The case with its scenarios, as the options have them."""
     case = load_case(options.case)
     stop = getattr(options, "stop", None)
-    return case, case.prepare(options.scenario, dict(options.set), options.step, stop, parameters(options))
+    scenarios = case.prepare(options.scenario, dict(options.set), options.step, stop, parameters(options))
+    print_questions(scenarios)
+    return case, scenarios
 
 
 def parameters(options: argparse.Namespace) -> list[ParameterFile]:

@@ -12,7 +12,7 @@ from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.points import compute_points
-from orchestrator.cli.terminal import made_folder, make_console, make_errors
+from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.errors import INTERRUPTED
 from orchestrator.report import sweep_tables
@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
     case = load_case(options.case)
     values = {key: value for file in parameters(options) for key, value in file.values.items()} | dict(options.set)
     plan = plan_sweep(case, options.vary, options.scenario, values, options.step, options.range)
+    print_questions(plan.scenarios)
     folder = made_folder(options.out or Path("results") / f"{case.name}_sweep")
     console = make_console(stderr=options.json)
     store = PointStore(folder / "points")

@@ -1,6 +1,6 @@
 """What all commands print, and where to."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from orchestrator.report.linearised import exceptions_in_words
 
 if TYPE_CHECKING:
     from orchestrator.cases.case import Case
+    from orchestrator.cases.prepare import PreparedScenario
     from orchestrator.study.modes import ModesResult
 
 
@@ -60,11 +61,19 @@ def print_sources(console: Console, results: "Sequence[ModesResult]") -> None:
         console.print(f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False)
 
 
+def print_questions(scenarios: "Iterable[PreparedScenario]") -> None:
+    """Ask on standard error, once and before anything is computed, about data that are most unusual."""
+    console = make_errors()
+    for question in dict.fromkeys(q for prepared in scenarios for q in prepared.questions):
+        console.print(f"[bold yellow]question:[/bold yellow] {escape(str(question))}")
+
+
 def print_warnings(results: "Sequence[ModesResult]") -> None:
     """Say on standard error what is to be borne in mind of results."""
     console = make_errors()
     for result in results:
-        for text in result.warnings:
+        asked = {str(question) for question in result.prepared.questions}
+        for text in (t for t in result.warnings if t not in asked):
             console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")
 
 

@@ -14,6 +14,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed, oscillations
+from orchestrator.analysis.resolution import check_resolution
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.areas import areas_of
@@ -168,6 +169,8 @@ def modes_from(
         spectrum = whole_spectrum(model)
         shown, named = find_critical_modes(model, low, high, critical), {}
     stability = judge(model, spectrum, system)
+    unstable = stability.cause is Cause.COUPLING
+    step = check_resolution(master, model, system, shown, frequency_range, coupling_unstable=unstable)
     analysis = case.table.analysis
     return ModesResult(
         prepared=prepared,
@@ -176,7 +179,12 @@ def modes_from(
         modes=[mode for mode in shown if oscillations(np.array([mode.eigenvalue]))[0]],
         named=named,
         references=_references(case, prepared),
-        warnings=(*_warnings(stability), *map(str, doubts(blocks, master.schedule, model, shown))),
+        warnings=(
+            *map(str, prepared.questions),
+            *_warnings(stability),
+            *step,
+            *map(str, doubts(blocks, master.schedule, model, shown)),
+        ),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
         stability=stability,
@@ -212,7 +220,10 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
         modes=[],
         named={},
         references={},
-        warnings=(f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",),
+        warnings=(
+            *map(str, prepared.questions),
+            f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",
+        ),
         swing=(),
         areas={},
         stability=Stability(None, reason=f"the system cannot be linearised: {'; '.join(reasons)}"),
@@ -245,8 +256,7 @@ def _warnings(stability: Stability) -> tuple[str, ...]:
         return ()
     return (
         f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
-        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s; take a shorter step or the "
-        "Gauss-Seidel schedule, devices before the grid",
+        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
     )
 
 

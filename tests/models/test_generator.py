@@ -32,6 +32,73 @@ def test_exact_conversion_gives_the_standard_operational_reactance(data):
         assert operational_reactance(s, X, X_l, b) == pytest.approx(wanted, rel=1e-10)
 
 
+@pytest.mark.parametrize("conversion", [classical, exact])
+@pytest.mark.parametrize("data", AXES.values(), ids=AXES)
+@pytest.mark.parametrize("missing", ["slow", "fast", "both"])
+def test_a_winding_that_the_data_leave_out_is_not_there(data, missing, conversion):
+    """X' = X: no slow branch, X'' = X': no fast one. One branch alone has one X(s), whichever way it is found."""
+    X, X1, X2, X_l, T10, T20 = data
+    X1 = X if missing in ("slow", "both") else X1
+    X2 = X1 if missing in ("fast", "both") else X2
+    T1, T2 = T10 * X1 / X, T20 * X2 / X1
+    b = conversion(AxisData(*map(ca.SX, (X, X1, X2, X_l, T10, T20))), ca.SX(OMEGA_B))
+    for s in (0.3j, 5j, 40 + 200j, 3000j):
+        wanted = X * (1 + s * T1) * (1 + s * T2) / ((1 + s * T10) * (1 + s * T20))
+        assert operational_reactance(s, X, X_l, b) == pytest.approx(wanted, rel=1e-7)
+
+
+def test_a_damper_that_is_not_there_never_passes_for_the_field():
+    """T''_0 means nothing where X'' = X'; one near T'_0 must not change the order of the branches."""
+    b = exact(AxisData(*map(ca.SX, (0.9, 0.3, 0.3, 0.1, 4.0, 3.9))), ca.SX(OMEGA_B))
+    assert float(b.X_2) > 1e6
+    assert float(b.X_1) == pytest.approx(0.8 * 0.2 / 0.6)
+
+
+MACHINES = [f"synchronous_generator_{e}{v}" for e in ("ac4a", "st1", "st4b") for v in ("", "_phasor")]
+
+
+@pytest.mark.parametrize("name", [*MACHINES, "synchronous_generator_st4b_pss2a"])
+def test_every_machine_converts_its_data_in_the_same_way_unless_it_is_told(name):
+    (start,) = (v.start for v in build_model(name).parameters if v.name == "machine.exact_conversion")
+    assert start == 0.0
+
+
+def refused_by(values):
+    """The rules that a machine with these parameters breaks."""
+    model = build_model("synchronous_generator_ac4a")
+    p = np.array([values.get(v.name, v.start) for v in model.parameters])
+    c, _ = model.initialise(p)
+    margins = np.array(model.requirements(p, c)).ravel()
+    return [text for text, margin in zip(model.requirement_texts, margins, strict=True) if not margin > 0]
+
+
+@pytest.mark.parametrize("exactly", [0.0, 1.0])
+@pytest.mark.parametrize(
+    "values",
+    [{"X_q1": 1.7}, {"X_q2": 0.55}, {"X_d2": 0.3}, {"X_q1": 1.7, "X_q2": 1.7}],
+    ids=["no slow q winding", "no q damper", "no d damper", "nothing on q"],
+)
+def test_equal_reactances_are_data(values, exactly):
+    named = {f"machine.{name}": value for name, value in values.items()}
+    assert refused_by(named | {"machine.exact_conversion": exactly}) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "rule"),
+    [
+        ({"X_q1": 1.71}, "machine.X_q1 must not exceed machine.X_q"),
+        ({"X_q2": 0.56}, "machine.X_q2 must not exceed machine.X_q1"),
+        ({"X_d1": 1.8}, "machine.X_d must exceed machine.X_d1"),
+        ({"X_d2": 0.31}, "machine.X_d2 must not exceed machine.X_d1"),
+        ({"X_l": 0.25}, "machine.X_d2 must exceed machine.X_l"),
+        ({"T_d20": 30.0}, "machine.T_d10 must exceed machine.T_d20"),
+        ({"T_q20": 0.4}, "machine.T_q10 must exceed machine.T_q20"),
+    ],
+)
+def test_what_the_circuit_cannot_hold_is_refused(values, rule):
+    assert rule in refused_by({f"machine.{name}": value for name, value in values.items()})
+
+
 @pytest.mark.parametrize("data", AXES.values(), ids=AXES)
 def test_classical_conversion_gives_the_subtransient_reactance_at_high_frequency(data):
     X, X1, X2, X_l, T10, T20 = data

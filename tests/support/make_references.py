@@ -36,13 +36,16 @@ _DIP = 0.99 * np.exp(0.5j * np.pi / 180)  # small enough to leave the current li
 _BUS = ({"v_re": 1.0, "v_im": 0.0}, {"v_re": float(_DIP.real), "v_im": float(_DIP.imag)})
 _FOLDER = "fmus/synchronous_generator"
 _GENERATOR = ("i_re", "i_im", "omega", "delta", "v_t", "E_fd", "P_m")
+_EXACT = {"machine.exact_conversion": 1.0}  # one generator shows the other conversion
 _INFEED = {"i_re": 13.5, "i_im": 0.0}
 REFERENCES = (
     Reference(
         "gfor", "gfor_fmu/reference.csv", {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
         *_BUS, ("i_re", "i_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
     ),
-    Reference("synchronous_generator_ac4a", f"{_FOLDER}/reference_ac4a.csv", {"P_0": 0.8}, *_BUS, _GENERATOR),
+    Reference(
+        "synchronous_generator_ac4a", f"{_FOLDER}/reference_ac4a.csv", {"P_0": 0.8, **_EXACT}, *_BUS, _GENERATOR,
+    ),
     Reference("synchronous_generator_st1", f"{_FOLDER}/reference_st1.csv", {"P_0": 0.78}, *_BUS, _GENERATOR),
     Reference("synchronous_generator_st4b", f"{_FOLDER}/reference_st4b.csv", {"P_0": 0.9}, *_BUS, _GENERATOR),
     Reference(
@@ -52,7 +55,8 @@ REFERENCES = (
     ),
     *(
         Reference(
-            f"synchronous_generator_{exciter}_phasor", f"{_FOLDER}/reference_{exciter}_phasor.csv", {"P_0": P_0},
+            f"synchronous_generator_{exciter}_phasor", f"{_FOLDER}/reference_{exciter}_phasor.csv",
+            {"P_0": P_0, **(_EXACT if exciter == "ac4a" else {})},
             *_BUS, (*_GENERATOR, "e_re", "e_im"),
         )
         for exciter, P_0 in (("ac4a", 0.8), ("st1", 0.78), ("st4b", 0.9))

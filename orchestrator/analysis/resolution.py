@@ -1,0 +1,205 @@
+"""Whether a communication step resolves the modes: the step map's against the continuous system's.
+
+Inputs are held over a communication step. That delays every coupling by half a step and more, which moves a mode by
+about as much as the step grows; a step far too long leaves modes that have nothing to do with the system. The
+continuous system, from the components' own derivatives, has the modes as they are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.analysis.critical_modes import DENSE, nearest_eigenvalue
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import Mode, eigenvalues
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.told_step import as_if_told
+from orchestrator.errors import CosimError, InputError
+
+MOVED, LOST = 0.01, 0.1
+"""A step that moves a mode by the first part of its size is warned of; one by the second leaves nothing of it."""
+
+SWINGING = 0.5
+"""Damping ratio up to which a mode is compared; what is damped more is no swing."""
+
+SLOW_HZ = 5.0
+"""A lost mode below this is refused; faster ones, which only a wide range shows, are warned of."""
+
+_SLOWEST_HZ = 0.01
+_GROWTH = 1.0
+"""A step map that grows faster than the continuous system by more than this [1/s] is of an unstable coupling."""
+
+_COMPARED = 6
+"""Modes of a large system that are compared, least damped first: each costs a sparse factorisation."""
+
+_ADVISED = (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
+"""Steps [s] that are tried for an advice, longest first, and how many of them."""
+_TRIALS = 9
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A mode as a step map has it, and as the continuous system does [rad/s]."""
+
+    seen: complex
+    exact: complex
+
+    @property
+    def error(self) -> float:
+        """How far the step moves the mode, in parts of its size."""
+        return abs(self.seen - self.exact) / abs(self.exact)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether what is seen says nothing of the mode: far from it, or on the other side of stability."""
+        return self.error > LOST or (self.error > MOVED and self.seen.real * self.exact.real < 0)
+
+
+def check_resolution(
+    master: Master,
+    model: LinearModel,
+    system: LinearModel | None,
+    modes: Sequence[Mode],
+    frequency_range: tuple[float, float],
+    *,
+    coupling_unstable: bool = False,
+) -> tuple[str, ...]:
+    """Compare the modes of a step map with those of the continuous system.
+
+    Parameters
+    ----------
+    master
+        At the operating point; it is left as it was.
+    model, system
+        The step map, and the continuous model; None where a component gives no derivatives: nothing is said then.
+    modes
+        Of the step map.
+    frequency_range
+        In which modes were looked for [Hz].
+    coupling_unstable
+        Ask for a step at which the coupling is stable, even if the modes are resolved.
+
+    Returns
+    -------
+    What is to be said, with a step that is short enough: as computed, not as guessed.
+
+    Raises
+    ------
+    InputError
+        If a slow mode is lost: what the step map shows in its place would be a wrong verdict.
+    """
+    step = model.step_size
+    if step is None or system is None:
+        return ()
+    pairs = _pairs(model, system, modes, frequency_range)
+    worst = max(pairs, key=lambda pair: (_is_slow(pair) and pair.is_lost, pair.error), default=None)
+    moved = worst is not None and worst.error > MOVED
+    if worst is None or not moved:
+        return (_advice(master, system, pairs),) if coupling_unstable else ()
+    short = _short_step(master, system, pairs)
+    text = (
+        f"the communication step of {step:g} s {'does not resolve' if worst.is_lost else 'moves'} a mode: the step map "
+        f"has {_in_words(worst.seen)} where the system without a communication step has {_in_words(worst.exact)}"
+    )
+    if short is None:
+        return (
+            f"{text}; no shorter step that was tried comes nearer, so that the derivatives which the components "
+            "give disagree with their steps, or the coupling is unstable at all of them: compare with "
+            "`gfor linearize --continuous`",
+        )
+    if worst.is_lost and _is_slow(worst):
+        raise InputError(f"{text}; {_take(short)}")
+    return (f"{text}; {_take(short)}",)
+
+
+def _advice(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> str:
+    """For modes that are as they should be while the coupling is unstable."""
+    short = _short_step(master, system, pairs)
+    if short is None:
+        return "no shorter step that was tried has a stable coupling; see that the schedule has devices before the grid"
+    return f"against the unstable coupling, {_take(short)}"
+
+
+def _take(step: float) -> str:
+    return (
+        f"take a step of {step:g} s (`--step {step:g}`, or the case's solver.step_size): there the coupling is stable "
+        f"and no mode that was compared is moved by more than {100 * MOVED:g} %"
+    )
+
+
+def _in_words(value: complex) -> str:
+    return f"{abs(value.imag) / (2 * np.pi):.4g} Hz with {-100 * value.real / abs(value):.3g} % damping"
+
+
+def _is_slow(pair: Pair) -> bool:
+    return min(abs(pair.seen.imag), abs(pair.exact.imag)) < 2 * np.pi * SLOW_HZ
+
+
+# -- which modes -------------------------------------------------------------------------------------
+
+
+def _pairs(
+    model: LinearModel, system: LinearModel, modes: Sequence[Mode], frequency_range: tuple[float, float]
+) -> list[Pair]:
+    """The swings of the step map, each with the continuous system's nearest, and in a small system the reverse.
+
+    The reverse finds what the step map has lost altogether.
+    """
+    low, high = max(frequency_range[0], _SLOWEST_HZ), frequency_range[1]
+    seen = [mode.eigenvalue for mode in modes if _swings(mode.eigenvalue, low, high)]
+    nearest = _nearest(system)
+    if len(system.names) > DENSE:
+        return [Pair(value, nearest(value)) for value in seen[:_COMPARED]]
+    of_step = _nearest(model)
+    exact = [complex(value) for value in eigenvalues(system) if _swings(value, low, high)]
+    return [Pair(value, nearest(value)) for value in seen] + [Pair(of_step(value), value) for value in exact]
+
+
+def _swings(value: complex, low: float, high: float) -> bool:
+    return low <= value.imag / (2 * np.pi) <= high and -value.real <= SWINGING * abs(value)
+
+
+def _nearest(model: LinearModel) -> Callable[[complex], complex]:
+    """Of all eigenvalues [rad/s] of a model, the one nearest to a given one."""
+    if len(model.names) > DENSE:
+        return lambda wanted: nearest_eigenvalue(model, wanted)
+    values: NDArray[np.complex128] = eigenvalues(model)
+    return lambda wanted: complex(values[np.argmin(np.abs(values - wanted))])
+
+
+# -- which step --------------------------------------------------------------------------------------
+
+
+def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> float | None:
+    """The longest step tried [s] that moves none of the modes and leaves the coupling stable; None if none does."""
+    exact = list(dict.fromkeys(pair.exact for pair in pairs))
+    limit = max(0.0, float(eigenvalues(system).real.max(initial=0.0))) + _GROWTH
+    shorter = [step for step in _ADVISED if step <= 0.51 * master.clock.step_size]
+    for step in shorter[:_TRIALS]:
+        try:
+            with as_if_told(master, step):
+                model = compose(Blocks(master, step), master.schedule)
+        except CosimError:  # an FMU may refuse a step; others are left to try
+            continue
+        nearest = _nearest(model)
+        if all(Pair(nearest(value), value).error <= MOVED for value in exact) and _growth(model) <= limit:
+            return step
+    return None
+
+
+def _growth(model: LinearModel) -> float:
+    """Growth of what grows fastest in a step map [1/s]; 0 where nothing stands out from the crowd of slow modes."""
+    if model.step_size is None or len(model.names) <= DENSE:
+        return float(eigenvalues(model).real.max())
+    n = len(model.names)
+    step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
+    start = np.random.default_rng(0).standard_normal(n)
+    try:
+        largest = spla.eigs(step, k=2, ncv=20, maxiter=50, tol=1e-6, v0=start, return_eigenvectors=False)
+    except spla.ArpackNoConvergence:
+        return 0.0
+    return float(np.log(np.abs(largest).max()) / model.step_size)

@@ -1,0 +1,42 @@
+"""What the data of one component must obey together, because physics or the equations leave no other choice."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """The parameter ``larger`` must exceed ``smaller``, or at least reach it."""
+
+    larger: str
+    smaller: str
+    why: str
+    may_be_equal: bool = False
+
+    def holds(self, larger: float, smaller: float) -> bool:
+        return larger > smaller or (self.may_be_equal and larger == smaller)
+
+    def text(self, larger: str, smaller: str) -> str:
+        """The rule with the values seen, both as text."""
+        must = "must not exceed" if self.may_be_equal else "must be less than"
+        return f"{smaller} {must} {larger}: {self.why}"
+
+
+_FIELD = "what a winding screens, it takes from the reactance; a machine without a field winding is not modelled"
+_SCREENS = "a winding that reacts can only lower the reactance; equal says that there is no such winding"
+_LEAKAGE = "the leakage reactance is what no rotor winding can screen"
+_SLOWER = "the transient is by definition the slower one; check the units and whether the two are swapped"
+
+RULES = (
+    Rule("machine.X_d", "machine.X_d1", _FIELD),
+    Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
+    Rule("machine.X_d2", "machine.X_l", _LEAKAGE),
+    Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
+    Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True),
+    Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
+    Rule("machine.T_d10", "machine.T_d20", _SLOWER),
+    Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+)
+"""The machines' FMUs refuse the same in any tool; here it is said with the line, before anything is started."""
+
+RESISTANCES = (("transformer.R_t", "transformer.X_t"), ("filter.R_c", "filter.X_c"))
+"""Each with the reactance that it should not exceed."""

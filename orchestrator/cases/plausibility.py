@@ -1,0 +1,230 @@
+"""Data that cannot be are refused, data that are most unusual are questioned; both with their place in the file.
+
+A question is a warning: the case runs. It is answered by the key ``meant`` of the case, a list of names
+``component.variable`` (patterns such as ``sg*.machine.H`` fit several).
+"""
+
+import fnmatch
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.plausible_ranges import (
+    LINE_B,
+    LINE_RATIO,
+    LINE_X,
+    MOST_R_OVER_X,
+    RANGES,
+    SMALLEST_SHARE,
+    STRAY_B,
+    Plausible,
+)
+from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import Problem
+from orchestrator.fmi.port import BoundDescription
+
+_SHOWN = 3
+"""Components that a question names; the others are counted."""
+
+
+def check_plausibility(draft: Draft) -> None:
+    """Note what cannot be, and collect the draft's questions."""
+    for name, plan in draft.system.components.items():
+        for rule in RULES:
+            _check_rule(draft, name, plan, rule)
+    _check_frequencies(draft)
+    draft.questions = _merged([d for d in _doubts(draft) if not _is_meant(draft, d.name)])
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubt:
+    """A value that is most unusual: ``component.variable``, its place, and what is said about it."""
+
+    name: str
+    place: str
+    text: str
+
+
+def _doubts(draft: Draft) -> Iterator[_Doubt]:
+    for name, plan in draft.system.components.items():
+        for variable in plan.description.parameters:
+            wanted, value = RANGES.get(variable), _value(plan, variable)
+            if wanted is not None and value is not None and _unit(plan, variable) == wanted.unit:
+                yield from _outside(draft, name, variable, value, wanted)
+        for resistance, reactance in RESISTANCES:
+            R, X = _value(plan, resistance), _value(plan, reactance)
+            if R is not None and X is not None and R > X > 0:
+                text = f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
+                yield _Doubt(f"{name}.{resistance}", _place(draft, name, resistance, reactance), text)
+    yield from _small_units(draft)
+    yield from _lines(draft)
+
+
+# -- one value ---------------------------------------------------------------------------------------
+
+
+def _outside(
+    draft: Draft, component: str, variable: str, value: float, wanted: Plausible, where: str | None = None
+) -> Iterator[_Doubt]:
+    if wanted.fits(value):
+        return
+    unit = f" {wanted.unit}" if wanted.unit != "1" else ""
+    usual = f"{wanted.low:g} to {wanted.high:g}{unit}" if wanted.low < wanted.high else f"{wanted.low:g}{unit}"
+    slip = ""
+    for factor, text in ((1e-3, "too large"), (1e3, "too small")):
+        if wanted.low <= value * factor <= wanted.high:
+            slip = f"; it looks {'1000' if wanted.low < wanted.high else ''} times {text}: check its unit and base"
+    text = f"{variable} = {value:g}{unit} is outside of {usual} ({wanted.why}){slip}"
+    yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
+
+
+def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> None:
+    larger, smaller = _value(plan, rule.larger), _value(plan, rule.smaller)
+    if larger is None or smaller is None or rule.holds(larger, smaller):
+        return
+    texts = [
+        f"{v} = {x:g} {_unit(plan, v)}{'' if v in plan.parameters else ' (the default)'}"
+        for v, x in ((rule.larger, larger), (rule.smaller, smaller))
+    ]
+    draft.note(_place(draft, name, rule.smaller, rule.larger), rule.text(*texts))
+
+
+# -- several components ------------------------------------------------------------------------------
+
+
+def _check_frequencies(draft: Draft) -> None:
+    """What is coupled has one rated frequency: frames of two frequencies turn against each other."""
+    rated = {name: f for name, plan in draft.system.components.items() if (f := _frequency(plan)) is not None}
+    for group in _coupled(draft):
+        known = {name: rated[name] for name in group if name in rated}
+        if len(set(known.values())) < 2:
+            continue
+        grid = draft.grid if draft.grid in known else None
+        common = known[grid] if grid else max(set(known.values()), key=list(known.values()).count)
+        reference = grid or next(name for name, f in known.items() if f == common)
+        for name, f in known.items():
+            if f != common:
+                draft.note(
+                    _frequency_place(draft, name),
+                    f"{name} is rated at {f:g} Hz and {reference} at {common:g} Hz; what is coupled has one rated "
+                    f"frequency, because voltages and currents are exchanged in one frame: give both the same f_n "
+                    f"(a whole [network] has a key 'frequency', a binding has rating.f_n)",
+                )
+
+
+def _frequency(plan: ComponentPlan) -> float | None:
+    """A binding says what an FMU's per-unit frequency and angles mean, whatever parameters the FMU has itself."""
+    return plan.description.port.f_n if isinstance(plan.description, BoundDescription) else _value(plan, "f_n")
+
+
+def _frequency_place(draft: Draft, name: str) -> str:
+    if isinstance(draft.system.components[name].description, BoundDescription):
+        return draft.place("components", name, "binding")
+    return _place(draft, name, "f_n")
+
+
+def _coupled(draft: Draft) -> list[set[str]]:
+    """Components that are connected, directly or through others."""
+    groups = [{name} for name in draft.system.components]
+    for connection in draft.system.connections:
+        ends = {connection.source.component, connection.target.component}
+        touched = [group for group in groups if group & ends]
+        groups = [group for group in groups if not group & ends] + [set().union(*touched)]
+    return groups
+
+
+def _small_units(draft: Draft) -> Iterator[_Doubt]:
+    """Ratings of units in the power flow that nothing of the network would notice."""
+    ports = {p.name: p.bus for p in draft.network.ports} if draft.network else {}
+    plans = {name: plan for name, plan in draft.system.components.items() if name in ports}
+    ratings = {name: S_n for name, plan in plans.items() if (S_n := _value(plan, "S_n")) is not None}
+    if not ratings:
+        return
+    largest = max(ratings, key=lambda name: ratings[name])
+    for name, S_n in ratings.items():
+        shared = [n for n in draft.origins if n in ratings and ports[n] == ports[name]] if name in draft.origins else []
+        whole = sum(ratings[n] for n in shared) if shared else S_n  # a unit's share may be as small as it likes
+        if whole < SMALLEST_SHARE * ratings[largest]:
+            text = f"S_n = {S_n:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
+            yield _Doubt(f"{name}.S_n", _place(draft, name, "S_n"), text)
+
+
+def _lines(draft: Draft) -> Iterator[_Doubt]:
+    """Reactance, charging, ratio and R/X of the lines of the network, with the values that are set."""
+    grid = draft.system.components.get(draft.grid or "")
+    if grid is None or draft.network is None or draft.grid is None:
+        return
+    wanted = {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}
+    for line in draft.network.lines:
+        found = {q: _value(grid, f"{q}_{line.name}") for q in ("X", "R", "B", "tap")}
+        for quantity, usual in wanted.items():
+            value = found[quantity]
+            if value is not None:
+                where = _line_place(draft, line.name, quantity)
+                yield from _outside(draft, draft.grid, f"{quantity}_{line.name}", value, usual, where)
+        R, X = found["R"], found["X"]
+        if R is not None and X is not None and R > MOST_R_OVER_X * X:
+            text = f"R_{line.name} = {R:g} pu is {R / X:.3g} times X_{line.name} = {X:g} pu; are the two swapped?"
+            yield _Doubt(f"{draft.grid}.R_{line.name}", _line_place(draft, line.name, "R"), text)
+    if (stray := _value(grid, "stray_B")) is not None:
+        yield from _outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
+
+
+def _line_place(draft: Draft, line: str, quantity: str) -> str:
+    """Where a line's value was set, else where the line is."""
+    table = draft.case.network
+    if set_at := draft.places.get(f"{draft.grid}.{quantity}_{line}"):
+        return set_at
+    if table is not None and line in table.lines:
+        return draft.place("network", "lines", line, quantity)
+    in_file = draft.data.places.get(line) if draft.data else None
+    source = next((key for key in ("pandapower", "matpower") if table is not None and getattr(table, key)), None)
+    return in_file or f"{draft.place('network', source) if source else draft.place('network')}, line {line!r}"
+
+
+# -- places and values -------------------------------------------------------------------------------
+
+
+def _place(draft: Draft, name: str, *variables: str) -> str:
+    """Where the first of some variables of a component was set that was set at all, else the component."""
+    found = (draft.places.get(f"{name}.{variable}") for variable in variables)
+    return next((place for place in found if place), f"{draft.place('components', name)}, {variables[0]} (its default)")
+
+
+def _value(plan: ComponentPlan, variable: str) -> float | None:
+    """The number in effect: what is set, else the FMU's default; None where there is neither."""
+    if variable in plan.parameters:
+        return float(plan.parameters[variable])
+    info = plan.description.variables.get(variable)
+    if info is None or info.type == "Boolean" or info.start is None:
+        return None
+    try:
+        return float(info.start)
+    except ValueError:
+        return None
+
+
+def _unit(plan: ComponentPlan, variable: str) -> str:
+    return plan.description.variables[variable].unit
+
+
+def _is_meant(draft: Draft, name: str) -> bool:
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.case.meant)
+
+
+def _merged(doubts: list[_Doubt]) -> list[Problem]:
+    """One question for equal ones about several components, each with how to answer it."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for doubt in doubts:
+        groups.setdefault((doubt.place, doubt.text), []).append(doubt.name)
+    return [Problem(place, _question(text, names)) for (place, text), names in groups.items()]
+
+
+def _question(text: str, names: list[str]) -> str:
+    components = [name.partition(".")[0] for name in names]
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return (
+        f"{', '.join(components[:_SHOWN])}{more}: {text}; if it is meant, say so at the top of the case: "
+        f'meant = ["{names[0]}"]'
+    )

@@ -1,0 +1,123 @@
+"""What the data of a power system usually are: a value outside is questioned, not refused.
+
+The ranges are wide: they are there for slips of a unit (ms for s, kVA for MVA) or of a base, and not to judge data.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Plausible:
+    """A range, both ends included.
+
+    Attributes
+    ----------
+    unit
+        The variable's; a variable of the same name in another unit is not meant.
+    why
+        Where the range comes from.
+    or_zero
+        Whether 0 is usual as well, because it leaves something out.
+    """
+
+    low: float
+    high: float
+    unit: str
+    why: str
+    or_zero: bool = False
+
+    def fits(self, value: float) -> bool:
+        return self.low <= value <= self.high or (self.or_zero and value == 0)
+
+
+_KUNDUR_H = "Kundur 1994, table 3.2: 2 to 10 s, widened"
+_KUNDUR = "Kundur 1994, table 4.2, widened"
+_421 = "IEEE 421.5, typical data, widened"
+_PSS = "IEEE 421.5, stabilisers, widened"
+_GOVERNORS = "IEEE PES-TR1, turbine-governor models, widened"
+_FILTER = "usual LC filters and transformers of converters"
+_CONTROL = "usual time scales of converter control"
+
+_MACHINE = {
+    "machine.H": Plausible(0.5, 15, "s", _KUNDUR_H),
+    "machine.R_s": Plausible(0, 0.05, "pu", _KUNDUR),
+    "machine.X_l": Plausible(0.02, 0.5, "pu", _KUNDUR),
+    "machine.X_d": Plausible(0.3, 4, "pu", _KUNDUR),
+    "machine.X_d1": Plausible(0.05, 1, "pu", _KUNDUR),
+    "machine.X_d2": Plausible(0.04, 1, "pu", _KUNDUR),
+    "machine.X_q": Plausible(0.2, 4, "pu", _KUNDUR),
+    "machine.X_q1": Plausible(0.05, 4, "pu", _KUNDUR),
+    "machine.X_q2": Plausible(0.04, 4, "pu", _KUNDUR),
+    "machine.T_d10": Plausible(0.5, 20, "s", _KUNDUR),
+    "machine.T_d20": Plausible(0.005, 0.3, "s", _KUNDUR),
+    "machine.T_q10": Plausible(0.05, 10, "s", _KUNDUR),
+    "machine.T_q20": Plausible(0.005, 0.4, "s", _KUNDUR),
+    "exciter.K_A": Plausible(1, 2000, "pu", _421),
+    "exciter.T_A": Plausible(0.001, 1, "s", _421),
+    "exciter.T_R": Plausible(0.001, 0.2, "s", _421),
+    "exciter.T_B": Plausible(0.005, 60, "s", _421, or_zero=True),
+    "exciter.T_C": Plausible(0.005, 60, "s", _421, or_zero=True),
+    "exciter.K_PR": Plausible(0.01, 300, "pu", _421, or_zero=True),
+    "exciter.K_IR": Plausible(0.01, 300, "1/s", _421),
+    "exciter.K_P": Plausible(0.5, 20, "pu", _421),
+    **{f"pss.{T}": Plausible(0.5, 50, "s", _PSS, or_zero=True) for T in ("T_w1", "T_w2", "T_w3", "T_w4", "T_7")},
+    **{f"pss.T_{k}": Plausible(0.005, 10, "s", _PSS, or_zero=True) for k in (1, 2, 3, 4, 6, 8, 9)},
+    "pss.K_s1": Plausible(0.01, 100, "pu", _PSS, or_zero=True),
+    "pss.limit": Plausible(0.005, 0.5, "pu", _PSS, or_zero=True),
+    "governor.inverse_R": Plausible(5, 100, "pu", _GOVERNORS, or_zero=True),
+    **{f"governor.T_{k}": Plausible(0.005, 60, "s", _GOVERNORS, or_zero=True) for k in range(1, 8)},
+}
+
+_CONVERTER = {
+    "filter.R_c": Plausible(0, 0.1, "pu", _FILTER),
+    "filter.X_c": Plausible(0.01, 0.6, "pu", _FILTER),
+    "filter.B_c": Plausible(0.01, 0.6, "pu", _FILTER),
+    "transformer.R_t": Plausible(0, 0.1, "pu", _FILTER),
+    "transformer.X_t": Plausible(0.01, 0.6, "pu", _FILTER, or_zero=True),
+    "droop.R_f": Plausible(0.001, 0.3, "pu", "grid codes: 2 to 12 % of rated frequency at rated power", or_zero=True),
+    "droop.R_V": Plausible(0.001, 0.5, "pu", "usual voltage droops: 2 to 10 %", or_zero=True),
+    "droop.tau_P": Plausible(0.002, 2, "s", _CONTROL),
+    "droop.tau_Q": Plausible(0.002, 2, "s", _CONTROL),
+    "voltage_control.tau": Plausible(0.002, 0.5, "s", _CONTROL),
+    "voltage_control.i_q_max": Plausible(0.5, 5, "pu", "usual current limits: 1 to 3 of the rated current"),
+    "voltage_control.i_d_max": Plausible(0.5, 5, "pu", "usual current limits: 1 to 3 of the rated current"),
+    "current_control.tau": Plausible(0.0002, 0.02, "s", _CONTROL),
+    "feed_forward.tau": Plausible(1e-5, 0.02, "s", _CONTROL),
+}
+
+_POD = {
+    "T_W": Plausible(0.3, 50, "s", "a washout passes 0.1 to 2 Hz"),
+    "T_f": Plausible(0.001, 2, "s", "a filter that passes 0.1 to 2 Hz"),
+    "T_S1": Plausible(0.001, 10, "s", "a lead that turns 0.1 to 2 Hz", or_zero=True),
+    "T_S2": Plausible(0.001, 10, "s", "a lag that turns 0.1 to 2 Hz", or_zero=True),
+    "K": Plausible(0, 10_000, "pu", "50 times the paper's 200"),
+    "limit": Plausible(0.002, 1.5, "pu", "up to the rating", or_zero=True),
+}
+
+_PORT = {
+    "S_n": Plausible(0.05, 20_000, "MVA", "from a distribution converter to a whole area"),
+    "S_base": Plausible(100, 100, "MVA", "the networks here are per unit on 100 MVA"),
+    "V_n": Plausible(0.1, 1500, "kV", "from low voltage to 1500 kV"),
+    "f_n": Plausible(45, 65, "Hz", "grids have 50 or 60 Hz"),
+    "v_0": Plausible(0.8, 1.2, "pu", "operation within 20 % of the rated voltage"),
+}
+
+RANGES: dict[str, Plausible] = {
+    **_PORT,
+    **_MACHINE,
+    **_CONVERTER,
+    **{f"{pod}.{name}": wanted for pod in ("pod_p", "pod_q") for name, wanted in _POD.items()},
+}
+"""By the variable's name inside a component."""
+
+_LINE = "lines and transformers on 100 MVA, from 20 kV cables to tie lines"
+LINE_X = Plausible(1e-5, 10, "pu", _LINE)
+LINE_B = Plausible(0, 10, "pu", _LINE)
+LINE_RATIO = Plausible(0.6, 1.6, "1", "tap changers and off-nominal ratios")
+STRAY_B = Plausible(0, 1, "pu", "a stray capacitance is small")
+
+MOST_R_OVER_X = 5.0
+"""Of a line; low-voltage cables come near it."""
+
+SMALLEST_SHARE = 1e-3
+"""Of the largest unit's rating: a smaller unit of the same network is questioned."""
