@@ -71,11 +71,12 @@ def test_parameters_of_one_unit(case):
     assert v["sg20.governor.T_5"] == 8
 
 
-def test_the_frequency_goes_to_everything_that_has_one_and_may_be_set(case):
+def test_the_frequency_goes_to_everything_that_has_one_and_no_other_may_be_set(case):
+    (ready,) = case().prepare(["plain"])
+    assert [ready.values[f"{n}.f_n"] for n in ("grid", "sg7", "sg20", "gfor7")] == [60, 60, 60, 60]
     text = CASE.replace("converter_parameters = {", "converter_parameters = { f_n = 50,")
-    (ready,) = case(text).prepare(["plain"])
-    v = ready.values
-    assert [v[f"{n}.f_n"] for n in ("grid", "sg7", "sg20", "gfor7")] == [60, 60, 60, 50]
+    with pytest.raises(CaseError, match="gfor7 is rated at 50 Hz and grid at 60 Hz"):
+        case(text).prepare(["plain"])
     (ready,) = case(CASE.replace('frequency = "60 Hz"\n', "")).prepare(["plain"])
     assert "grid.f_n" not in ready.values  # MATPOWER's files do not know theirs: every model keeps its own, 50 Hz
 
