@@ -2,16 +2,27 @@
 
 import numpy as np
 
+from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.model import Model
+from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 
 
-def exact_continuous(prepared: PreparedScenario) -> tuple[np.ndarray, list[str]]:
-    """Matrix A of ẋ = A·x, and the names of the states."""
+def network_of(case: Case, scenario: str, overrides: dict | None = None) -> Network:
+    """The network for which a case's grid is built."""
+    preparer = case._preparer(scenario, overrides, ())
+    preparer.assemble()
+    assert preparer.draft.network is not None
+    return preparer.draft.network
+
+
+def exact_continuous(prepared: PreparedScenario, network: Network | None = None) -> tuple[np.ndarray, list[str]]:
+    """Matrix A of ẋ = A·x, and the names of the states; ``network`` is that of a grid built for the case."""
     parts = {}
     for name, plan in prepared.system.components.items():
-        model = build_model(plan.description.model_name)
+        own = network is not None and plan.description.model_name == network.name
+        model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
         parts[name] = (model, p, c, x)
