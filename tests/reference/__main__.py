@@ -61,8 +61,8 @@ def contents() -> dict[str, dict[str, Any]]:
     """Files by name."""
     return {
         "two_area.json": {
-            "provenance": "python -m tests.reference; README.md beside this file. 'independent': eigenvalues [1/s] from "
-            "0.1 to 2 Hz and the largest growth rate [1/s] of the two-area system, from an independent monolithic "
+            "provenance": "python -m tests.reference; README.md beside this file. 'independent': eigenvalues [1/s] "
+            "from 0.1 to 2 Hz and the largest growth rate [1/s] of the two-area system, from an independent monolithic "
             "linearisation. 'paper': its table of the electromechanical mode at X_L = 0.1: real, imag, Hz, damping %. "
             "Mateu-Barriendos et al. 2024; system data: Norma tecnica de supervision 631 v2.0 (2020).",
             "paper": PAPER_TABLE,

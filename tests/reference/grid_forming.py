@@ -7,7 +7,6 @@ import numpy as np
 from tests.reference.blocks import lag, lead_lag, washout
 from tests.reference.descriptor import Unknowns
 
-
 Data = dict[str, float]
 
 W_B = 100 * np.pi
@@ -17,8 +16,10 @@ GFOR: Data = {
     "S_n": 1500.0, "filter.R_c": 0.005, "filter.X_c": 0.15, "filter.B_c": 0.15, "transformer.R_t": 0.002,
     "transformer.X_t": 0.15, "droop.R_f": 0.05, "droop.R_V": 0.067, "droop.tau_P": 0.1, "droop.tau_Q": 0.1,
     "feed_forward.tau": 1e-4, "voltage_control.tau": 0.05, "voltage_control.xi": 0.707, "current_control.tau": 1e-3,
-    "pod_p.enabled": False, "pod_p.K": 200.0, "pod_p.T_W": 5.0, "pod_p.T_f": 0.1, "pod_p.T_S1": 0.20, "pod_p.T_S2": 0.37,
-    "pod_q.enabled": False, "pod_q.K": 200.0, "pod_q.T_W": 5.0, "pod_q.T_f": 0.1, "pod_q.T_S1": 0.26, "pod_q.T_S2": 0.29,
+    "pod_p.enabled": False, "pod_p.K": 200.0, "pod_p.T_W": 5.0, "pod_p.T_f": 0.1,
+    "pod_p.T_S1": 0.20, "pod_p.T_S2": 0.37,
+    "pod_q.enabled": False, "pod_q.K": 200.0, "pod_q.T_W": 5.0, "pod_q.T_f": 0.1,
+    "pod_q.T_S1": 0.26, "pod_q.T_S2": 0.29,
 }  # fmt: skip
 """The paper's converter; N_S = 2 stages."""
 

@@ -47,9 +47,9 @@ SG2: Data = _COMMON | {
 """ST1."""
 
 PSS2A: Data = {
-    "pss.T_w1": 2.0, "pss.T_w2": 2.0, "pss.T_6": 0.0, "pss.T_w3": 2.0, "pss.T_w4": 0.0, "pss.T_7": 2.0, "pss.K_s2": 0.158,
-    "pss.K_s3": 1.0, "pss.T_8": 0.0, "pss.T_9": 0.1, "pss.K_s1": 17.069, "pss.T_1": 0.28, "pss.T_2": 0.04,
-    "pss.T_3": 0.28, "pss.T_4": 0.12,
+    "pss.T_w1": 2.0, "pss.T_w2": 2.0, "pss.T_6": 0.0, "pss.T_w3": 2.0, "pss.T_w4": 0.0, "pss.T_7": 2.0,
+    "pss.K_s2": 0.158, "pss.K_s3": 1.0, "pss.T_8": 0.0, "pss.T_9": 0.1, "pss.K_s1": 17.069, "pss.T_1": 0.28,
+    "pss.T_2": 0.04, "pss.T_3": 0.28, "pss.T_4": 0.12,
 }  # fmt: skip
 """Of SG1 in the grid code's test; M = 5, N = 1."""
 

@@ -42,13 +42,17 @@ def test_with_saturation_the_damping_is_the_papers_within_a_tenth_of_a_point(sce
 
 
 @pytest.mark.parametrize(
-    "row", FIGURES["independent"], ids=lambda r: f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}"
+    "row",
+    FIGURES["independent"],
+    ids=lambda r: f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}{'-saturated' * r['saturation']}",
 )
 def test_every_mode_of_the_independent_linearisation_is_found(row):
     overrides = {"grid.X_L": row["X_L"], "sg1.governor.enabled": row["governor_on_sg1"]}
+    overrides |= SATURATED if row["saturation"] else {}
     modes = compute_modes(*prepare(row["scenario"], overrides)).modes
-    for real, imag in row["eigenvalues"]:
-        assert min(abs(m.eigenvalue - complex(real, imag)) for m in modes) < 0.02
+    for value in (complex(*parts) for parts in row["eigenvalues"]):
+        error = min(abs(m.eigenvalue - value) for m in modes)
+        assert error < (0.002 if value.real > -5 else 0.02)  # the step moves fast control modes more
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The exact continuous linear model of a prepared case: CasADi Jacobians, interconnected without any FMU."""
 
 import numpy as np
+from scipy.linalg import expm
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model
@@ -19,13 +20,7 @@ def network_of(case: Case, scenario: str, overrides: dict | None = None) -> Netw
 
 def exact_continuous(prepared: PreparedScenario, network: Network | None = None) -> tuple[np.ndarray, list[str]]:
     """Matrix A of ẋ = A·x, and the names of the states; ``network`` is that of a grid built for the case."""
-    parts = {}
-    for name, plan in prepared.system.components.items():
-        own = network is not None and plan.description.model_name == network.name
-        model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
-        p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
-        c, x = model.initialise(p)
-        parts[name] = (model, p, c, x)
+    parts = _parts(prepared, network)
     inputs = _inputs(prepared, parts)
     blocks = {}
     for name, (model, p, c, x) in parts.items():
@@ -33,6 +28,18 @@ def exact_continuous(prepared: PreparedScenario, network: Network | None = None)
         rates = np.array(model.derivatives(x, inputs[name], p, c))
         assert np.abs(rates).max(initial=0) < 1e-6, f"{name} is not in steady state"  # [1/s]
     return _interconnect(prepared, parts, blocks)
+
+
+def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
+    """Model, parameters, constants and initial states of every component."""
+    parts = {}
+    for name, plan in prepared.system.components.items():
+        own = network is not None and plan.description.model_name == network.name
+        model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
+        p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
+        c, x = model.initialise(p)
+        parts[name] = (model, p, c, x)
+    return parts
 
 
 def _inputs(prepared: PreparedScenario, parts: dict) -> dict[str, np.ndarray]:
@@ -79,3 +86,41 @@ def _block_diagonal(blocks: list[np.ndarray]) -> np.ndarray:
 
 def _index(variables: tuple, name: str) -> int:
     return [v.name for v in variables].index(name)
+
+
+def exact_step_map(prepared: PreparedScenario, network: Network | None = None) -> np.ndarray:
+    """One communication step of the linearised system, every device integrated exactly between its held inputs.
+
+    By hand: a state vector and the inputs that are held, carried through the schedule's groups one after the other.
+    """
+    parts = _parts(prepared, network)
+    inputs = _inputs(prepared, parts)
+    step = {}
+    for name, (model, p, c, x) in parts.items():
+        A, B, C, D = (np.array(block) for block in model.jacobians()(x, inputs[name], p, c))
+        n, m = B.shape
+        held = np.zeros((n + m, n + m))
+        held[:n, :n], held[:n, n:] = A, B
+        over = expm(held * prepared.step_size)
+        step[name] = over[:n, :n], over[:n, n:], C, D
+    first = dict(zip(parts, np.cumsum([0, *(len(part[0].states) for part in parts.values())]), strict=False))
+    size = sum(len(part[0].states) for part in parts.values())
+    offset = dict(zip(parts, size + np.cumsum([0, *(len(part[0].inputs) for part in parts.values())]), strict=False))
+    whole = size + sum(len(part[0].inputs) for part in parts.values())
+    z, fed = np.eye(whole), set(range(size))
+    for group in prepared.schedule.groups:
+        outputs = {}
+        for name in group:
+            over_x, over_u, C, D = step[name]
+            states = slice(first[name], first[name] + len(over_x))
+            held = z[offset[name] : offset[name] + over_u.shape[1]]
+            z[states] = over_x @ z[states] + over_u @ held
+            outputs[name] = C @ z[states] + D @ held
+        for wire in prepared.system.connections:
+            if wire.source.component in outputs:
+                source, target = parts[wire.source.component][0], parts[wire.target.component][0]
+                row = offset[wire.target.component] + _index(target.inputs, wire.target.variable)
+                fed.add(row)
+                z[row] = outputs[wire.source.component][_index(source.outputs, wire.source.variable)]
+    kept = sorted(fed)  # an input that nothing feeds is a constant, not a state
+    return z[np.ix_(kept, kept)]
