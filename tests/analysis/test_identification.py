@@ -31,6 +31,17 @@ def test_close_and_well_damped_modes_are_told_apart():
     assert modes[0].eigenvalue == pytest.approx(wanted[0], abs=1e-2)
 
 
+def test_as_many_modes_as_a_system_of_several_areas_has_are_found():
+    """Six oscillations beside a drift are an order of thirteen; a pencil of a lower one blends them."""
+    wanted = [complex(-0.02 - 0.06 * k, 2 * np.pi * (0.25 + 0.28 * k)) for k in range(6)]
+    signal = sum(exponential(v, 1 - 0.12 * k, 0.5 * k) for k, v in enumerate(wanted)) + 0.5 * np.exp(-0.2 * TIMES)
+    found = identify_modes(TIMES, signal)
+    for k, value in enumerate(wanted):
+        mode = nearest(found, value)
+        assert mode.eigenvalue == pytest.approx(value, abs=1e-4)
+        assert mode.amplitude == pytest.approx((1 - 0.12 * k) / 2, rel=1e-3)
+
+
 def test_noise_is_not_a_mode():
     rng = np.random.default_rng(1)
     signal = exponential(-0.2 + 4j, 1.0) + 1e-3 * rng.standard_normal(len(TIMES))

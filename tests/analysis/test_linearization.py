@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator.analysis.component_linearization import linearize_component
 from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.linear_model import HELD
 from orchestrator.analysis.linearization import Blocks, compose, continuous
@@ -10,6 +11,8 @@ from orchestrator.analysis.modes import eigenvalues
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel, jacobi
+from orchestrator.coupling.system import System
+from tests.coupling.small_fmus import lag_factor, small_fmu
 from tests.support.exact import exact_continuous
 
 SCENARIOS = ("base", "gfor", "pod_pq")
@@ -123,3 +126,17 @@ def test_linearisation_leaves_the_system_as_it_was():
 def test_two_perturbation_sizes_agree():
     with running(prepared("pod_pq")) as master:
         assert 0 < Blocks(master).disagreement < 1e-8
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0, 2e7, -5e9])
+def test_a_perturbation_is_as_large_as_its_value_needs(value):
+    """At 2e7 a step of 1e-5 is two thousand times the distance of neighbouring numbers: three digits, not nine."""
+    system = System()
+    system.add("one", small_fmu("lag"), {"T": 0.005, "x_0": value}, {"u": value})
+    with Master(system, gauss_seidel((("one",),)), 1e-3) as master:
+        found = linearize_component(master.exchanges["one"], 0.0, 1e-3, ["u"], ["y"])
+    left = lag_factor(1e-3, 0.005)
+    assert found.A.item() == pytest.approx(left, abs=1e-9)
+    assert found.B.item() == pytest.approx(1 - left, abs=1e-9)
+    assert found.C_o.item() == pytest.approx(1.0, abs=1e-9)
+    assert found.disagreement < 1e-9

@@ -111,6 +111,29 @@ def test_states_that_come_and_go_do_not_lose_the_modes():
     assert both.frequencies[link.source] == pytest.approx(1.5, abs=1e-3)
 
 
+def shared(similarity):
+    """Two sets of one mode each, whose product of eigenvectors is the similarity."""
+    a = ModeSet(np.array([1j]), np.array([[1, 0]], complex), np.array([[1, 0]], complex), ("x", "y"))
+    vector = np.array([[np.sqrt(similarity), np.sqrt(1 - similarity)]], complex)
+    return a, ModeSet(np.array([1.01j]), vector, vector, ("x", "y"))
+
+
+@pytest.mark.parametrize("alike", [0.35, 0.49, 0.51, 0.75])
+def test_more_than_half_of_a_mode_is_the_mode(alike):
+    a, b = shared(alike)
+    assert similarity(a, b).item() == pytest.approx(alike)
+    assert [link.similarity for link in match(a, b)] == ([pytest.approx(alike)] if alike > 0.5 else [])
+
+
+@pytest.mark.parametrize(("best", "other", "linked"), [(0.62, 0.30, True), (0.62, 0.34, False), (0.55, 0.2, True)])
+def test_a_mode_with_a_rival_nearly_as_good_is_taken_for_neither(best, other, linked):
+    a, _ = shared(1.0)
+    vectors = np.sqrt(np.array([[best, 1 - best], [other, 1 - other]], complex))
+    b = ModeSet(np.array([1.01j, 1.02j]), vectors, vectors, ("x", "y"))
+    assert similarity(a, b)[0] == pytest.approx([best, other])
+    assert bool(match(a, b)) == linked
+
+
 def test_a_point_without_modes():
     nothing = mode_set(np.array([[-1.0]]), ("a.x",), (0.1, 2.0))
     assert match(nothing, oscillators(0.5, 1.5)) == []

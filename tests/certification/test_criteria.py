@@ -59,6 +59,33 @@ def test_growth_is_a_fault_at_any_frequency_unless_it_was_there_before():
     assert stability_fault(1e-5, -0.1) is None
 
 
+@pytest.mark.parametrize(("growth", "faulty"), [(0.5e-3, False), (0.9e-3, False), (1.2e-3, True), (0.1, True)])
+def test_what_counts_as_growth(growth, faulty):
+    """The free angle's eigenvalue is zero to 1e-3; a system that doubles within ten minutes is not stable."""
+    assert bool(stability_fault(growth, -0.1)) == faulty
+    assert bool(stability_fault(0.5, growth)) != faulty
+
+
+@pytest.mark.parametrize(("before", "existing"), [(0.049, True), (0.051, False)])
+def test_whether_a_mode_was_below_already_is_decided_at_five_percent(before, existing):
+    assert verdict((0.5, 0.03, "a"), [(0.55, before, "a")]).accepted == existing
+
+
+@pytest.mark.parametrize(("ratio", "accepted"), [(0.0499, False), (0.0501, True)])
+def test_a_mode_that_is_introduced_is_judged_at_five_percent(ratio, accepted):
+    assert verdict((0.5, ratio, "converter"), []).accepted == accepted
+
+
+def test_half_of_a_mode_makes_it_the_same():
+    """Of a mode that the converter shares, the one it resembles by 0.55 is the same, and by 0.45 is none."""
+    for alike, same in ((0.55, True), (0.45, False)):
+        shape = np.array([[np.sqrt(alike), np.sqrt(1 - alike)]], complex)
+        having = ModeSet(np.array([mode(0.5, 0.03)]), shape, shape, ("a", "b"))
+        one = np.array([[1.0, 0.0]], complex)
+        (found,) = eigenvalue_test(having, ModeSet(np.array([mode(0.5, 0.02)]), one, one, ("a", "b")))
+        assert (found.before is not None, found.accepted) == (same, same)
+
+
 TIMES = np.arange(0, 40, 0.005)
 
 
@@ -80,6 +107,21 @@ def test_what_lies_outside_the_range_or_is_negligible_is_not_judged():
     assert modal_test(TIMES, ring((1, 0.4, 0.08), (0.004, 1.1, 0.03)), 0.5).accepted
     assert modal_test(TIMES, np.exp(-TIMES), 0.5).accepted
     assert not modal_test(TIMES, np.ones_like(TIMES), 0.5).accepted  # nothing was excited: nothing is shown
+
+
+@pytest.mark.parametrize(("amplitude", "accepted"), [(0.008, True), (0.013, False), (0.03, False)])
+def test_a_component_above_a_hundredth_of_the_largest_is_judged(amplitude, accepted):
+    assert modal_test(TIMES, ring((1, 0.4, 0.08), (amplitude, 1.1, 0.03)), 0.5).accepted == accepted
+
+
+@pytest.mark.parametrize(("ratio", "accepted"), [(0.0495, False), (0.0505, True)])
+def test_a_signals_mode_is_judged_at_five_percent(ratio, accepted):
+    assert modal_test(TIMES, ring((1, 0.7, ratio)), 0.5).accepted == accepted
+
+
+@pytest.mark.parametrize(("frequency", "judged"), [(0.095, False), (0.105, True), (1.49, True), (1.51, False)])
+def test_a_signals_mode_is_judged_from_a_tenth_to_one_and_a_half_hertz(frequency, judged):
+    assert modal_test(TIMES, ring((1, 0.6, 0.08), (0.9, frequency, 0.02)), 0.5).accepted != judged
 
 
 def test_the_bus_frequency_is_the_turn_of_the_angle_without_the_network_transient():
