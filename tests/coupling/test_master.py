@@ -15,7 +15,9 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.description import read_description
 from tests.coupling.small_fmus import lag_factor, small_fmu
+from tests.vendor.gallery.build import Source, Variable, build
 
 H = 1e-3
 STEPS = 200
@@ -152,6 +154,26 @@ def test_direct_feedthrough_is_delayed_by_a_step_only_where_the_schedule_says_so
     assert np.abs(seen - expected).max() < 40 * TOLERANCE
 
 
+def test_what_is_fed_through_arrives_before_the_first_step_however_long_the_chain():
+    """Twelve gains, each before the one that feeds it, need a pass each; the last one feeds nobody."""
+    count = 12
+    names = [f"k{n}" for n in range(count)]
+    system = system_of(
+        [(f"{a}.y", f"{b}.u") for a, b in zip(["x", *names], names, strict=False)],
+        x=("integrator", {"x_0": 3.0}, {"u": 0.0}),
+        **{name: ("gain", {"K": 2.0}) for name in names},
+    )
+    with Master(system, gauss_seidel(tuple((name,) for name in [*reversed(names), "x"])), H) as master:
+        first = dict(zip(master.output_names, master.y.tolist(), strict=True))
+    assert first == {"x.y": 3.0} | {f"k{n}.y": 3.0 * 2.0 ** (n + 1) for n in range(count - 1)}
+
+
+def test_a_loop_of_gains_starts_where_it_agrees_with_itself():
+    system = system_of(ring("a", "b"), a=("gain", {"K": 0.5, "offset": 1.0}), b=("gain", {"K": 0.5}))
+    with Master(system, jacobi(("a", "b")), H) as master:
+        assert master.y == pytest.approx([4 / 3, 2 / 3], rel=1e-9)
+
+
 def test_one_output_feeds_several_inputs():
     system = system_of(
         [("x.y", "k.u"), ("x.y", "m.u")],
@@ -226,6 +248,32 @@ def test_a_time_between_communication_points(time, nearest):
 def test_an_infinite_time_is_refused(time):
     with pytest.raises(InputError, match="the stop"):
         Clock(H).index(time, "the stop")
+
+
+@pytest.fixture(scope="session")
+def told_time(tmp_path_factory):
+    """An FMU that repeats the time and the size of the step that it was told."""
+    variables = [Variable("u", 0, "input", 0, "1")]
+    variables += [Variable(name, k, "output", unit="s") for k, name in enumerate(("time", "step"), start=1)]
+    variables += [Variable("held", 3, "output", unit="1")]
+    source = Source("told_time", "../../coupling/told_time.c", {}, tuple(variables))
+    return read_description(build(source, tmp_path_factory.mktemp("told_time")))
+
+
+def test_a_step_is_told_the_time_at_which_it_begins_and_gets_the_input_of_then(told_time):
+    """An FMU with a clock of its own, or with a table over time, would run ahead by a step and nothing would show."""
+    system = system_of(x=("integrator", {"x_0": 7.0}, {"u": 1.0}))
+    system.add("clock", told_time)
+    system.connect("x.y", "clock.u")
+    names = ["clock.time", "clock.step", "clock.held"]
+    recorder = Recorder(names, 1)
+    with Master(system, jacobi(("clock", "x")), H) as master:
+        master.run(2 * H)
+        master.run(6 * H, (), [recorder])
+    for k, (time, step, held) in zip(range(1, 6), recorder.values, strict=False):
+        assert time == k * H
+        assert step == H
+        assert held == pytest.approx(7.0 + k * H, abs=TOLERANCE)
 
 
 # -- events ----------------------------------------------------------------------------------------
