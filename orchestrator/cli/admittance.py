@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group
+from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.black_box.bench import Bench
@@ -99,7 +100,7 @@ def _summary(content: dict[str, Any]) -> Group:
              f"{content['model']['order']}, error {content['model']['error']:.1e}")  # fmt: skip
     table = Table(title="Poles of the fitted model", title_justify="left", header_style="bold")
     for column in ("Pole [rad/s]", "f [Hz]", "Damping [%]"):
-        table.add_column(column, justify="right")
+        table.add_column(escape(column), justify="right")
     for pole in content["model"]["poles"]:
         size = math.hypot(pole["real"], pole["imag"])
         value = f"{pole['real']:.4g}" + (f" ± j{pole['imag']:.4g}" if pole["imag"] else "")

@@ -83,7 +83,7 @@ def _table(result: Certification) -> Table:
         "in the signal: ξ [%]",
         "",
     ):
-        table.add_column(column, justify="right")
+        table.add_column(escape(column), justify="right")
     for v in result.verdicts:
         worst = v.modes[0] if v.modes else None
         ratio = v.time.swings.ratio if v.time else None

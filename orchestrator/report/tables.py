@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.fmi.description import FmuDescription
@@ -19,9 +20,10 @@ _ITEMS_SHOWN = 5
 
 
 def _table(title: str, *columns: str, left: int = 1) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    """Headings are shown as they are: rich would take a unit such as [rad/s] for a style and leave it out."""
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index < left else "right", overflow="fold")
+        table.add_column(escape(column), justify="left" if index < left else "right", overflow="fold")
     return table
 
 

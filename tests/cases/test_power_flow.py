@@ -51,6 +51,22 @@ def test_two_sources_at_the_ends_of_a_line():
     assert flow.powers["slack"] == pytest.approx(complex(-P, q_2) / 4, abs=TOLERANCE)
 
 
+@pytest.mark.parametrize("shift", [0.3, -0.2])
+def test_a_phase_shifter_turns_the_voltage_behind_it_back(shift):
+    """The ratio tap·e^{j·shift} stands at the from side, as MATPOWER has it: behind it v = v₁/(tap·e^{j·shift})."""
+    flow = solve_power_flow(
+        ["one", "two"],
+        [FlowLine("shifter", "one", "two", R=0.0, X=X, B=0.0, tap=1.05, shift=shift)],
+        [FlowLoad("two", 60.0, 0.0)],
+        [FlowUnit("unit", "one", 100.0, 0.0, 1.02)],
+        "one",
+    )
+    behind = 1.02 / 1.05
+    v = math.sqrt((behind**2 + math.sqrt(behind**4 - 4 * (0.6 * X) ** 2)) / 2)
+    expected = cmath.rect(v, -shift - math.asin(0.6 * X / (v * behind)))
+    assert flow.voltages["two"] == pytest.approx(expected, abs=TOLERANCE)
+
+
 def test_every_bus_of_a_meshed_network_is_in_balance():
     buses = ["a", "b", "c", "d"]
     lines = [

@@ -36,9 +36,7 @@ def test_a_power_is_as_asked_within_two_percent_of_the_rating(judged, factor, ve
     assert judged(converter("slight", I_FACTOR=factor), "power_balance") == verdict
 
 
-@pytest.mark.parametrize(
-    ("angle", "verdict"), [(1e-7, "pass"), (3e-7, "remark"), (1.2e-4, "remark"), (1.7e-4, "fail")]
-)
+@pytest.mark.parametrize(("angle", "verdict"), [(1e-7, "pass"), (3e-7, "remark"), (1.2e-4, "remark"), (1.7e-4, "fail")])
 def test_a_current_that_moves_in_steady_state(judged, angle, verdict):
     """By seven times the angle [rad] by which the start is turned; 1e-6 pu is worth a remark, 1e-3 a fault."""
     assert judged(converter("slight", FAULT_DRIFT=angle), "steady_state")[0] == verdict
