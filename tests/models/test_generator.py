@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.conversion import AxisData, classical, exact
+from fmus.synchronous_generator.conversion import AxisData, RotorBranches, classical, exact
 from fmus.synchronous_generator.data import GovernorData
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.toolchain.catalogue import build_model
@@ -105,6 +105,20 @@ def test_classical_conversion_gives_the_subtransient_reactance_at_high_frequency
     b = classical(AxisData(*map(ca.SX, (X, X1, X2, X_l, T10, T20))), ca.SX(OMEGA_B))
     assert operational_reactance(1e9j, X, X_l, b) == pytest.approx(X2, rel=1e-4)
     assert operational_reactance(1e-9j, X, X_l, b) == pytest.approx(X, rel=1e-6)
+
+
+@pytest.mark.parametrize("data", AXES.values(), ids=AXES)
+def test_classical_conversion_takes_the_branches_one_after_the_other(data):
+    """The slow one alone has X' and T'_0; the fast one beside a slow one without resistance has X'' and T''_0."""
+    X, X1, X2, X_l, T10, T20 = data
+    b = classical(AxisData(*map(ca.SX, (X, X1, X2, X_l, T10, T20))), ca.SX(OMEGA_B))
+    slow_alone = RotorBranches(b.X_1, b.R_1, b.X_2, ca.SX(1e12))
+    fast_alone = RotorBranches(b.X_1, ca.SX(0), b.X_2, b.R_2)
+    for s in (0.3j, 5j, 40 + 200j, 3000j):
+        wanted = X * (1 + s * T10 * X1 / X) / (1 + s * T10)
+        assert operational_reactance(s, X, X_l, slow_alone) == pytest.approx(wanted, rel=1e-7)
+        wanted = X1 * (1 + s * T20 * X2 / X1) / (1 + s * T20)
+        assert operational_reactance(s, X, X_l, fast_alone) == pytest.approx(wanted, rel=1e-7)
 
 
 @pytest.mark.parametrize(

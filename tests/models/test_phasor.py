@@ -133,6 +133,19 @@ def test_the_current_limit_is_not_represented_and_the_model_says_when_it_would_a
     assert dip["i_s"] > 1.3 * limited["i_s"]
 
 
+@pytest.mark.parametrize(("P", "Q"), [(0.9, 0.0), (0.2, 0.6), (0.2, -0.5)])
+def test_the_current_limit_of_each_axis_is_its_own(P, Q):
+    """At the operating point, from the current that the power flow asks of the converter, in the capacitor's frame."""
+    device = Evaluated("gfor_phasor", P_0=P, Q_0=Q, voltage_control__i_q_max=1.3, voltage_control__i_d_max=0.8)
+    values = dict(zip((v.name for v in device.model.parameters), device.p.tolist(), strict=True))
+    i_g = complex(P, -Q)
+    u = 1.0 + complex(values["transformer.R_t"], values["transformer.X_t"]) * i_g
+    B_c = values["filter.B_c"]
+    i_s = (i_g + 1j * B_c * u / (1 + 1j / 30)) * np.exp(-1j * np.angle(u))  # in series with the capacitor: 1/(30·B_c)
+    wanted = max(abs(i_s.real) / 1.3, abs(i_s.imag) / 0.8)
+    assert device.outputs([1.0, 0.0])["current_limit"] == pytest.approx(wanted, rel=1e-9)
+
+
 def test_a_dispatch_beyond_the_current_limit_is_refused(fmu_path):
     with Component("device", read_description(fmu_path("gfor_phasor"))) as device:
         device.set({"P_0": 1.3})

@@ -168,6 +168,20 @@ def test_the_pages_modes(page, summary):
         agrees(row, "Damping [%] 2", theirs["damping_percent"])
 
 
+def test_what_is_poorly_damped_is_marked(studied, page):
+    text = (studied[0] / "report.html").read_text(encoding="utf-8")
+    marked = re.findall(r'<td><span class="bad">([^<]*)</span></td>', text)
+    assert "−0.90" in marked
+    assert not [cell for cell in marked if value(cell) >= 5]
+
+
+def test_the_findings_say_what_is_unstable(studied, page, summary):
+    text = (studied[0] / "report.html").read_text(encoding="utf-8")
+    for title, s in summary.items():
+        said = re.search(re.escape(title) + r": the electromechanical mode is (\w+)", text)
+        assert said.group(1) == ("unstable" if s["modes"]["electromechanical"]["real"] > 0 else "damped")
+
+
 def test_the_pages_ring_down(page, summary):
     rows = table(page, "Ring-down")
     assert [row["Scenario"] for row in rows] == list(summary)
