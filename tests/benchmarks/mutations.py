@@ -165,23 +165,24 @@ def _files(root: Path) -> list[str]:
 def run_all(
     mutations: Iterable[Mutation], root: Path, workers: int, limit: float, tell: Callable[[Mutation, Outcome], None]
 ) -> None:
-    """Try mutations out, each worker in a copy of its own."""
-    waiting: SimpleQueue[Mutation | None] = SimpleQueue()
-    # Equal selections stand together, so that they are run once without a mistake.
-    for mutation in sorted(mutations, key=lambda m: m.tests):
-        waiting.put(mutation)
+    """Try mutations out, each worker in a copy of its own; equal selections are run once without a mistake."""
+    groups: dict[tuple[str, ...], list[Mutation]] = {}
+    for mutation in mutations:
+        groups.setdefault(mutation.tests, []).append(mutation)
+    waiting: SimpleQueue[list[Mutation]] = SimpleQueue()
+    for group in [*groups.values(), *[[]] * workers]:  # an empty one sends a worker home
+        waiting.put(group)
     lock = threading.Lock()
 
     def work(folder: Path) -> None:
         copy = Copy(root, folder)
-        while (mutation := waiting.get()) is not None:
-            outcome = copy.try_out(mutation, limit)
-            with lock:
-                tell(mutation, outcome)
+        while group := waiting.get():
+            for mutation in group:
+                outcome = copy.try_out(mutation, limit)
+                with lock:
+                    tell(mutation, outcome)
 
     with tempfile.TemporaryDirectory(prefix="mutations") as folder, ThreadPoolExecutor(workers) as pool:
-        for _ in range(workers):
-            waiting.put(None)
         for done in [pool.submit(work, Path(folder) / str(k)) for k in range(workers)]:
             done.result()
 

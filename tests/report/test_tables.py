@@ -241,3 +241,26 @@ def test_the_readmes_first_table(gfor, saturated, first):
         mode = found[NAMES[name]]
         assert eigenvalue(row[first]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=0.7e-3)
         assert value(row[first + 1]) == pytest.approx(mode["damping_percent"], abs=0.5e-2 * 1.001)
+
+
+def test_the_readmes_table_of_steps(studied):
+    """|Δλ| in 10⁻³ rad/s; the rows of the base case, which is run here."""
+    (rows,) = [t for t in in_markdown(README.read_text(encoding="utf-8")) if t[0][:2] == ["Scenario", "Schedule"]]
+    known = shifts(studied[0])
+    base = next(k for k, row in enumerate(rows) if row[0] == "Base")
+    for row, schedule in zip(rows[base : base + 2], ("gauss-seidel", "jacobi"), strict=True):
+        for heading, cell in list(zip(rows[0], row, strict=True))[2:]:
+            shift = 1e3 * float(known["base", schedule, heading]["shift [rad/s]"])
+            assert value(cell) == pytest.approx(shift, rel=0.03), (row, heading)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", ["POD-P, ΔK = 50", "POD-Q, ΔK = 50", "POD-P, ΔK = 0.1", "POD-Q, ΔK = 0.1"])
+def test_the_readmes_table_of_designs(gfor, label):
+    (rows,) = [t for t in in_markdown(README.read_text(encoding="utf-8")) if "K before its bounds" in t[0]]
+    (row,) = [r for r in rows if r[0] == label]
+    controller, gain = label.split(", ΔK = ")
+    arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json"]
+    found = json.loads(gfor("design", "two_area", *arguments)[1])
+    for heading, key in {"T_S1 [s]": "T_S1", "T_S2 [s]": "T_S2", "K before its bounds": "K_unbounded"}.items():
+        agrees(dict(zip(rows[0], row, strict=True)), heading, found[key], unit=0.501)
