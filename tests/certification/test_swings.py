@@ -99,3 +99,35 @@ def test_a_ripple_above_the_judged_modes_is_taken_out_and_the_modes_stay(frequen
     test, wanted = swing_test(TIMES, slow, EVENT), swing_test(TIMES, clean, EVENT)
     assert test.ratio == pytest.approx(wanted.ratio, rel=0.01)
     assert swing_test(TIMES, rippled, EVENT).ratio != pytest.approx(wanted.ratio, rel=0.01)
+
+
+def corners(*points):
+    """Straight pieces between corners (time, value) as a signal over 40 s."""
+    times = np.linspace(0, 40, 40001)
+    return times, np.interp(times, *zip(*points, strict=True))
+
+
+@pytest.mark.parametrize(("part", "counts"), [(0.8e-3, False), (1.2e-3, True)])
+def test_a_turn_counts_from_a_thousandth_of_the_range(part, counts):
+    """The range is 10; the signal turns back by a part of it near the end."""
+    small = 10 * part
+    times, signal = corners((0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (20, 6.0), (21, 6.0 - small), (40, 6.5))
+    late = [p for p in extrema(times, signal, EVENT) if p.time > 15]
+    assert len(late) == (2 if counts else 0)
+
+
+@pytest.mark.parametrize(("quiet", "accepted"), [(9.8, False), (10.2, True)])
+def test_what_stood_still_for_ten_seconds_has_died_out(quiet, accepted):
+    """That long is a period of the slowest mode that is judged."""
+    end = 40 - quiet
+    times, signal = corners((0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (end - 1, 7.0), (end, 6.0), (40, 6.5))
+    assert swing_test(times, signal, EVENT).accepted == accepted
+
+
+@pytest.mark.parametrize(("frequency", "kept"), [(1.5, 1.0), (2.0, 1.0), (5.0, 0.5), (10.0, 0.0)])
+def test_what_is_taken_out_begins_above_the_judged_modes(frequency, kept):
+    """Forth and back, the filter halves what lies at 5 Hz."""
+    signal = np.sin(2 * np.pi * frequency * TIMES)
+    middle = slice(2000, -2000)
+    size = np.abs(slow_part(TIMES, signal)[middle]).max()
+    assert size == pytest.approx(kept, abs=0.01)
