@@ -76,13 +76,15 @@ def test_verdicts_and_the_users_tree(tmp_path):
         SURVIVED: mutation("not noticed", "2 * x", "3 * x", "-k", "zero"),
         NOT_APPLICABLE: mutation("gone", "4 * x", "3 * x", "-k", "double"),
         UNCLEAR: mutation("fails anyway", "2 * x", "3 * x", "-k", "broken"),
-        TOO_SLOW: mutation("for ever", "sleep(0)", "sleep(60)", "-k", "slow"),
     }
     nothing = mutation("selects nothing", "2 * x", "3 * x", "-k", "no_such_test")
     found = {}
-    run_all([*cases.values(), nothing], root, 2, 15.0, lambda m, outcome: found.update({m.name: outcome}))
+    run_all([*cases.values(), nothing], root, 2, 100.0, lambda m, outcome: found.update({m.name: outcome}))
+    for_ever = mutation("for ever", "sleep(0)", "sleep(100)", "-k", "slow")
+    run_all([for_ever], root, 1, 4.0, lambda m, outcome: found.update({m.name: outcome}))
     assert {m.name: found[m.name].verdict for m in cases.values()} == {m.name: v for v, m in cases.items()}
     assert found["selects nothing"].verdict == UNCLEAR
+    assert found["for ever"].verdict == TOO_SLOW
     assert found["noticed"].by == "test_it.py::test_double"
     assert {path: path.read_bytes() for path in sorted(Path(root).glob("*.py"))} == before
 
