@@ -20,7 +20,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
 from time import perf_counter
@@ -68,11 +68,12 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a mutation: the verdict, seconds, and the first test that failed."""
+    """What came of a mutation: the verdict, seconds, the first test that failed, and `Mutation.key` of what was run."""
 
     verdict: str
     seconds: float = 0.0
     by: str = ""
+    key: str = ""
 
 
 def read_list(path: Path = LIST) -> list[Mutation]:
@@ -101,6 +102,9 @@ class Copy:
 
     def try_out(self, mutation: Mutation, limit: float) -> Outcome:
         """Make the mistake, run the tests that must fail, and take it back."""
+        return replace(self._try_out(mutation, limit), key=mutation.key(self.tree))
+
+    def _try_out(self, mutation: Mutation, limit: float) -> Outcome:
         path = self.tree / mutation.file
         before = path.read_text(encoding="utf-8") if path.is_file() else ""
         after = mutation.applied(before)
@@ -118,7 +122,7 @@ class Copy:
         finally:
             path.write_text(before, encoding="utf-8")
             shutil.rmtree(cache, ignore_errors=True)
-        seconds = perf_counter() - begin
+        seconds = round(perf_counter() - begin, 1)
         if code is None:
             return Outcome(TOO_SLOW, seconds)
         return Outcome(SURVIVED if code == 0 else CAUGHT, seconds, first)
@@ -230,24 +234,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not chosen:
         parser.error(f"no mutation has {' or '.join(map(repr, options.only))} in its name")
     stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
-    stored = {m.name: stored[m.name] for m in mutations if stored.get(m.name, {}).get("key") == m.key(ROOT)}
+    known = {name: Outcome(**entry) for name, entry in stored.items()}
+    known = {m.name: known[m.name] for m in mutations if m.name in known and known[m.name].key == m.key(ROOT)}
     if options.again:
-        stored = {name: entry for name, entry in stored.items() if name not in {m.name for m in chosen}}
-
-    def outcomes() -> dict[str, Outcome]:
-        return {name: Outcome(*(entry[k] for k in ("verdict", "seconds", "by"))) for name, entry in stored.items()}
+        known = {name: outcome for name, outcome in known.items() if name not in {m.name for m in chosen}}
 
     def tell(mutation: Mutation, outcome: Outcome) -> None:
         print(f"{outcome.verdict}: {mutation.name} ({outcome.seconds:.0f} s) {outcome.by}", flush=True)
-        stored[mutation.name] = {"key": mutation.key(ROOT), **asdict(outcome), "seconds": round(outcome.seconds, 1)}
-        RESULTS.write_text(json.dumps(stored, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        PAGE.write_text(page(mutations, outcomes()), encoding="utf-8")
+        known[mutation.name] = outcome
+        write()
 
-    run_all([m for m in chosen if m.name not in stored], ROOT, options.workers, options.limit, tell)
-    PAGE.write_text(page(mutations, outcomes()), encoding="utf-8")
-    known = [outcomes()[m.name].verdict for m in chosen]
-    print(f"{known.count(CAUGHT)} of {len(known)} caught; the table is in {PAGE.relative_to(ROOT)}")
-    return 0 if all(verdict == CAUGHT for verdict in known) else 1
+    def write() -> None:
+        entries = {name: asdict(known[name]) for name in sorted(known)}
+        RESULTS.write_text(json.dumps(entries, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        PAGE.write_text(page(mutations, known), encoding="utf-8")
+
+    run_all([m for m in chosen if m.name not in known], ROOT, options.workers, options.limit, tell)
+    write()
+    verdicts = [known[m.name].verdict for m in chosen]
+    print(f"{verdicts.count(CAUGHT)} of {len(verdicts)} caught; the table is in {PAGE.relative_to(ROOT)}")
+    return 0 if all(verdict == CAUGHT for verdict in verdicts) else 1
 
 
 if __name__ == "__main__":
