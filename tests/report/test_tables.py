@@ -126,7 +126,7 @@ def test_the_terminals_table_of_all_modes(gfor):
     rows = table(on_terminal(out), "62 states")
     # A row goes on in the next line where the cell of participations is folded: that line has no mode.
     rows = [row for row in rows if row["f [Hz]"]]
-    assert len(rows) == len(scenario["modes"]) > 10
+    assert len(rows) == len(scenario["modes"]) >= 8
     for row, mode in zip(rows, scenario["modes"], strict=True):
         assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=1e-4)
         agrees(row, "f [Hz]", mode["frequency_hz"])
