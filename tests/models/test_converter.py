@@ -184,6 +184,23 @@ def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(size):
     assert len(clamped) == {0.003: 1, 0.05: 2, 0.3: 4}[size]
 
 
+@pytest.mark.parametrize("axis", ["q", "d"])
+def test_an_integrator_stops_at_the_limit_of_its_own_axis(axis):
+    """What an integrator asks for rises from one limit to the other, through all that lies between the two limits."""
+    device = Evaluated(build_model("gfor"), OTHERWISE)
+    v, name = 1.03 * exp(0.6j), f"voltage_control.x_{axis}"
+    # A voltage beside its reference is the error to integrate.
+    rest = device.states | {f"filter.u_c_{a}": device.states[f"filter.u_c_{a}"] + 0.03 for a in "qd"}
+    rates = []
+    for offset in np.linspace(-1.5, 1.5, 61):
+        x = rest | {name: device.states[name] + offset}
+        wanted, _ = by_hand(device.parameters, x, v)
+        found = device.rates([v.real, v.imag], device.vector(x))
+        assert found[name] == pytest.approx(wanted[name], rel=1e-9, abs=1e-9)
+        rates.append(found[name] != 0)
+    assert 0 < sum(rates) < 61
+
+
 # -- the limits in dips -------------------------------------------------------------------------
 
 
