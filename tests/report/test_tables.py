@@ -49,11 +49,11 @@ def table(tables, *words):
     return found
 
 
-def agrees(row, heading, wanted, unit=0.5):
+def agrees(row, heading, wanted):
     """A cell has the number, in the digits that it shows."""
     cell = row[heading]
     digits = len(cell.partition(".")[2].rstrip("% "))
-    assert value(cell) == pytest.approx(wanted, abs=unit * 10**-digits * (1 + 1e-9)), (heading, row)
+    assert value(cell) == pytest.approx(wanted, abs=0.5 * 10**-digits * (1 + 1e-9)), (heading, row)
 
 
 # -- the terminal -------------------------------------------------------------------------------
@@ -263,4 +263,4 @@ def test_the_readmes_table_of_designs(gfor, label):
     arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json"]
     found = json.loads(gfor("design", "two_area", *arguments)[1])
     for heading, key in {"T_S1 [s]": "T_S1", "T_S2 [s]": "T_S2", "K before its bounds": "K_unbounded"}.items():
-        agrees(dict(zip(rows[0], row, strict=True)), heading, found[key], unit=0.501)
+        agrees(dict(zip(rows[0], row, strict=True)), heading, found[key])
