@@ -65,6 +65,16 @@ class ComponentError(CosimError):
         super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}")
 
 
+class NotFiniteError(ComponentError):
+    """A running FMU gave an output that is no finite number, and said nothing itself."""
+
+    def __init__(self, component: str, variable: str, value: float | None, time: float | None) -> None:
+        self.variable, self.value = variable, value
+        seen = "" if value is None else f" ({value})"
+        said = f"{variable} is no finite number{seen}"
+        super().__init__(component, "fmi2GetReal", "not a number", said, time)
+
+
 class RunInterruptedError(CosimError):
     """Ctrl-C ended a run before its time."""
 

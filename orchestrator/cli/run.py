@@ -17,6 +17,7 @@ from orchestrator.cli.terminal import (
     made_folder,
     make_console,
     make_errors,
+    print_findings,
     print_named_modes,
     print_sources,
     print_warnings,
@@ -68,6 +69,7 @@ def run(options: argparse.Namespace) -> int:
             results.append(result)
             save_run(result, folder)
             print_warnings([result.modes])
+            print_findings([result])
             if result.failure:
                 stopped = (prepared.name, result.failure)
                 break

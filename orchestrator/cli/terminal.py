@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from orchestrator.cases.case import Case
     from orchestrator.cases.prepare import PreparedScenario
     from orchestrator.study.modes import ModesResult
+    from orchestrator.study.run import RunResult
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -75,6 +76,16 @@ def print_warnings(results: "Sequence[ModesResult]") -> None:
         asked = {str(question) for question in result.prepared.questions}
         for text in (t for t in result.warnings if t not in asked):
             console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")
+
+
+def print_findings(results: "Sequence[RunResult]") -> None:
+    """Say on standard error what runs did wrong; a failure is said where the study ends."""
+    console = make_errors()
+    for result in results:
+        for finding in result.findings:
+            if finding.message != str(result.failure):
+                name = result.modes.prepared.name
+                console.print(f"[bold yellow]found:[/bold yellow] scenario {name!r}: {escape(finding.message)}")
 
 
 def made_folder(path: Path, option: str = "--out") -> Path:

@@ -1,5 +1,6 @@
-/* The master's inner loop over FMI 2.0 function pointers: gather inputs, set, step, get, nothing else.
+/* The master's inner loop over FMI 2.0 function pointers: gather inputs, set, step, get, and note where outputs went.
    `loop.py` describes the same structures to Python. */
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #ifdef _WIN32
@@ -24,6 +25,11 @@ static double seconds(void) {
 typedef int (*get_set)(void *, const unsigned *, size_t, double *);
 typedef int (*do_step)(void *, double, double, int);
 
+/* Where one output went since somebody last looked: extremes, the last value and change, and how often it turned. */
+struct track {
+    double low, high, last, change, turns;
+};
+
 struct call {
     void *component;
     get_set set_real, get_real;
@@ -34,12 +40,29 @@ struct call {
     int64_t n_inputs, n_outputs;
     int64_t group;
     double spent; /* seconds inside the FMU's functions, summed up */
+    struct track *tracks; /* one for each output */
 };
 
-enum { SET = 1, STEP = 2, GET = 3 };
+enum { SET = 1, STEP = 2, GET = 3, NOT_FINITE = -1 };
+
+/* Note new outputs; the index of the first that is no finite number, or -1. */
+static int64_t follow(struct track *tracks, const double *values, int64_t n) {
+    for (int64_t i = 0; i < n; ++i) {
+        struct track *t = &tracks[i];
+        const double value = values[i], change = value - t->last;
+        if (!isfinite(value)) return i;
+        if (value < t->low) t->low = value;
+        if (value > t->high) t->high = value;
+        if (change * t->change < 0) t->turns += 1;
+        if (change != 0) t->change = change;
+        t->last = value;
+    }
+    return -1;
+}
 
 /* Do `count` communication steps from `index`. Returns 0, or the status of the call that failed with
-   failure = {steps completed, call, SET | STEP | GET}. Calls of one group stand together, in order. */
+   failure = {steps completed, call, SET | STEP | GET}; or NOT_FINITE with failure = {steps completed, call, output}.
+   Calls of one group stand together, in order. */
 EXPORT int advance(struct call *calls, int64_t n, const double *y, int64_t index, int64_t count, double step_size,
                    int64_t *failure) {
     for (int64_t k = index; k < index + count; ++k) {
@@ -70,6 +93,10 @@ EXPORT int advance(struct call *calls, int64_t n, const double *y, int64_t index
                     return status;
                 }
                 c->spent += seconds() - start;
+                if ((failure[2] = follow(c->tracks, c->outputs, c->n_outputs)) >= 0) {
+                    failure[0] = k, failure[1] = i;
+                    return NOT_FINITE;
+                }
             }
         }
     }

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.tracks import Tracks
+from orchestrator.errors import NotFiniteError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("inner_loop.c")
 _FUNCTIONS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
+_NOT_FINITE = -1
 
 
 class Exchange:
@@ -52,6 +55,8 @@ class Loop(Protocol):
         ------
         ComponentError
             If a call fails; ``completed`` tells how many steps were done before.
+        NotFiniteError
+            If a step gives an output that is no finite number.
         """
 
     completed: int
@@ -75,6 +80,7 @@ class _Call(ctypes.Structure):
         ("n_outputs", ctypes.c_int64),
         ("group", ctypes.c_int64),
         ("spent", ctypes.c_double),
+        ("tracks", ctypes.c_void_p),
     )
 
 
@@ -93,8 +99,10 @@ def _library() -> Any | None:
 class CompiledLoop:
     """Steps a system in C."""
 
-    def __init__(self, library: Any, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64]) -> None:
-        self._library, self._y = library, y
+    def __init__(
+        self, library: Any, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], tracks: Tracks
+    ) -> None:
+        self._library, self._y, self._tracks = library, y, tracks
         self._exchanges = [exchange for group in groups for exchange in group]
         self._calls = (_Call * len(self._exchanges))()
         self._failure = (ctypes.c_int64 * 3)()
@@ -103,8 +111,7 @@ class CompiledLoop:
             for exchange in group:
                 self._fill(self._calls[self._exchanges.index(exchange)], exchange, number)
 
-    @staticmethod
-    def _fill(call: _Call, exchange: Exchange, group: int) -> None:
+    def _fill(self, call: _Call, exchange: Exchange, group: int) -> None:
         def address(function: Any) -> int | None:
             return ctypes.cast(function, ctypes.c_void_p).value
 
@@ -116,6 +123,7 @@ class CompiledLoop:
         _, call.output_references, call.n_outputs, call.outputs = exchange.outputs.arguments
         call.sources = exchange.sources.ctypes.data
         call.group = group
+        call.tracks = self._tracks.address(exchange.window.start or 0)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         with calls:
@@ -129,6 +137,9 @@ class CompiledLoop:
                 ctypes.addressof(self._failure),
             )
             self.completed = self._failure[0] - index if status else count
+        if status == _NOT_FINITE:
+            outputs = self._exchanges[self._failure[1]].outputs
+            raise _not_finite(outputs, self._failure[2], (self._failure[0] + 1) * step_size)
         if status:
             component = self._exchanges[self._failure[1]].component
             component.check(status, _FUNCTIONS[self._failure[2]], self._failure[0] * step_size)
@@ -152,10 +163,11 @@ class PythonLoop:
         self,
         groups: Sequence[Sequence[Exchange]],
         y: NDArray[np.float64],
+        tracks: Tracks,
         schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
     ) -> None:
-        self._groups, self._y, self._hand_over = groups, y, hand_over
+        self._groups, self._y, self._tracks, self._hand_over = groups, y, tracks, hand_over
         self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
         self._before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
@@ -188,6 +200,9 @@ class PythonLoop:
                     component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
                 known[exchange.window] = exchange.outputs.values
                 spent[i] += perf_counter() - start
+                bad = self._tracks.follow(exchange.window, exchange.outputs.values)
+                if bad is not None:
+                    raise _not_finite(exchange.outputs, bad, time + size)
 
     def _interval(self, index: int, step_size: float) -> tuple[float, float]:
         """Time and size of a step [s]."""
@@ -207,12 +222,19 @@ class PythonLoop:
         return [seconds for group in self._spent for seconds in group]
 
 
+def _not_finite(outputs: RealBatch, index: int, time: float) -> NotFiniteError:
+    return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)
+
+
 def make_loop(
     groups: Sequence[Sequence[Exchange]],
     y: NDArray[np.float64],
+    tracks: Tracks,
     schedule: Schedule,
     hand_over: Callable[[], None] | None = None,
 ) -> Loop:
     """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
     library = _library() if schedule.is_plain else None
-    return PythonLoop(groups, y, schedule, hand_over) if library is None else CompiledLoop(library, groups, y)
+    if library is None:
+        return PythonLoop(groups, y, tracks, schedule, hand_over)
+    return CompiledLoop(library, groups, y, tracks)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from math import isfinite
 from pathlib import Path
 from shutil import rmtree
 from time import perf_counter
@@ -17,7 +18,8 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
 from orchestrator.coupling.system import Endpoint, System
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.coupling.tracks import Tracks
+from orchestrator.errors import ComponentError, InputError, NotFiniteError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.instance import open_component
@@ -48,6 +50,8 @@ class Master:
         Number of communication steps done, and the time [s] reached.
     y
         All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+    tracks
+        Where each of them went, step by step, since an observer last looked.
 
     Raises
     ------
@@ -78,7 +82,8 @@ class Master:
         groups = [[self.exchanges[name] for name in group] for group in schedule.groups]
         self._wires = self._single_wires() if schedule.wire_by_wire else []
         self._handed_over = False
-        self._loop = make_loop(groups, self.y, schedule, self._hand_over if self._wires else None)
+        self.tracks = Tracks(len(self.y))
+        self._loop = make_loop(groups, self.y, self.tracks, schedule, self._hand_over if self._wires else None)
 
     # -- life cycle ------------------------------------------------------------------------------
 
@@ -237,6 +242,8 @@ class Master:
             If the stop time or an event is not at a communication point.
         ComponentError
             If an FMU fails; observers are ended first, so nothing recorded is lost.
+        NotFiniteError
+            If a coupled output is no finite number, at whatever step.
         """
         calls.watch()  # again: a notebook hands Ctrl-C back to Python after each cell
         stop = self.clock.index(stop_time, "the stop")
@@ -251,6 +258,7 @@ class Master:
                 observer.begin(self, stop)
                 begun.append(observer)
                 observer.observe(self)
+            self._require_finite(self.components)
             for target in stops:
                 self._run_to(target, first, observers)
                 if target < stop:
@@ -280,6 +288,15 @@ class Master:
                 self.components[name].set(settings)
             for name in event.changes():
                 self.components[name].read(self.exchanges[name].outputs)
+            self._require_finite(event.changes())
+
+    def _require_finite(self, names: Iterable[str]) -> None:
+        """What components gave without a step, at the start and at events; the inner loop looks after the steps."""
+        for name in names:
+            outputs = self.exchanges[name].outputs
+            for variable, value in zip(outputs.names, outputs.values.tolist(), strict=True):
+                if not isfinite(value):
+                    raise NotFiniteError(name, variable, value, self.time)
 
     def _statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
         names = [name for group in self.schedule.groups for name in group]

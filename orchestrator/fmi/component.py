@@ -29,6 +29,8 @@ class RealBatch:
 
     Attributes
     ----------
+    component
+        Whose they are.
     values
         Array of shape (n,), the caller's to read or fill.
     """
@@ -49,20 +51,20 @@ class RealBatch:
             len(self.names),
             self.values.ctypes.data,
         )
-        self._component = component
+        self.component = component
 
     def read(self) -> NDArray[np.float64]:
         """Fetch the values from the FMU."""
         if self.names:
             with calls:
-                self._component.check(self._component.get_real(*self.arguments), "fmi2GetReal")
+                self.component.check(self.component.get_real(*self.arguments), "fmi2GetReal")
         return self.values
 
     def write(self) -> None:
         """Send the values to the FMU."""
         if self.names:
             with calls:
-                self._component.check(self._component.set_real(*self.arguments), "fmi2SetReal")
+                self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")
 
 
 class Component:

@@ -21,7 +21,7 @@ from ctypes import c_double, c_int, c_size_t, c_void_p  # isort: skip
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.errors import ComponentError, InputError, NotFiniteError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
@@ -96,8 +96,7 @@ class IsolatedComponent(Component):
         if status == NOT_A_NUMBER:
             bad = self._box.head.bad_reference
             names = [n for n, v in self.description.variables.items() if v.reference == bad and v.type == "Real"]
-            said = f"{names[0] if names else 'a variable'} is no finite number"
-            raise ComponentError(self.name, call, "not a number", said, time)
+            raise NotFiniteError(self.name, names[0] if names else "a variable", None, time)
         if status == INTERRUPTED:  # it is still at work on the question
             self._kill()
             self._end = "interrupted: its process was ended"

@@ -141,7 +141,7 @@ def _summary(case: Case, results: Sequence["RunResult"]) -> dict[str, Any]:
 
 
 def summary_of(result: "RunResult") -> dict[str, Any]:
-    """Figures of one scenario: steady state, named modes, references, ring-down, speed, failure."""
+    """Figures of one scenario: steady state, named modes, references, ring-down, speed, findings, failure."""
     modes = result.modes
     seen, stats = result.ring_down, result.statistics
     return {
@@ -168,6 +168,7 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
         "linearised": modes.linearised,
         "fit_errors": modes.fit_errors,
         "warnings": list(modes.warnings),
+        "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
     }
 

@@ -1,4 +1,4 @@
-"""A run: the modes of a scenario, its response to the events, and what links the two."""
+"""A run: the modes of a scenario, its response to the events, what links the two, and what went wrong in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,6 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.observers import Observer
-from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.told_step import as_if_told
@@ -22,6 +21,8 @@ from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
+from orchestrator.watch.finding import Finding
+from orchestrator.watch.watch import Watch
 
 STEPS = (0.5, 1.0, 2.0, 5.0)
 """Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""
@@ -55,6 +56,8 @@ class RunResult:
         The linear model's response to the same events, where it was asked for.
     failure
         The error that ended the run before its time.
+    findings
+        What the run did wrong, each said once, in the order of its beginning.
     """
 
     modes: ModesResult
@@ -64,6 +67,7 @@ class RunResult:
     shifts: list[ModeShift] = field(default_factory=list)
     linear: xr.Dataset | None = None
     failure: CosimError | None = None
+    findings: list[Finding] = field(default_factory=list)
 
 
 def run_scenario(
@@ -80,7 +84,7 @@ def run_scenario(
     A component that fails in the middle ends the run, and so does Ctrl-C; what was recorded until then is in the
     result.
     """
-    recorder = Recorder(prepared.record, prepared.record_every)
+    watch = Watch(prepared)
     statistics = None
     failure: CosimError | None = None
     with running(prepared) as master:
@@ -89,14 +93,14 @@ def run_scenario(
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
         try:
-            statistics = master.run(prepared.stop_time, prepared.events, [recorder, *observers])
+            statistics = master.run(prepared.stop_time, prepared.events, [*watch.observers, *observers])
         except CosimError as error:
             failure = error
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"interrupted at t = {master.time:.6g} s")
-    dataset = trajectory_dataset(recorder, case, prepared)
+    dataset = trajectory_dataset(watch.recorder, case, prepared)
     ring_down = None if failure else _ring_down(case, modes, dataset)
-    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure)
+    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, watch.findings(failure))
 
 
 def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:

@@ -16,6 +16,23 @@ _BARS = 8
 _LEAST_DAMPING = 5.0
 """Damping [%] that grid codes commonly ask for; less is marked."""
 
+_KINDS = {
+    "growth": "the undisturbed state grows",
+    "undisturbed_motion": "the undisturbed state moves",
+    "growing_oscillation": "growing oscillation",
+    "sustained_oscillation": "sustained oscillation",
+    "active_limit": "active limit",
+    "loss_of_synchronism": "loss of synchronism",
+    "not_finite": "not a number",
+}
+"""What a run found, in words."""
+
+
+_NOTHING = (
+    "The runs were watched for growth of the undisturbed state, growing and sustained oscillations, limits that stay "
+    "active, loss of synchronism and values that are no numbers; nothing of it was found."
+)
+
 
 def titles(results: Results) -> dict[str, str]:
     """Title of every scenario."""
@@ -36,6 +53,12 @@ def findings(results: Results) -> str:
         if verdict := s.get("stability"):
             shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")
             items.append(f'{escape(s["title"])}: <b class="{shade}">{escape(verdict["sentence"])}</b>')
+        items += [
+            f'{escape(s["title"])}: <span class="bad">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
+            f"{escape(f['message'])}"
+            for f in s.get("findings", [])
+            if f["message"] != s["failure"]
+        ]
         for name, mode in s["modes"].items():
             state = "unstable" if mode["damping_percent"] < 0 else "damped"
             items.append(
@@ -243,7 +266,22 @@ def responses(results: Results, figures: Figures) -> str:
             figures_of_it = table(caption, ["Scenario", *(label for label, _ in columns)], rows)
             heading = f"<h3>{escape(plot.title)}</h3><p>{link} shows the responses to the events.</p>"
             parts.append(f"{heading}{picture}{figures_of_it}")
-    return "".join(parts) + _ring_downs(results)
+    return "".join(parts) + _ring_downs(results) + _watched(results)
+
+
+def _watched(results: Results) -> str:
+    """What each run did wrong: when, where, until when."""
+    rows = [
+        [escape(s["title"]), escape(_KINDS.get(f["kind"], f["kind"])), escape(f["component"]), escape(f["variable"]),
+         f"{f['time']:.4g}", "the end" if f["until"] is None else f"{f['until']:.4g}"]
+        for s in results.scenarios
+        for f in s.get("findings", [])
+    ]  # fmt: skip
+    columns = ["Scenario", "Found", "Component", "Variable", "From [s]", "To [s]"]
+    if rows:
+        return table("What the runs did wrong", columns, rows, left=4)
+    watched = all("findings" in s for s in results.scenarios)
+    return f'<p class="soft">{_NOTHING}</p>' if watched else ""
 
 
 def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve], dict[str, str]]:

@@ -1,0 +1,64 @@
+"""The strongest oscillation in a stretch of a signal: frequency, growth rate and amplitude."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.analysis.identification import identify_modes
+from orchestrator.errors import AnalysisError
+from orchestrator.watch.seen import Numbers
+
+LEAST_PERIODS = 2
+"""An oscillation is told by at least so many of its periods."""
+
+_HIGHEST_HZ = 10.0
+"""A signal is thinned for frequencies up to this one, unless it turns more often."""
+
+_PER_PERIOD = 5
+"""Samples that a period must have to be seen in samples."""
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A·e^{rate·t}·cos(2π·frequency·t): rate [1/s], frequency [Hz], amplitude at the stretch's end [signal's unit]."""
+
+    frequency_hz: float
+    rate: float
+    amplitude: float
+
+
+def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float = LEAST_PERIODS) -> Oscillation | None:
+    """By the matrix pencil; None where nothing oscillates for so many periods, or too fast for the samples."""
+    if too_fast(times, signal):
+        return None
+    crossing = crossings_hz(times, signal)
+    try:
+        found = identify_modes(times, signal - signal.mean(), highest_hz=max(_HIGHEST_HZ, 1.2 * crossing))
+    except AnalysisError:
+        return None
+    length = float(times[-1] - times[0])
+    all_modes = (
+        Oscillation(m.frequency_hz, m.eigenvalue.real, m.amplitude * float(np.exp(m.eigenvalue.real * length)))
+        for m in found
+    )
+    oscillating = [m for m in all_modes if m.frequency_hz * length >= least_periods]
+    return max(oscillating, key=lambda m: m.amplitude, default=None)
+
+
+def crossings_hz(times: Numbers, signal: Numbers) -> float:
+    """Half of how often a signal passes its own trend [Hz]."""
+    around = without_trend(signal)
+    passes = int((np.diff(np.sign(around)) != 0).sum())
+    return passes / 2 / float(times[-1] - times[0])
+
+
+def too_fast(times: Numbers, signal: Numbers) -> bool:
+    """Whether a signal swings too fast for its samples to show how."""
+    return crossings_hz(times, signal) * float(times[1] - times[0]) * _PER_PERIOD > 1
+
+
+def without_trend(signal: Numbers) -> Numbers:
+    """What a cubic leaves over, along the first axis."""
+    basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(signal)), 3)
+    rest: Numbers = signal - basis @ np.linalg.lstsq(basis, signal, rcond=None)[0]
+    return rest

@@ -1,0 +1,303 @@
+"""The response at its end: an oscillation that grows, or one that neither grows nor decays, as a limit cycle does."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from orchestrator.coupling.system import System
+from orchestrator.watch.finding import Finding, Kind
+from orchestrator.watch.oscillation import (
+    LEAST_PERIODS,
+    Oscillation,
+    crossings_hz,
+    strongest_oscillation,
+    too_fast,
+    without_trend,
+)
+from orchestrator.watch.seen import Numbers, Seen
+
+FEWEST_LOOKS = 60
+"""In the stretch that is looked at: the last three quarters of the time since the last event."""
+
+KEPT = 0.7
+"""What has lost more than this leaves of its swing, from the middle to the last third of the stretch, is decaying."""
+
+SMALLEST = 1e-7
+"""Of 1 or of the signal's start: less is no oscillation that anybody could see."""
+
+SMALLEST_FAST = 1e-5
+"""The same for one that is too fast for the looks, of which only the extent is known."""
+
+SMALLEST_PART = 0.01
+"""Of the signal's own deviation since the event."""
+
+STEADY = 0.05
+"""An oscillation whose amplitude changes by less than this in the logarithm, over the stretch, is sustained."""
+
+SAME_FREQUENCY = 0.05
+"""An oscillation is one if both the stretch and its second half show the same frequency, to this part of it."""
+
+EXPLAINED = 0.3
+"""An oscillation is what swings if it makes at least this part of the swing."""
+
+IRREGULAR = 1e-3
+"""A swing in which no single oscillation is found is told from this part of 1 or of the signal's start on."""
+
+_PASSES = 8
+"""An irregular swing passes its trend at least so often within the last third."""
+
+_FAST = 0.25
+"""Turns from one look to the next from which on an output is judged by its extremes between the looks."""
+
+_TURNS, _FEWEST_GROUPS = 6, 12
+"""So many turns make one figure of how far an output goes to and fro, and so many of these figures are needed."""
+
+_TRIED = 8
+"""Signals in which oscillations are looked for: those that swing most at the end."""
+
+_PARTS = 40
+"""Pieces of the time since the event, of which the first is looked for in which an oscillation is all there."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A signal that still swings at the end as it did before.
+
+    Attributes
+    ----------
+    size
+        Root mean square in the last third without the trend, beside the scale.
+    scale
+        1 or the start's magnitude [the signal's unit].
+    after
+        Time of the last event [s].
+    times, signal
+        The stretch.
+    since
+        When it began to swing as it does at the end [s].
+    turns_hz
+        Half of how often the signal turns [Hz], step by step; only for what was followed between the looks.
+    """
+
+    name: str
+    size: float
+    scale: float
+    after: float
+    times: Numbers
+    signal: Numbers
+    since: float
+    turns_hz: float | None = None
+
+
+def unsettled_response(seen: Seen, system: System, after: float, units: Sequence[str]) -> Iterator[Finding]:
+    """At most one growing and one sustained oscillation after the last event, where they are strongest.
+
+    Where one is faster than the looks, only such are told: in the looks it would pass for a slower one.
+
+    Parameters
+    ----------
+    after
+        Time of the last event, or the start [s].
+    units
+        Components that feed the grid: they are named rather than the grid where both swing.
+    """
+    first = int(np.searchsorted(seen.times, after))
+    begin = after + (float(seen.times[-1]) - after) / 4
+    if (seen.times >= begin).sum() < FEWEST_LOOKS:
+        return
+    times = seen.times[first:]
+    slow = (_swing(name, y[first:], times, begin) for name, y in _signals(seen, system).items())
+    fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
+    swings = [swing for swing in chain(slow, fast) if swing is not None]
+    swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
+    # What is faster than the looks shows in the signals as something slower, so it goes first.
+    for group in ([s for s in swings if s.turns_hz is not None], [s for s in swings if s.turns_hz is None]):
+        told = _told(group[:_TRIED], system)
+        if told:
+            yield from told
+            return
+
+
+def _told(swings: Sequence[Swing], system: System) -> list[Finding]:
+    """The first finding of each kind; a swing without a frequency only where there is none with one."""
+    told: dict[Kind, Finding] = {}
+    irregular = []
+    for swing in swings:
+        oscillation = _fast(swing) if swing.turns_hz is not None else _single(swing)
+        if oscillation is not None:
+            finding = _regular(swing, oscillation, _unit(swing.name, system))
+            if finding is not None:
+                told.setdefault(finding.kind, finding)
+        elif _is_irregular(swing):
+            irregular.append(_irregular(swing, _unit(swing.name, system)))
+    return [*told.values()] or irregular[:1]
+
+
+def _signals(seen: Seen, system: System) -> dict[str, Numbers]:
+    """Signals that rest in a steady state at any frequency: no angles, magnitudes of real and imaginary parts."""
+    everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
+    found = {}
+    for name, signal in everything.items():
+        if _is_derivative(name) or _unit(name, system) == "rad" or not np.isfinite(signal).all():
+            continue
+        if not name.endswith(("_re", "_im")):
+            found[name] = signal
+        elif name.endswith("_re") and f"{name[:-3]}_im" in everything:
+            found[name] = np.hypot(signal, everything[f"{name[:-3]}_im"])
+    return found
+
+
+def _is_derivative(name: str) -> bool:
+    return name.partition(".")[2].startswith("der(")
+
+
+def _component(name: str) -> str:
+    return name.partition(".")[0]
+
+
+def _unit(name: str, system: System) -> str:
+    component, _, variable = name.partition(".")
+    return system.components[component].description.variables[variable].unit
+
+
+def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | None:
+    """What of a signal is worth a closer look; the signal and its times begin with the event."""
+    deviation, scale = float(np.abs(signal - signal[0]).max()), max(1.0, abs(float(signal[0])))
+    rows = times >= begin
+    _, middle, last = (_rms(part) for part in np.array_split(signal[rows], 3))
+    if last < KEPT * middle or np.sqrt(2) * last < max(SMALLEST * scale, SMALLEST_PART * deviation):
+        return None
+    sizes = [(float(t[0]), _rms(y)) for t, y in _pieces(times, signal)]
+    return Swing(name, last / scale, scale, float(times[0]), times[rows], signal[rows], _since(sizes, last))
+
+
+def _rms(signal: Numbers) -> float:
+    return float(np.sqrt(np.mean(without_trend(signal) ** 2)))
+
+
+def _pieces(times: Numbers, signal: Numbers) -> Iterator[tuple[Numbers, Numbers]]:
+    count = max(3, min(_PARTS, len(times) // 20))
+    return zip(np.array_split(times, count), np.array_split(signal, count), strict=True)
+
+
+def _since(sizes: Sequence[tuple[float, float]], last: float) -> float:
+    """The first time from which on the swing is about as large as at the end [s]."""
+    since = sizes[-1][0]
+    for time, size in reversed(sizes):
+        if not KEPT * last < size < last / KEPT:
+            break
+        since = time
+    return since
+
+
+def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None:
+    """An output that goes to and fro between the looks; its signal is how far, beyond where it got in the meantime."""
+    turns, last = seen.turns[name][first + 1 :], seen.last[name][first:]
+    often = float(np.array_split(turns, 4)[3].mean())
+    if often < _FAST:
+        return None
+    group = int(np.ceil(_TURNS / often))
+    rows = np.arange(0, len(turns) - group + 1, group)
+    high = np.maximum.reduceat(seen.high[name][first + 1 :], rows)
+    low = np.minimum.reduceat(seen.low[name][first + 1 :], rows)
+    ends = np.append(rows[1:], len(turns))
+    ripple, times = np.maximum(high - low - np.abs(last[ends] - last[rows]), 0.0), seen.times[first + 1 :][rows]
+    deviation, scale = float(np.abs(last - last[0]).max()), max(1.0, abs(float(last[0])))
+    stretch = times >= begin
+    if stretch.sum() < _FEWEST_GROUPS:
+        return None
+    _, middle, end = (float(part.mean()) for part in np.array_split(ripple[stretch], 3))
+    if end < KEPT * middle or end / 2 < max(SMALLEST_FAST * scale, SMALLEST_PART * deviation):
+        return None
+    sizes = list(zip(times.tolist(), ripple.tolist(), strict=True))
+    size = end / (2 * np.sqrt(2)) / scale
+    after, hz = float(seen.times[first]), often / 2 / seen.interval
+    return Swing(name, size, scale, after, times[stretch], ripple[stretch], _since(sizes, end), hz)
+
+
+def _regular(swing: Swing, oscillation: Oscillation, unit: str) -> Finding | None:
+    """A finding, unless the oscillation decays."""
+    change = oscillation.rate * float(swing.times[-1] - swing.times[0])
+    if change < -STEADY:
+        return None
+    return _growing(swing, oscillation, unit) if change > STEADY else _sustained(swing, oscillation, unit)
+
+
+def _is_irregular(swing: Swing) -> bool:
+    passes = 2 * crossings_hz(swing.times, swing.signal) * float(swing.times[-1] - swing.times[0]) / 3
+    return swing.turns_hz is None and swing.size >= IRREGULAR and passes >= _PASSES
+
+
+def _single(swing: Swing) -> Oscillation | None:
+    """The oscillation that makes the swing, if there is one and the second half of the stretch shows it as well."""
+    half = len(swing.times) // 2
+    whole = strongest_oscillation(swing.times, swing.signal)
+    late = strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)
+    if whole is None or late is None or whole.amplitude < EXPLAINED * np.sqrt(2) * swing.size * swing.scale:
+        return None
+    if abs(whole.frequency_hz - late.frequency_hz) > SAME_FREQUENCY * whole.frequency_hz:
+        return None
+    enough = late.frequency_hz * float(swing.times[-1] - swing.times[half]) >= LEAST_PERIODS
+    return late if enough else whole
+
+
+def _fast(swing: Swing) -> Oscillation | None:
+    """Frequency from the turns, growth rate from the extent; a rate that its scatter does not bear out is 0."""
+    if swing.turns_hz is None or not (swing.signal > 0).all():
+        return None
+    half = len(swing.times) // 2
+    times, sizes = swing.times[half:], np.log(swing.signal[half:])
+    rate, start = (float(c) for c in np.polyfit(times, sizes, 1))
+    scatter = float(np.std(sizes - rate * times - start))
+    if abs(rate) * float(times[-1] - times[0]) < scatter:
+        rate = 0.0
+    return Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)
+
+
+def _growing(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
+    message = (
+        f"the response grows from t = {swing.after:.4g} s on: {_shown(swing.name)} swings at "
+        f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at the end its amplitude is "
+        f"{oscillation.amplitude:.3g} {unit}"
+    )
+    return _finding("growing_oscillation", swing.after, swing, message, oscillation)
+
+
+def _sustained(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
+    message = (
+        f"the response neither decays nor grows, as in a limit cycle: from t = {swing.since:.4g} s to the end "
+        f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
+        f"{oscillation.amplitude:.3g} {unit}"
+    )
+    return _finding("sustained_oscillation", swing.since, swing, message, oscillation)
+
+
+def _irregular(swing: Swing, unit: str) -> Finding:
+    amplitude = float(np.sqrt(2)) * swing.size * swing.scale
+    fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
+    message = (
+        f"the response does not settle: from t = {swing.since:.4g} s to the end {_shown(swing.name)} swings by about "
+        f"{amplitude:.3g} {unit}, at no single frequency{fast}"
+    )
+    return Finding("sustained_oscillation", swing.since, *_place(swing.name), message, None, {"amplitude": amplitude})
+
+
+def _finding(kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation) -> Finding:
+    figures = {
+        "growth_rate": oscillation.rate,
+        "frequency_hz": oscillation.frequency_hz,
+        "amplitude": oscillation.amplitude,
+    }
+    return Finding(kind, time, *_place(swing.name), message, None, figures)
+
+
+def _place(name: str) -> tuple[str, str]:
+    component, _, variable = name.partition(".")
+    return component, variable
+
+
+def _shown(name: str) -> str:
+    """A pair of real and imaginary part is shown as its magnitude."""
+    return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name

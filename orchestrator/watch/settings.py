@@ -1,0 +1,47 @@
+"""The values of parameters over a run: those that components start with, and those that events give them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestrator.coupling.events import Event
+from orchestrator.coupling.system import System
+from orchestrator.watch.seen import Numbers
+
+
+class Settings:
+    """Parameters of a system at the times of the looks [s]."""
+
+    def __init__(self, system: System, events: Sequence[Event], times: Numbers) -> None:
+        self._system, self._times = system, times
+        self._changes = [
+            (event.time, f"{name}.{variable}", float(value))
+            for event in sorted(events, key=lambda e: e.time)
+            for name, settings in event.changes().items()
+            for variable, value in settings.items()
+        ]
+
+    def values(self, component: str, parameter: str) -> Numbers:
+        """A parameter or switch (1 or 0) at every look, shape (n,)."""
+        plan = self._system.components[component]
+        start = plan.parameters.get(parameter, plan.description.variables[parameter].start)
+        held = np.full(len(self._times), _number(start))
+        for time, name, value in self._changes:
+            if name == f"{component}.{parameter}":
+                held[self._times > time] = value  # what is seen at an event's time is from before it
+        return held
+
+    def connected(self, component: str) -> Numbers:
+        """Whether a component is on the grid: its own breaker, and the grid's port for it; 1 or 0, shape (n,)."""
+        held = np.ones(len(self._times))
+        for name, plan in self._system.components.items():
+            switch = "connected" if name == component else f"{component}.connected"
+            if switch in plan.description.variables:
+                held *= self.values(name, switch) > 0
+        return held
+
+
+def _number(value: object) -> float:
+    words = {"true": 1.0, "false": 0.0, "none": 0.0}
+    text = str(value).lower()
+    return words[text] if text in words else float(text)
