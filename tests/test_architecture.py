@@ -16,7 +16,7 @@ FLOORS = (
     ("orchestrator.coupling", "orchestrator.vendor"),
     ("orchestrator.ssp",),
     ("orchestrator.analysis", "orchestrator.cases", "orchestrator.distributed"),
-    ("orchestrator.report", "orchestrator.interop"),
+    ("orchestrator.report", "orchestrator.interop", "orchestrator.watch"),
     ("orchestrator.study",),
     ("orchestrator.black_box",),
     ("orchestrator.certification",),

@@ -18,6 +18,10 @@ _PER_PERIOD = 5
 """Samples that a period must have to be seen in samples."""
 
 
+_MOST_SAMPLES = 1200
+"""A long stretch of a fast oscillation is judged by so many samples at its end."""
+
+
 @dataclass(frozen=True)
 class Oscillation:
     """A·e^{rate·t}·cos(2π·frequency·t): rate [1/s], frequency [Hz], amplitude at the stretch's end [signal's unit]."""
@@ -32,13 +36,15 @@ def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float 
     if too_fast(times, signal):
         return None
     crossing = crossings_hz(times, signal)
+    enough = round(_MOST_SAMPLES / (_PER_PERIOD * max(crossing, _HIGHEST_HZ / 2) * float(times[1] - times[0])))
+    times, signal = times[-enough:], signal[-enough:]
     try:
         found = identify_modes(times, signal - signal.mean(), highest_hz=max(_HIGHEST_HZ, 1.2 * crossing))
     except AnalysisError:
         return None
     length = float(times[-1] - times[0])
-    all_modes = (
-        Oscillation(m.frequency_hz, m.eigenvalue.real, m.amplitude * float(np.exp(m.eigenvalue.real * length)))
+    all_modes = (  # an oscillation is a pair of exponentials
+        Oscillation(m.frequency_hz, m.eigenvalue.real, 2 * m.amplitude * float(np.exp(m.eigenvalue.real * length)))
         for m in found
     )
     oscillating = [m for m in all_modes if m.frequency_hz * length >= least_periods]

@@ -16,7 +16,7 @@ from orchestrator.watch.oscillation import (
     too_fast,
     without_trend,
 )
-from orchestrator.watch.seen import Numbers, Seen
+from orchestrator.watch.seen import Numbers, Seen, is_derivative, unit
 
 FEWEST_LOOKS = 60
 """In the stretch that is looked at: the last three quarters of the time since the last event."""
@@ -39,7 +39,7 @@ STEADY = 0.05
 SAME_FREQUENCY = 0.05
 """An oscillation is one if both the stretch and its second half show the same frequency, to this part of it."""
 
-EXPLAINED = 0.3
+EXPLAINED = 0.5
 """An oscillation is what swings if it makes at least this part of the swing."""
 
 IRREGULAR = 1e-3
@@ -57,8 +57,8 @@ _TURNS, _FEWEST_GROUPS = 6, 12
 _TRIED = 8
 """Signals in which oscillations are looked for: those that swing most at the end."""
 
-_PARTS = 40
-"""Pieces of the time since the event, of which the first is looked for in which an oscillation is all there."""
+_PARTS, _SHORT = 40, 0.1
+"""At most so many pieces of at least this length [s], of which the first is looked for with an oscillation in full."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,10 @@ class Swing:
         Root mean square in the last third without the trend, beside the scale.
     scale
         1 or the start's magnitude [the signal's unit].
-    after
-        Time of the last event [s].
+    response
+        Times [s] since the last event, and the signal at them.
     times, signal
-        The stretch.
-    since
-        When it began to swing as it does at the end [s].
+        The same in the stretch.
     turns_hz
         Half of how often the signal turns [Hz], step by step; only for what was followed between the looks.
     """
@@ -84,11 +82,15 @@ class Swing:
     name: str
     size: float
     scale: float
-    after: float
+    response: tuple[Numbers, Numbers]
     times: Numbers
     signal: Numbers
-    since: float
     turns_hz: float | None = None
+
+    @property
+    def after(self) -> float:
+        """Time of the last event [s]."""
+        return float(self.response[0][0])
 
 
 def unsettled_response(seen: Seen, system: System, after: float, units: Sequence[str]) -> Iterator[Finding]:
@@ -113,25 +115,27 @@ def unsettled_response(seen: Seen, system: System, after: float, units: Sequence
     swings = [swing for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
     # What is faster than the looks shows in the signals as something slower, so it goes first.
-    for group in ([s for s in swings if s.turns_hz is not None], [s for s in swings if s.turns_hz is None]):
-        told = _told(group[:_TRIED], system)
+    quick = [s for s in swings if s.turns_hz is not None]
+    others = [s for s in swings if s.turns_hz is None and not (quick and too_fast(s.times, s.signal))]
+    for group in (quick, others):
+        told = _told(group[:_TRIED], system, irregular_as_well=not quick)
         if told:
             yield from told
             return
 
 
-def _told(swings: Sequence[Swing], system: System) -> list[Finding]:
+def _told(swings: Sequence[Swing], system: System, *, irregular_as_well: bool) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one."""
     told: dict[Kind, Finding] = {}
     irregular = []
     for swing in swings:
         oscillation = _fast(swing) if swing.turns_hz is not None else _single(swing)
         if oscillation is not None:
-            finding = _regular(swing, oscillation, _unit(swing.name, system))
+            finding = _regular(swing, oscillation, unit(swing.name, system))
             if finding is not None:
                 told.setdefault(finding.kind, finding)
-        elif _is_irregular(swing):
-            irregular.append(_irregular(swing, _unit(swing.name, system)))
+        elif irregular_as_well and _is_irregular(swing):
+            irregular.append(_irregular(swing, unit(swing.name, system)))
     return [*told.values()] or irregular[:1]
 
 
@@ -140,7 +144,7 @@ def _signals(seen: Seen, system: System) -> dict[str, Numbers]:
     everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
     found = {}
     for name, signal in everything.items():
-        if _is_derivative(name) or _unit(name, system) == "rad" or not np.isfinite(signal).all():
+        if is_derivative(name) or unit(name, system) == "rad" or not np.isfinite(signal).all():
             continue
         if not name.endswith(("_re", "_im")):
             found[name] = signal
@@ -149,17 +153,8 @@ def _signals(seen: Seen, system: System) -> dict[str, Numbers]:
     return found
 
 
-def _is_derivative(name: str) -> bool:
-    return name.partition(".")[2].startswith("der(")
-
-
 def _component(name: str) -> str:
     return name.partition(".")[0]
-
-
-def _unit(name: str, system: System) -> str:
-    component, _, variable = name.partition(".")
-    return system.components[component].description.variables[variable].unit
 
 
 def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | None:
@@ -169,27 +164,25 @@ def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | 
     _, middle, last = (_rms(part) for part in np.array_split(signal[rows], 3))
     if last < KEPT * middle or np.sqrt(2) * last < max(SMALLEST * scale, SMALLEST_PART * deviation):
         return None
-    sizes = [(float(t[0]), _rms(y)) for t, y in _pieces(times, signal)]
-    return Swing(name, last / scale, scale, float(times[0]), times[rows], signal[rows], _since(sizes, last))
+    return Swing(name, last / scale, scale, (times, signal), times[rows], signal[rows])
 
 
 def _rms(signal: Numbers) -> float:
     return float(np.sqrt(np.mean(without_trend(signal) ** 2)))
 
 
-def _pieces(times: Numbers, signal: Numbers) -> Iterator[tuple[Numbers, Numbers]]:
-    count = max(3, min(_PARTS, len(times) // 20))
-    return zip(np.array_split(times, count), np.array_split(signal, count), strict=True)
-
-
-def _since(sizes: Sequence[tuple[float, float]], last: float) -> float:
-    """The first time from which on the swing is about as large as at the end [s]."""
-    since = sizes[-1][0]
-    for time, size in reversed(sizes):
-        if not KEPT * last < size < last / KEPT:
-            break
-        since = time
-    return since
+def _since(swing: Swing, frequency: float | None) -> float:
+    """The first time [s] from which on the swing is about as large as at the end."""
+    times, signal = swing.response
+    length = float(times[-1] - times[0])
+    periods = length * frequency / 2 if frequency and swing.turns_hz is None else length / _SHORT
+    count = int(min(_PARTS, periods, len(times) // 4))
+    if count < 2:
+        return float(times[0])
+    sizes = [float(y.mean()) if swing.turns_hz else _rms(y) for y in np.array_split(signal, count)]
+    last = float(np.mean(sizes[-max(1, count // 4) :]))
+    ago = next((k for k, size in enumerate(reversed(sizes)) if not KEPT * last < size < last / KEPT), count)
+    return float(np.array_split(times, count)[count - max(ago, 1)][0])
 
 
 def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None:
@@ -202,8 +195,10 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     rows = np.arange(0, len(turns) - group + 1, group)
     high = np.maximum.reduceat(seen.high[name][first + 1 :], rows)
     low = np.minimum.reduceat(seen.low[name][first + 1 :], rows)
-    ends = np.append(rows[1:], len(turns))
-    ripple, times = np.maximum(high - low - np.abs(last[ends] - last[rows]), 0.0), seen.times[first + 1 :][rows]
+    # The extremes hold the oscillation and how far its middle went.
+    middles = (high + low) / 2
+    drift = np.abs(np.gradient(middles)) if len(rows) > 1 else np.zeros(1)
+    ripple, times = np.maximum(high - low - drift, 0.0), seen.times[first:][rows]
     deviation, scale = float(np.abs(last - last[0]).max()), max(1.0, abs(float(last[0])))
     stretch = times >= begin
     if stretch.sum() < _FEWEST_GROUPS:
@@ -211,10 +206,8 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     _, middle, end = (float(part.mean()) for part in np.array_split(ripple[stretch], 3))
     if end < KEPT * middle or end / 2 < max(SMALLEST_FAST * scale, SMALLEST_PART * deviation):
         return None
-    sizes = list(zip(times.tolist(), ripple.tolist(), strict=True))
-    size = end / (2 * np.sqrt(2)) / scale
-    after, hz = float(seen.times[first]), often / 2 / seen.interval
-    return Swing(name, size, scale, after, times[stretch], ripple[stretch], _since(sizes, end), hz)
+    size, hz = end / (2 * np.sqrt(2)) / scale, often / 2 / seen.interval
+    return Swing(name, size, scale, (times, ripple), times[stretch], ripple[stretch], hz)
 
 
 def _regular(swing: Swing, oscillation: Oscillation, unit: str) -> Finding | None:
@@ -266,22 +259,23 @@ def _growing(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
 
 
 def _sustained(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
+    since = _since(swing, oscillation.frequency_hz)
     message = (
-        f"the response neither decays nor grows, as in a limit cycle: from t = {swing.since:.4g} s to the end "
+        f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to the end "
         f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
         f"{oscillation.amplitude:.3g} {unit}"
     )
-    return _finding("sustained_oscillation", swing.since, swing, message, oscillation)
+    return _finding("sustained_oscillation", since, swing, message, oscillation)
 
 
 def _irregular(swing: Swing, unit: str) -> Finding:
-    amplitude = float(np.sqrt(2)) * swing.size * swing.scale
+    amplitude, since = float(np.sqrt(2)) * swing.size * swing.scale, _since(swing, None)
     fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
     message = (
-        f"the response does not settle: from t = {swing.since:.4g} s to the end {_shown(swing.name)} swings by about "
+        f"the response does not settle: from t = {since:.4g} s to the end {_shown(swing.name)} swings by about "
         f"{amplitude:.3g} {unit}, at no single frequency{fast}"
     )
-    return Finding("sustained_oscillation", swing.since, *_place(swing.name), message, None, {"amplitude": amplitude})
+    return Finding("sustained_oscillation", since, *_place(swing.name), message, None, {"amplitude": amplitude})
 
 
 def _finding(kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation) -> Finding:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.system import System
 
 if TYPE_CHECKING:
     from orchestrator.coupling.master import Master
@@ -47,6 +48,17 @@ class Seen:
     def interval(self) -> float:
         """Between two looks [s]."""
         return float(self.times[1] - self.times[0]) if len(self.times) > 1 else 0.0
+
+
+def is_derivative(name: str) -> bool:
+    """Whether a signal is what FMI calls ``der(state)``."""
+    return name.partition(".")[2].startswith("der(")
+
+
+def unit(name: str, system: System) -> str:
+    """Of a signal, as its FMU has it."""
+    component, _, variable = name.partition(".")
+    return system.components[component].description.variables[variable].unit
 
 
 def look_every(step_size: float, record_every: int, stop_time: float) -> int:

@@ -1,13 +1,14 @@
 """The undisturbed state: before the first event nothing may move, and nothing may grow."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
-from orchestrator.watch.oscillation import strongest_oscillation
-from orchestrator.watch.seen import Numbers, Seen
+from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
+from orchestrator.watch.seen import Numbers, Seen, is_derivative, unit
 
 LEAST_GROWTH = 1e-6
 """A growth is told once a signal is this far from its start, as a part of 1 or of the start."""
@@ -18,11 +19,17 @@ LEAST_MOTION = 1e-4
 _STEEP = 0.2
 """What grows by itself had less than this part of a motion in half the time."""
 
-_FEWEST_LOOKS = 3
+FEWEST_LOOKS = 3
 """A growth rises over at least so many looks; else it is a jump."""
 
+_ROUNDING, _LARGE = 1e-13, 0.03
+"""A growth is measured between these parts of 1 or of the start."""
 
-def undisturbed_motion(seen: Seen, until: float) -> Iterator[Finding]:
+_AGREE = 0.2
+"""Two measurements of a growth agree to this part."""
+
+
+def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Finding]:
     """How the state moves before the first event, if it does.
 
     Parameters
@@ -31,45 +38,39 @@ def undisturbed_motion(seen: Seen, until: float) -> Iterator[Finding]:
         Time of the first event, or the end [s].
     """
     count = int(np.searchsorted(seen.times, until * (1 + 1e-12), side="right"))
-    if count < _FEWEST_LOOKS:
-        return
-    motions = _motions(seen, count)
+    motions = _motions(seen, system, count) if count >= FEWEST_LOOKS else {}
     if not motions:
         return
     most = max(motions, key=lambda name: motions[name][-1])
-    size = motions[most][-1]
-    steep = _is_growth(motions[most])
+    size, steep = float(motions[most][-1]), _is_growth(motions[most])
     least = LEAST_GROWTH if steep else LEAST_MOTION
     if size < least:
         return
     begin = {name: int(np.argmax(m >= least)) for name, m in motions.items() if m[-1] >= least}
-    first = min(begin, key=lambda name: (begin[name], -motions[name][-1]))
+    first = min(begin, key=lambda name: (begin[name], -motions[name][begin[name]]))
     time = float(seen.times[begin[first]])
-    who = f"{most} moves first and most" if first == most else f"{first} moves first; {most} moves most"
+    who = f"{first} moves first and most" if first == most else f"{first} moves first; {most} moves most"
     sizes = f"{who}, by {size:.3g} of 1 or of its start until t = {until:.4g} s, before anything happens"
     component, _, variable = first.partition(".")
-    figures = {"motion": float(size)}
     if not steep:
         message = f"the undisturbed state does not stand still from t = {time:.4g} s: {sizes}"
-        yield Finding("undisturbed_motion", time, component, variable, message, None, figures)
+        yield Finding("undisturbed_motion", time, component, variable, message, None, {"motion": size})
         return
-    rate, frequency = _growth(seen, most, motions[most])
-    figures |= {"growth_rate": rate, "frequency_hz": frequency}
-    how = f"at {rate:+.4g} 1/s " + (f"with {frequency:.4g} Hz" if frequency else "without oscillation")
-    message = f"the undisturbed state grows {how} from t = {time:.4g} s: {sizes}"
+    growth = _growth(seen, motions)
+    how = f"with {growth.frequency_hz:.4g} Hz" if growth.frequency_hz else "without oscillation"
+    message = f"the undisturbed state grows at {growth.rate:+.4g} 1/s {how} from t = {time:.4g} s: {sizes}"
+    figures = {"motion": size, "growth_rate": growth.rate, "frequency_hz": growth.frequency_hz}
     yield Finding("growth", time, component, variable, message, None, figures)
 
 
-def _motions(seen: Seen, count: int) -> dict[str, Numbers]:
-    """How far every signal has been from its start, beside 1 or its start; shape (count,) each, never falling."""
+def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
+    """How far every signal but angles has been from its start, beside 1 or its start; shape (count,), never falling."""
     found = {}
-    for name in {*seen.values, *seen.last}:
-        if name.partition(".")[2].startswith("der("):
+    for name, signal in {**seen.values, **seen.last}.items():
+        if is_derivative(name) or unit(name, system) == "rad":
             continue
-        signal = seen.last[name] if name in seen.last else seen.values[name]
-        lows, highs = (seen.low.get(name, signal), seen.high.get(name, signal))
-        start = signal[0]
-        far = np.maximum(highs[:count] - start, start - lows[:count]) / max(1.0, abs(start))
+        low, high, start = seen.low.get(name, signal), seen.high.get(name, signal), signal[0]
+        far = np.maximum(high[:count] - start, start - low[:count]) / max(1.0, abs(float(start)))
         if np.isfinite(far).all():
             found[name] = np.maximum.accumulate(far)
     return found
@@ -80,32 +81,36 @@ def _is_growth(motion: Numbers) -> bool:
     reached = int(np.argmax(motion >= 0.5 * motion[-1]))
     if reached == 0 or motion[reached // 2] > _STEEP * motion[reached]:
         return False
-    return int(_rising(motion).sum()) >= _FEWEST_LOOKS
+    return int(_rising(motion).sum()) >= FEWEST_LOOKS
 
 
 def _rising(motion: Numbers) -> NDArray[np.bool_]:
-    """Looks at which a growth is out of the rounding and not yet at its end."""
-    floor = max(10 * motion[1], 1e-13)
-    rising: NDArray[np.bool_] = (motion > floor) & (motion < 0.3 * motion[-1])
+    """Looks at which a growth is out of the rounding and not yet so large that something limits it."""
+    floor = max(10 * motion[1], _ROUNDING)
+    rising: NDArray[np.bool_] = (motion > floor) & (motion < min(0.3 * motion[-1], _LARGE))
     return rising
 
 
-def _growth(seen: Seen, name: str, motion: Numbers) -> tuple[float, float]:
-    """Growth rate [1/s] and frequency [Hz], 0 where nothing turns.
+def _growth(seen: Seen, motions: Mapping[str, Numbers]) -> Oscillation:
+    """Growth rate and frequency (0 where nothing turns) where the growth shows first.
 
-    The rate is that of the envelope, over every communication step. Where the looks are close enough for the
-    frequency, the matrix pencil gives both more exactly.
+    The rate is that of the extent, over every communication step, and the frequency that of the turns. Where the looks
+    are close enough for the frequency, the matrix pencil gives both more exactly.
     """
-    rising = np.flatnonzero(_rising(motion))
+    coupled = {name: m for name, m in motions.items() if name in seen.turns and _is_growth(m)} or motions
+    size = min(_LARGE, 0.3 * max(float(m[-1]) for m in coupled.values()))
+    row = min(int(np.argmax(m >= size)) for m in coupled.values() if m[-1] >= size)
+    name = max(coupled, key=lambda n: coupled[n][row])
+    rising = np.flatnonzero(_rising(coupled[name]))
     rows = slice(int(rising[0]), int(rising[-1]) + 1)
     times = seen.times[rows]
-    rate = float(np.polyfit(times, np.log(motion[rows]), 1)[0])
-    late = rows if len(times) < 2 * _FEWEST_LOOKS else slice((rows.start + rows.stop) // 2, rows.stop)
-    frequency = 0.0
-    if name in seen.turns:
-        frequency = float(seen.turns[name][late].sum()) / 2 / (seen.interval * (late.stop - late.start))
-    signal = (seen.last if name in seen.last else seen.values)[name][rows]
-    exact = strongest_oscillation(times, signal) if len(times) > 1 else None
-    if exact is not None and abs(exact.rate - rate) < 0.2 * rate:
-        return exact.rate, exact.frequency_hz
-    return rate, frequency
+    rate = float(np.polyfit(times, np.log(coupled[name][rows]), 1)[0])
+    late = slice((rows.start + rows.stop) // 2, rows.stop)
+    turns = float(seen.turns[name][late].sum()) if name in seen.turns else 0.0
+    frequency = turns / 2 / (seen.interval * (late.stop - late.start)) if turns > 1 else 0.0
+    exact = strongest_oscillation(times, (seen.last if name in seen.last else seen.values)[name][rows])
+    if exact is not None and abs(exact.rate - rate) < _AGREE * rate:
+        aliased = name in seen.turns and abs(exact.frequency_hz - frequency) > _AGREE * frequency + 1 / np.ptp(times)
+        if not aliased:
+            return exact
+    return Oscillation(frequency, rate, float(coupled[name][-1]))

@@ -54,7 +54,7 @@ class Watch:
         units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
         lost = list(lost_synchronism(seen, system, settings))
         found = [
-            *undisturbed_motion(seen, happened[0] if happened else end),
+            *undisturbed_motion(seen, system, happened[0] if happened else end),
             *active_limits(seen, system, settings),
             *lost,
         ]

@@ -3,6 +3,8 @@
 from functools import cache
 from math import ceil
 
+import casadi as ca
+
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import cached
@@ -79,6 +81,15 @@ def blow_up() -> Model:
     return m.build()
 
 
+def root() -> Model:
+    """y = √(0.05 + offset − u): no number where that is negative."""
+    m = ModelBuilder("small_root", "Square root")
+    offset = m.parameter("offset", 0.0, "1", "Added to what the root is taken of", tunable=True)
+    u = m.input("u", "1", "Input")
+    m.output("y", ca.sqrt(0.05 + offset - u), "1", "Root")
+    return m.build()
+
+
 def power_source() -> Model:
     """An output in megawatt, and a switch."""
     m = ModelBuilder("small_power_source", "Constant power")
@@ -95,6 +106,7 @@ MODELS = {
     "started_gain": started_gain,
     "guarded_gain": guarded_gain,
     "blow_up": blow_up,
+    "root": root,
     "power_source": power_source,
 }
 

@@ -1,0 +1,35 @@
+"""Runs made by hand: signals by formula, as the watch would see them."""
+
+import numpy as np
+
+from orchestrator.coupling.system import System
+from orchestrator.watch.seen import Seen
+from tests.coupling.small_fmus import small_fmu
+
+LOOK = 5e-3
+STEP = 1e-4
+
+
+def system(*names):
+    """Components with an input ``u`` and an output ``y``."""
+    made = System()
+    for name in names:
+        made.add(name, small_fmu("gain"))
+    return made
+
+
+def seen_of(signals, stop):
+    """What the watch sees of outputs given as functions of time, every step of `STEP`, until ``stop`` [s]."""
+    times = np.arange(round(stop / STEP) + 1) * STEP
+    every = round(LOOK / STEP)
+    parts = {"last": {}, "low": {}, "high": {}, "turns": {}}
+    for name, function in signals.items():
+        y = function(times)
+        change = np.diff(y, prepend=y[0])
+        turned = np.concatenate([[0.0], (change[1:] * change[:-1] < 0)]).astype(float)
+        inner = y[1:].reshape(-1, every)
+        parts["last"][name] = y[::every]
+        parts["low"][name] = np.concatenate([[y[0]], np.minimum(inner.min(axis=1), y[:-1:every])])
+        parts["high"][name] = np.concatenate([[y[0]], np.maximum(inner.max(axis=1), y[:-1:every])])
+        parts["turns"][name] = np.concatenate([[0.0], turned[1:].reshape(-1, every).sum(axis=1)])
+    return Seen(times[::every], dict(parts["last"]), parts["last"], parts["low"], parts["high"], parts["turns"])

@@ -1,0 +1,154 @@
+"""`gfor run` on cases that are well, and on cases with something planted in them: what it says, and where."""
+
+import json
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.study.run import run_scenario
+
+DEEP = """
+name = "deep"
+[solver]
+stop_time = "3 s"
+groups = [["gfor"], ["grid"]]
+[components.gfor]
+model = "gfor"
+parameters = { S_n = "1500 MVA", P_0 = 0.6, Q_0 = 0.05, v_0 = 1.0 }
+[components.grid]
+model = "infinite_bus"
+parameters = { P_0 = 9.0, Q_0 = 0.75, v_0 = 1.0 }
+[[connections]]
+from = "grid.v_re"
+to = "gfor.v_re"
+[[connections]]
+from = "grid.v_im"
+to = "gfor.v_im"
+[[connections]]
+from = "gfor.i_re"
+to = "grid.i_re"
+[[connections]]
+from = "gfor.i_im"
+to = "grid.i_im"
+[[events]]
+type = "parameter_change"
+time = "1 s"
+component = "grid"
+parameter = "dip.depth"
+value = 0.8
+[[events]]
+type = "parameter_change"
+time = "1.3 s"
+component = "grid"
+parameter = "dip.depth"
+value = 0.0
+[[plots]]
+name = "power"
+title = "Power"
+panels = [{ signal = "gfor.p", label = "P [pu]" }]
+"""
+
+
+def findings(case, scenario, stop=None, **overrides):
+    loaded = load_case(case)
+    (ready,) = loaded.prepare([scenario], {k.replace("__", "."): v for k, v in overrides.items()}, stop_time=stop)
+    return run_scenario(loaded, ready).findings
+
+
+@pytest.mark.parametrize("scenario", ["gfor", "pod_p", "pod_q", "pod_pq"])
+def test_what_is_well_is_silent(scenario):
+    assert findings("two_area_rms", scenario) == []
+
+
+@pytest.mark.parametrize("scenario", ["dip", "load_step"])
+def test_a_shallow_dip_and_a_load_step_are_silent(scenario):
+    assert findings("infinite_bus", scenario) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["gfor", "pod_p", "pod_q", "pod_pq"])
+def test_the_papers_scenarios_are_silent(scenario):
+    assert findings("two_area", scenario) == []
+
+
+@pytest.mark.parametrize(
+    ("case", "rate"),
+    [("two_area_rms", 0.033), pytest.param("two_area", 0.0285, marks=pytest.mark.slow)],
+)
+def test_the_papers_base_case_grows_after_its_load_step(case, rate):
+    (finding,) = findings(case, "base")
+    assert (finding.kind, finding.component, finding.time) == ("growing_oscillation", "sg1", 1.0)
+    assert finding.figures["growth_rate"] == pytest.approx(rate, abs=0.001)
+    assert finding.figures["frequency_hz"] == pytest.approx(0.573, abs=0.001)
+
+
+@pytest.mark.slow
+def test_an_undisturbed_state_that_grows():
+    """λ = 68.85 ± j215.8 (34.35 Hz) with that droop; the reference moves it off its exact rest by 1e-9 pu."""
+    growth, lost = findings("two_area", "gfor", 0.9, gfor__droop__R_f=5.0, gfor__droop__delta_P_ref=1e-9)
+    assert growth.kind == "growth"
+    assert growth.figures["growth_rate"] == pytest.approx(68.85, rel=0.01)
+    assert growth.figures["frequency_hz"] == pytest.approx(34.35, rel=0.01)
+    assert 0.1 < growth.time < 0.3
+    assert (lost.kind, lost.component) == ("loss_of_synchronism", "gfor")
+
+
+def test_limits_and_lost_synchronism_are_said_once_in_terminal_summary_and_report(gfor, tmp_path):
+    file = tmp_path / "case.toml"
+    file.write_text(DEEP, encoding="utf-8")
+    code, _, said = gfor("run", file, "--out", tmp_path)
+    assert code == 0
+    (summary,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]
+    kinds = [(f["kind"], f["component"], f["variable"]) for f in summary["findings"]]
+    assert sorted(kinds) == [
+        ("active_limit", "gfor", "filter.i_s_d"),
+        ("active_limit", "gfor", "filter.i_s_q"),
+        ("loss_of_synchronism", "gfor", "droop.theta"),
+    ]
+    by_variable = {f["variable"]: f for f in summary["findings"]}
+    assert by_variable["filter.i_s_q"]["time"] == pytest.approx(1.0, abs=0.02)
+    assert by_variable["filter.i_s_q"]["duration_s"] > 0.3
+    lost = by_variable["droop.theta"]
+    assert lost["time"] == pytest.approx(1.55, abs=0.02)
+    assert lost["turns"] > 1
+    assert "gfor loses synchronism with grid: from t = 1.55 s" in lost["message"]
+    for finding in summary["findings"]:
+        assert said.count(finding["message"]) == 1
+    assert gfor("report", tmp_path)[0] == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for finding in summary["findings"]:
+        assert page.count(finding["message"]) == 1
+    assert "What the runs did wrong" in page
+
+
+def test_a_run_without_findings_says_so_in_its_report(gfor, tmp_path):
+    code, _, said = gfor("run", "two_area_rms", "--scenario", "gfor", "--out", tmp_path)
+    assert (code, said) == (0, "")
+    gfor("report", tmp_path)
+    assert "nothing of it was found" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_pod_at_its_limit_is_told_with_its_duration():
+    found = findings("two_area_rms", "pod_p", gfor__pod_p__limit=1e-4)
+    (limit,) = [f for f in found if f.kind == "active_limit"]
+    assert (limit.component, limit.variable) == ("gfor", "delta_p_pod")
+    assert 1.0 < limit.time < 1.5
+    assert limit.figures["duration_s"] > 0.1
+
+
+def test_watching_changes_no_number(tmp_path):
+    """What is recorded with the watch is what a master gives that only records."""
+    from orchestrator.analysis.steady_state import find_operating_point
+    from orchestrator.coupling.recorder import Recorder
+    from orchestrator.study.modes import running
+
+    case = load_case("two_area_rms")
+    (ready,) = case.prepare(["pod_pq"], stop_time=3.0)
+    watched = run_scenario(case, ready).dataset
+    plain = Recorder(ready.record, ready.record_every)
+    with running(ready) as master:
+        find_operating_point(master)
+        master.run(ready.stop_time, ready.events, [plain])
+    for column, name in enumerate(ready.record):
+        assert np.array_equal(watched[name].values, plain.values[:, column], equal_nan=True)
