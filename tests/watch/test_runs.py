@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
+from orchestrator.coupling.recorder import Recorder
+from orchestrator.study.modes import running
 from orchestrator.study.run import run_scenario
 
 DEEP = """
@@ -139,10 +142,6 @@ def test_a_pod_at_its_limit_is_told_with_its_duration():
 
 def test_watching_changes_no_number(tmp_path):
     """What is recorded with the watch is what a master gives that only records."""
-    from orchestrator.analysis.steady_state import find_operating_point
-    from orchestrator.coupling.recorder import Recorder
-    from orchestrator.study.modes import running
-
     case = load_case("two_area_rms")
     (ready,) = case.prepare(["pod_pq"], stop_time=3.0)
     watched = run_scenario(case, ready).dataset
