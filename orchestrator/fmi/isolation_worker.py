@@ -11,7 +11,7 @@ from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError
 from orchestrator.fmi.component import Component
-from orchestrator.fmi.description import read_description
+from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, apply_limits
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
@@ -26,13 +26,16 @@ class Worker:
         self._request, self._parent = request, request["parent"]
         self._box = Mailbox(folder / "mailbox")
         limits = Limits(**request["limits"])
-        self._description = read_description(request["fmu"])
+        self._description = self._described()
         compile_adapters(self._description)
-        apply_limits(limits, folder / "work")
+        self._unlimited = apply_limits(limits, folder / "work")
         on_message(limits.messages, lambda: self._box.head.steps + self._box.head.request, self._box.write_log)
         self._component: Component | None = None
         self._states: dict[int, Any] = {}
         self._next = itertools.count(1)
+
+    def _described(self) -> FmuDescription:
+        return read_description(self._request["fmu"])
 
     def serve(self) -> None:
         """Answer the mailbox."""
@@ -72,8 +75,9 @@ class Worker:
         assert self._component is not None
         return self._component
 
-    def do_begin(self) -> None:
-        """Tell that from here on it is the FMU that takes time."""
+    def do_begin(self) -> list[str]:
+        """Tell that from here on it is the FMU that takes time, and what could not be limited."""
+        return self._unlimited
 
     def do_instantiate(self) -> None:
         if self._description.guid != self._request["guid"]:

@@ -2,7 +2,8 @@
    `mailbox.py` describes the same structure to Python.
 
    What is set waits until a step or a reading needs it, and a step brings the values along that were read after the
-   last one: a communication step costs one exchange between the processes and not three. */
+   last one: a communication step costs one exchange between the processes and not three. Many steps of one of several
+   instances may be asked for at once (RUN). */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -58,9 +59,9 @@ static int is_gone(int64_t process) {
 static int is_orphan(int64_t parent) { return (int64_t)getppid() != parent; }
 #endif
 
-enum { MOST = 16384, TEXT = 1 << 20, LOG = 8192 };
+enum { MOST = 16384, TEXT = 1 << 24, LOG = 8192, ROOM = 1 << 18 };
 enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66, INTERRUPTED = 67 };
-enum { EXCHANGE = 1, TALK = 2 };
+enum { EXCHANGE = 1, TALK = 2, RUN = 3 };
 enum { SET = 1, STEP = 2, GET = 4 };
 
 struct mailbox {
@@ -77,6 +78,10 @@ struct mailbox {
     double set_values[MOST], got[MOST];
     char text[TEXT];
     char log[LOG];
+    /* RUN: `n_rows` rows of inputs in `room`, then a row of outputs for each step, or one for none. */
+    int64_t instance, n_steps, n_rows, n_in, n_out;
+    int64_t done, stage; /* steps that are finished; what it is at: SET, STEP or GET */
+    double room[ROOM];
 };
 
 /* How often a word is looked at before a process sleeps: worth it where the other one has a processor of its own, and a
@@ -86,7 +91,10 @@ static int spins = SPINS, vain, sleeps;
 
 EXPORT size_t mailbox_size(void) { return sizeof(struct mailbox); }
 EXPORT size_t mailbox_offset(int which) {
-    return which == 0 ? offsetof(struct mailbox, text) : offsetof(struct mailbox, log);
+    const size_t places[] = {offsetof(struct mailbox, text), offsetof(struct mailbox, log),
+                             offsetof(struct mailbox, instance), offsetof(struct mailbox, set_references),
+                             offsetof(struct mailbox, get_references), offsetof(struct mailbox, room)};
+    return places[which];
 }
 
 static void relax(void) {
@@ -217,6 +225,62 @@ EXPORT int mailbox_serve(struct mailbox *box, int64_t parent, void *component, g
         box->status = serve(box, component, set_real, get_real, step);
         publish(&box->reply, box->request, &box->sleeping[1]);
     }
+}
+
+/* One instance of several that a process serves; none where its component is NULL. */
+struct served {
+    void *component;
+    get_set set_real, get_real;
+    do_step step;
+};
+
+static int run(struct mailbox *box, const struct served *served) {
+    double *in = box->room, *out = in + box->n_rows * box->n_in;
+    int worst = OK, status;
+    box->done = 0;
+    for (int64_t k = 0;; ++k) {
+        box->stage = SET;
+        if (box->n_in && k < box->n_rows &&
+            (status = served->set_real(served->component, box->set_references, (size_t)box->n_in, in + k * box->n_in)) > worst)
+            if ((worst = status) > 1) return worst;
+        box->stage = STEP;
+        if (box->n_steps) {
+            ++box->steps;
+            if ((status = served->step(served->component, box->time + (double)k * box->step, box->step, 1)) > worst)
+                if ((worst = status) > 1) return worst;
+        }
+        box->stage = GET;
+        if (box->n_out &&
+            (status = served->get_real(served->component, box->get_references, (size_t)box->n_out, out + k * box->n_out)) > worst)
+            if ((worst = status) > 1) return worst;
+        box->done = k + 1;
+        if (k + 1 >= box->n_steps) return worst;
+    }
+}
+
+/* As `mailbox_serve`, for several instances, of which every question names one. */
+EXPORT int mailbox_host(struct mailbox *box, int64_t parent, const struct served *table, int64_t n) {
+    for (;;) {
+        while (!changed(&box->request, box->reply, &box->sleeping[0]))
+            if (is_orphan(parent)) return 0;
+        if (box->kind != RUN || box->instance < 0 || box->instance >= n || !table[box->instance].component) return 1;
+        box->status = run(box, table + box->instance);
+        publish(&box->reply, box->request, &box->sleeping[1]);
+    }
+}
+
+/* Ask without waiting. The number is the asker's own: what lies in shared memory, the other side may have written. */
+EXPORT void mailbox_post(struct mailbox *box, int32_t kind, int32_t number) {
+    box->kind = kind;
+    publish(&box->request, number, &box->sleeping[0]);
+}
+
+/* 1 if the question of that number is answered, 0 if not within `most` seconds, -1 if something else was answered. */
+EXPORT int mailbox_wait(struct mailbox *box, int32_t number, double most) {
+    const double end = seconds() + most;
+    while (!changed(&box->reply, number - 1, &box->sleeping[1]))
+        if (seconds() > end) return 0;
+    return box->reply == number ? 1 : -1;
 }
 
 /* The answer to a talk. */

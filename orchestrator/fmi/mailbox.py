@@ -7,14 +7,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import InputError
 from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("mailbox.c")
-_MOST = 16384
-_TEXT, _LOG = 1 << 20, 8192
+_TEXT, _LOG = 1 << 24, 8192
 
+MOST, ROOM = 16384, 1 << 18
+"""References of one question; numbers of a question for many steps."""
+
+SET, STEP, GET = 1, 2, 4
+TALK, RUN = 2, 3
 OK = 0
 DIED, HUNG, NOT_A_NUMBER, INTERRUPTED = 64, 65, 66, 67
 """Answers of a mailbox that no FMU gives; those of mailbox.c."""
@@ -43,6 +49,26 @@ class Head(ctypes.Structure):
     )
 
 
+class Run(ctypes.Structure):
+    """What one question for many steps says, behind the log in ``struct mailbox``."""
+
+    _fields_ = (
+        ("instance", ctypes.c_int64),
+        ("n_steps", ctypes.c_int64),
+        ("n_rows", ctypes.c_int64),
+        ("n_in", ctypes.c_int64),
+        ("n_out", ctypes.c_int64),
+        ("done", ctypes.c_int64),
+        ("stage", ctypes.c_int64),
+    )
+
+
+class Served(ctypes.Structure):
+    """``struct served``: an instance that a process of several serves."""
+
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("component", "set_real", "get_real", "step"))
+
+
 @cache
 def mailbox_library() -> Any:
     """The compiled mailbox; its calls hold Python's lock, as those of an FMU in this process do.
@@ -61,11 +87,22 @@ def mailbox_library() -> Any:
     library.mailbox_size.restype = library.mailbox_offset.restype = size
     library.mailbox_talk.argtypes = [address]
     library.mailbox_serve.argtypes = [address, ctypes.c_int64, *[address] * 4]
+    library.mailbox_host.argtypes = [address, ctypes.c_int64, address, ctypes.c_int64]
     library.mailbox_answer.argtypes = [address, ctypes.c_int]
     library.mailbox_answer.restype = None
     library.mailbox_heed.argtypes = [address, address]
     library.mailbox_heed.restype = None
     library.mailbox_heed(ctypes.cast(ctypes.pythonapi.PyErr_CheckSignals, address), calls.asked_address)
+    return library
+
+
+@cache
+def unlocked_library() -> Any:
+    """Of the same functions those that ask without running an FMU here: they leave Python's lock to other threads."""
+    library = ctypes.CDLL(mailbox_library()._name)
+    library.mailbox_post.argtypes = [ctypes.c_void_p, ctypes.c_int32, ctypes.c_int32]
+    library.mailbox_post.restype = None
+    library.mailbox_wait.argtypes = [ctypes.c_void_p, ctypes.c_int32, ctypes.c_double]
     return library
 
 
@@ -78,6 +115,8 @@ class Mailbox:
         Of the structure; it takes an instance's place in FMI calls.
     head
         Its first fields.
+    run
+        The fields of a question for many steps.
     """
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
@@ -90,7 +129,13 @@ class Mailbox:
             self._memory = mmap.mmap(file.fileno(), size)
         self.head = Head.from_buffer(self._memory)
         self.address = ctypes.addressof(self.head)
-        self._text, self._log = (self.library.mailbox_offset(which) for which in (0, 1))
+        self._text, self._log, run, *arrays = (self.library.mailbox_offset(which) for which in range(6))
+        self.run = Run.from_buffer(self._memory, run)
+        self._arrays = arrays
+
+    def array(self, which: int, kind: Any, count: int) -> Any:
+        """A view of shared memory: references that are set (0), that are read (1), room for their values (2)."""
+        return np.frombuffer(self._memory, kind, count, self._arrays[which])
 
     def write_text(self, value: Any) -> None:
         """Leave a JSON value for the other side.

@@ -1,30 +1,28 @@
-"""Acceptance tests of one FMU, run in processes that it may crash, hang or flood without harm to anyone else."""
+"""Acceptance tests of one FMU.
 
-import json
-import mmap
-import signal
-import subprocess
-import sys
-import tempfile
-from dataclasses import asdict, dataclass, field
+The checks run here; the FMU runs in a process of its own, which it may crash, hang or flood, and from which nothing but
+measurements come. So it reaches no verdict.
+"""
+
+import traceback
+from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import rmtree
-from time import monotonic, sleep
+from time import monotonic
 from typing import Any
 
-from orchestrator.errors import BindingError, FmuFileError, HostileFmuError, InputError
+from orchestrator.errors import BindingError, ComponentError, CosimError, FmuFileError, HostileFmuError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
-from orchestrator.fmi.limits import TO_BEGIN, Limits
-from orchestrator.fmi.messages import FLOODED
+from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.vendor.binding import bind, read_table
 from orchestrator.vendor.checks.all import CHECKS
-from orchestrator.vendor.checks.base import Result, Verdict, failed, not_applicable, passed
+from orchestrator.vendor.checks.base import Check, Result, Verdict, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import RUN_FOR
-from orchestrator.vendor.checks.subject import CALLS, Progress
-from orchestrator.vendor.worker import PROGRESS_BYTES, progress_in
+from orchestrator.vendor.checks.subject import Subject
+from orchestrator.vendor.process import FmuProcess, ProcessEndedError
 
 _PATIENCE = 10
 """A check may take this many times the limit for one call."""
@@ -122,8 +120,13 @@ def check_fmu(
         bound = None if binding is None else _bound(report, native, binding)
         compile_adapters(bound or native)  # here, where nobody waits for the FMU
         checked = binding if bound else None
-        with tempfile.TemporaryDirectory(prefix="gfor_check_", ignore_cleanup_errors=True) as folder:
-            _Runner(report, checked, directory, Path(folder), limits or Limits(), run_for).run(list(only or CHECKS))
+        subject = Subject(bound or native, directory)
+        subject.memory["run_for"] = run_for
+        runner = _Runner(report, subject, checked, limits or Limits())
+        try:
+            runner.run(list(only or CHECKS))
+        finally:
+            runner.close()
     finally:
         rmtree(directory, ignore_errors=True)
     return report
@@ -142,115 +145,67 @@ def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescri
 
 
 class _Runner:
-    """Starts workers until every check has a result."""
+    """Asks every question, in this process, of an FMU that is in another."""
 
-    def __init__(
-        self, report: Report, binding: Path | None, directory: Path, folder: Path, limits: Limits, run_for: float
-    ) -> None:
-        self._report, self._limits, self._folder = report, limits, folder
-        self._request = {
-            "fmu": str(report.fmu.resolve()),
-            "binding": None if binding is None else str(binding.resolve()),
-            "directory": str(directory),
-            "folder": str(folder),
-            "limits": asdict(limits),
-            "memory": {"run_for": run_for},
-        }
+    def __init__(self, report: Report, subject: Subject, binding: Path | None, limits: Limits) -> None:
+        self._report, self._subject, self._binding, self._limits = report, subject, binding, limits
+        self._process: FmuProcess | None = None
+        self._deadline = 0.0
+        subject.process = self.process
+
+    def process(self) -> FmuProcess:
+        """The FMU's process; a new one where it has ended the last one."""
+        if self._process is None or not self._process.alive:
+            self.close()
+            subject = self._subject
+            self._process = FmuProcess(subject.description, self._binding, subject.directory, self._limits)
+            self._report.unlimited = self._process.unlimited
+        self._process.deadline = self._deadline
+        return self._process
 
     def run(self, names: list[str]) -> None:
-        pending = list(names)
-        while pending:
-            ended = self._one_process(pending)
-            if ended is None:
-                return
-            name, result = ended
-            self._report.results.append(result)
-            pending = pending[pending.index(name) + 1 :]
-            if name == "runs":
-                self._report.results += [not_applicable(n, f"because it ended its process in 'runs' ({result.fault})")
-                                         for n in pending]  # fmt: skip
+        results = self._report.results
+        for place, name in enumerate(names):
+            self._deadline = monotonic() + _PATIENCE * self._limits.seconds
+            result = self._answer(CHECKS[name])
+            results.append(result)
+            if name == "runs" and self._process is not None and not self._process.alive:
+                because = f"because it ended its process in 'runs' ({result.fault})"
+                results += [not_applicable(later, because) for later in names[place + 1 :]]
                 return
 
-    def _one_process(self, names: list[str]) -> tuple[str, Result] | None:
-        """Run checks in a new process; the check that it did not survive, or None."""
-        results, shared = self._folder / "results", self._folder / "progress"
-        results.write_bytes(b"")
-        shared.write_bytes(bytes(PROGRESS_BYTES))
-        request = json.dumps({**self._request, "checks": names, "failed": [r.check for r in self._report.failures]})
-        with (self._folder / "output").open("wb") as output, shared.open("r+b") as file:
-            progress = progress_in(mmap.mmap(file.fileno(), PROGRESS_BYTES))
-            process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "orchestrator.vendor.worker", request],
-                stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
-            )  # fmt: skip
-            try:
-                hung = self._watch(process, progress, results)
-            finally:
-                if process.poll() is None:
-                    process.kill()
-                process.wait()
-        running, finished = self._collect(results)
-        if finished:
-            return None
-        if running is None:
-            raise InputError(f"the FMU's process did not start: {self._said()}")
-        where = f"{CALLS[progress.call.value]}, at t = {progress.time.value:.6g} s"
-        return running, self._death(running, process.returncode, hung, where)
+    def _answer(self, check: Check) -> Result:
+        """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
+        faulty = [r.check for r in self._report.failures]
+        missing = [name for name in check.needs if name in faulty]
+        if missing:
+            return not_applicable(check.name, f"because it failed in {missing[0]!r}, without which this has no meaning")
+        self._subject.doing = ""
+        try:
+            return check.run(self._subject)
+        except ProcessEndedError as error:
+            doing = self._subject.doing
+            return failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
+        except ComponentError as error:
+            return failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
+        except InputError:
+            raise
+        except CosimError as error:
+            return failed(check.name, "refused call", str(error))
+        except Exception as error:  # a check that fails by itself must not hide the others, nor count as passed
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            says = f"the check failed by itself: {error!r} in {Path(where.filename).name}, line {where.lineno}"
+            return failed(check.name, "no verdict", says)
 
-    def _watch(self, process: "subprocess.Popen[bytes]", progress: Progress, results: Path) -> bool:
-        """Wait for the process; True if it had to be given up."""
-        state: Any = None
-        moved = begun = monotonic()
-        size = 0
-        while process.poll() is None:
-            now, written = (progress.time.value, progress.call.value), results.stat().st_size
-            if written != size:
-                size, begun = written, monotonic()
-            if now != state or begun > moved:
-                state, moved = now, monotonic()
-            patience = self._limits.seconds if size else TO_BEGIN
-            if monotonic() - moved > patience or monotonic() - begun > _PATIENCE * patience:
-                return True
-            sleep(0.02)
-        return False
+    def close(self) -> None:
+        if self._process is not None:
+            self._process.close()
 
-    def _collect(self, results: Path) -> tuple[str | None, bool]:
-        """Take over what was finished; the check that was running, and whether all is done."""
-        running = None
-        for line in results.read_text(encoding="utf-8", errors="replace").splitlines():
-            try:
-                entry = json.loads(line)
-            except ValueError:
-                continue  # cut off in the middle
-            if "unlimited" in entry:
-                self._report.unlimited = tuple(entry["unlimited"])
-            elif "begin" in entry:
-                running = entry["begin"]
-            elif "result" in entry:
-                self._report.results.append(Result.of_dict(entry["result"]))
-                self._request["memory"] = entry["memory"]
-                running = None
-            elif "end" in entry:
-                return None, True
-        return running, False
 
-    def _death(self, name: str, code: int, hung: bool, where: str) -> Result:
-        said = self._said()
-        tail = f"; it wrote: {said}" if said else ""
-        if hung:
-            return failed(name, "hang", f"no answer within {self._limits.seconds:g} s in {where}")
-        if code == FLOODED:
-            return failed(name, "output flood", f"more than {self._limits.messages} log messages in {where}")
-        if code < 0 and -code == getattr(signal, "SIGXFSZ", None):
-            return failed(name, "output flood", f"more than {self._limits.output} bytes written in {where}")
-        if code < 0 or code > 0x80000000:
-            kind = signal.Signals(-code).name if code < 0 else f"code {code:#x}"
-            return failed(name, "crash", f"its process died with {kind} in {where}{tail}")
-        return failed(name, "exit", f"it ended its process with exit code {code} in {where}{tail}")
-
-    def _said(self) -> str:
-        """The end of what the process wrote."""
-        with (self._folder / "output").open("rb") as output:
-            output.seek(max(0, output.seek(0, 2) - 2000))
-            lines = output.read().decode("utf-8", "replace").strip().splitlines()
-        return " ".join(lines[-1:])[:300]
+_REFUSED = {
+    "fmi2Instantiate": "no instance",
+    "fmi2EnterInitializationMode": "does not start",
+    "fmi2ExitInitializationMode": "does not start",
+    "fmi2DoStep": "error in a step",
+}
+"""Name of the fault where an FMU refuses what every FMU must be able to do."""

@@ -1,100 +1,69 @@
-"""The process in which a foreign FMU is checked; started by `runner`, never by a person.
+"""The process in which a foreign FMU is checked: it has instances of it and does what it is asked; started by `process`.
 
-Each check's name is written before it begins and its result when it is done, so that whoever started this process knows
-in which check the FMU ended it.
+No check runs here and no verdict is made here: code of the FMU can change whatever is in its process.
 """
 
 import ctypes
+import gc
 import json
-import mmap
+import os
 import sys
-import traceback
-from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import ComponentError, CosimError
-from orchestrator.fmi.instance import compile_adapters
-from orchestrator.fmi.limits import Limits, apply_limits
-from orchestrator.fmi.messages import on_message
+from orchestrator.fmi.component import Component
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.isolation_worker import Worker
+from orchestrator.fmi.mailbox import DIED, Served
+from orchestrator.vendor.allocations import memory_in_use
 from orchestrator.vendor.binding import bound_fmu
-from orchestrator.vendor.checks.all import CHECKS
-from orchestrator.vendor.checks.base import Check, Result, failed, not_applicable
-from orchestrator.vendor.checks.subject import Progress, Subject
 
-PROGRESS_BYTES = 64
-
-_REFUSED = {
-    "fmi2Instantiate": "no instance",
-    "fmi2EnterInitializationMode": "does not start",
-    "fmi2ExitInitializationMode": "does not start",
-    "fmi2DoStep": "error in a step",
-}
-"""Name of the fault where an FMU refuses what every FMU must be able to do."""
+_MOST = 256
+"""Instances at the same time."""
 
 
-def progress_in(memory: mmap.mmap) -> Progress:
-    """Progress that lies in shared memory."""
-    return Progress(ctypes.c_double.from_buffer(memory, 0), ctypes.c_int64.from_buffer(memory, 8))
+class Host(Worker):
+    """Answers for several instances, each under a number."""
 
+    def __init__(self, request: dict[str, Any]) -> None:
+        super().__init__(request)
+        self._table = (Served * _MOST)()
+        self._instances: dict[int, Component] = {}
+        self._asked = 0
 
-def main(request: dict[str, Any]) -> None:
-    """Run checks on one FMU.
+    def _described(self) -> FmuDescription:
+        return bound_fmu(self._request["fmu"], self._request["binding"])
 
-    Parameters
-    ----------
-    request
-        fmu, binding, directory (extracted), folder (may be written in), checks (names), limits.
-    """
-    folder = Path(request["folder"])
-    description = bound_fmu(request["fmu"], request["binding"])
-    compile_adapters(description)
-    with (
-        (folder / "results").open("a", encoding="utf-8", buffering=1) as results,
-        (folder / "progress").open("r+b") as shared,
-    ):
-        memory = mmap.mmap(shared.fileno(), PROGRESS_BYTES)
-        limits = Limits(**request["limits"])
-        missing = apply_limits(limits, folder)
-        results.write(json.dumps({"unlimited": missing}) + "\n")
-        subject = Subject(description, Path(request["directory"]), progress_in(memory))
-        subject.memory.update(request["memory"])
-        on_message(limits.messages, lambda: hash(subject.progress.time.value))
-        for name in request["checks"]:
-            results.write(json.dumps({"begin": name}) + "\n")
-            result = answer(CHECKS[name], subject, request["failed"])
-            if result.fault:
-                request["failed"].append(name)
-            kept = {k: v for k, v in subject.memory.items() if isinstance(v, float | int)}
-            results.write(json.dumps({"result": result.as_dict(), "memory": kept}, default=str) + "\n")
-        results.write(json.dumps({"end": True}) + "\n")
+    def serve(self) -> None:
+        """Answer the mailbox: runs in C, everything else here."""
+        box = self._box
+        while box.library.mailbox_host(box.address, self._parent, self._table, _MOST):
+            self._asked, command, *arguments = box.read_text()
+            self._answer(getattr(self, f"do_{command}"), arguments)
+        os._exit(DIED)
 
+    def _instance(self) -> Component:
+        return self._instances[self._asked]
 
-def answer(check: Check, subject: Subject, faulty: list[str]) -> Result:
-    """The check's result; an FMU that refuses what every FMU must be able to do is at fault.
+    def do_open(self, name: str) -> int:
+        component = open_component(name, self._description, self._request["directory"], isolated=False)
+        number = next(n for n in range(_MOST) if n not in self._instances)
+        self._instances[number] = component
+        functions = (component.set_real, component.get_real, component.do_step)
+        self._table[number] = Served(component.pointer, *(ctypes.cast(f, ctypes.c_void_p).value for f in functions))
+        return number
 
-    Parameters
-    ----------
-    faulty
-        Checks that failed before.
-    """
-    missing = [name for name in check.needs if name in faulty]
-    if missing:
-        return not_applicable(check.name, f"because it failed in {missing[0]!r}, without which this has no meaning")
-    try:
-        return check.run(subject)
-    except ComponentError as error:
-        return failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
-    except CosimError as error:
-        return failed(check.name, "refused call", str(error))
-    except MemoryError:
-        return failed(check.name, "memory limit", "the process has no memory left")
-    except Exception as error:  # a check that fails by itself must not hide the others
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        file = Path(where.filename).name
-        return not_applicable(
-            check.name, f"because the check failed by itself: {error!r} in {file}, line {where.lineno}"
-        )
+    def do_close(self, lost: bool) -> None:
+        component = self._instances.pop(self._asked)
+        self._table[self._asked] = Served()
+        inner = getattr(component, "inner", component)
+        inner._lost = inner._lost or lost  # told here, as it was found out there
+        component.close()
+
+    def do_memory_in_use(self) -> int:
+        gc.collect()
+        return memory_in_use() or 0
 
 
 if __name__ == "__main__":
-    main(json.loads(sys.argv[1]))
+    Host(json.loads(sys.argv[1])).serve()

@@ -19,6 +19,8 @@ REMEDIES = {
     "output flood": "an FMU must log through its logger, and only what matters; ask the author",
     "memory limit": "ask why it needs so much memory, or raise --memory-limit",
     "forbidden file access": "ask why it writes outside of its own folder",
+    "tampering": "do not run this file: its code wrote where an FMU has no business",
+    "no verdict": "report this with the FMU; until the check works nothing is known of what it asks",
     "no instance": "ask the author what the FMU's message means",
     "error in a step": "ask the author what the FMU's message means",
     "refused call": "ask the author why it refuses what it declares to be able to do",

@@ -1,11 +1,7 @@
 """Whether an FMU gives back the memory that it takes."""
 
-import ctypes
-import gc
-import sys
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 
 from orchestrator.vendor.checks.base import Result, check, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import affordable
@@ -19,37 +15,13 @@ _INSTANCE = 120.0
 """Bytes kept by each instance, or each saved state."""
 
 
-_MALLINFO2 = ["arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"]
-
-
 _TOOL = 65536.0
 """What an instance may keep if it runs in a tool, such as an interpreter that remembers every module it ran."""
 
 
-class _MallocInfo(ctypes.Structure):
-    _fields_ = tuple((name, ctypes.c_size_t) for name in _MALLINFO2)
-
-
-def memory_in_use() -> int | None:
-    """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does."""
-    try:
-        info = ctypes.CDLL(None).mallinfo2
-        info.restype = _MallocInfo
-        now = info()
-        # An interpreter keeps small objects in blocks of its own, which malloc does not see.
-        return int(now.uordblks + now.hblkhd) + 32 * sys.getallocatedblocks()
-    except (AttributeError, OSError, TypeError):
-        pass
-    if sys.platform == "linux":
-        import resource  # noqa: PLC0415 - only where it exists
-
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    return None
-
-
 @check("memory", "Does it give back the memory that it takes?")
 def memory(subject: Subject) -> Result:
-    if memory_in_use() is None:
+    if not _in_use(subject):
         return not_applicable("memory", "because this platform does not tell how much memory is in use")
     steps, instance = affordable(subject, 1500), _TOOL if subject.description.needs_tool else _INSTANCE
     texts, figures = [], {}
@@ -68,13 +40,17 @@ def memory(subject: Subject) -> Result:
     return passed("memory", ", ".join(f"{growth:.1f} bytes a {what}" for what, growth in figures.items()), **figures)
 
 
-def _growth(block: Callable[[], None], count: int) -> float:
+def _in_use(subject: Subject) -> int:
+    """Bytes in use in the FMU's process, as it says; 0 where it cannot."""
+    return subject.process().number("memory in use", -1, "memory_in_use")
+
+
+def _growth(subject: Subject, block: Callable[[], None], count: int) -> float:
     """Bytes kept by every repetition: the least growth of the later blocks, so that what fills once does not count."""
     sizes = []
     for _ in range(_BLOCKS):
         block()
-        gc.collect()
-        sizes.append(memory_in_use() or 0)
+        sizes.append(_in_use(subject))
     return max(0.0, min(b - a for a, b in pairwise(sizes[1:])) / count)
 
 
@@ -88,12 +64,9 @@ def _of_steps(subject: Subject, steps: int) -> float | None:
     with subject.running() as running:
 
         def block() -> None:
-            for _ in range(steps):
-                running.feed(stimulus(running.time))
-                running.step(subject.step_size)
-                running.read()
+            running.record(steps, subject.step_size, stimulus)
 
-        return _growth(block, steps)
+        return _growth(subject, block, steps)
 
 
 def _of_instances(subject: Subject, least: float) -> float:
@@ -108,7 +81,7 @@ def _of_so_many(subject: Subject, count: int) -> float:
             with subject.running() as running:
                 running.step(subject.step_size)
 
-    return _growth(block, count)
+    return _growth(subject, block, count)
 
 
 def _of_states(subject: Subject) -> float | None:
@@ -124,4 +97,4 @@ def _of_states(subject: Subject) -> float | None:
                     running.restore(kept)
                     running.time = at
 
-        return _growth(block, 50)
+        return _growth(subject, block, 50)

@@ -1,10 +1,9 @@
 """The FMU under test: instances of it at an operating point, and runs with reproducible inputs."""
 
-import ctypes
 from cmath import rect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -12,10 +11,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.port import START, BoundDescription
+from orchestrator.vendor.process import FmuProcess, HostedComponent
 
 Vector = NDArray[np.float64]
 Stimulus = Callable[[float], Vector]
@@ -39,18 +38,6 @@ class Point:
         return rect(self.v, self.theta)
 
 
-@dataclass
-class Progress:
-    """Where an FMU is, in memory that outlives its process: a crash leaves the time and the call behind."""
-
-    time: Any = field(default_factory=ctypes.c_double)
-    call: Any = field(default_factory=ctypes.c_int64)
-
-
-CALLS = ("fmi2Instantiate", "initialisation", "fmi2DoStep", "fmi2SetReal", "fmi2GetReal", "fmi2GetFMUstate",
-         "fmi2SetFMUstate", "fmi2Reset", "fmi2FreeInstance")  # fmt: skip
-
-
 class Subject:
     """One FMU, opened as often as a check wants.
 
@@ -64,13 +51,18 @@ class Subject:
         Communication step of the tests [s].
     inputs, outputs
         Names of the Real inputs and outputs.
+    process
+        Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
+    doing
+        What is done to it, for the report of a crash.
     memory
         Results that several checks share.
     """
 
-    def __init__(self, description: FmuDescription, directory: Path, progress: Progress | None = None) -> None:
-        self.description, self.directory = description, directory
-        self.progress = progress or Progress()
+    process: Callable[[], FmuProcess]
+
+    def __init__(self, description: FmuDescription, directory: Path) -> None:
+        self.description, self.directory, self.doing = description, directory, ""
         self.memory: dict[str, Any] = {}
         variables = description.variables
         self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
@@ -94,10 +86,16 @@ class Subject:
 
     # -- instances -------------------------------------------------------------------------------
 
-    def open(self, name: str = "fmu") -> Component:
+    def open(self, name: str = "fmu") -> HostedComponent:
         """A new instance, before initialisation."""
-        self.progress.call.value, self.progress.time.value = 0, 0.0
-        return open_component(name, self.description, self.directory, isolated=False)
+        return HostedComponent(name, self.process())
+
+    @contextmanager
+    def while_doing(self, what: str) -> Iterator[None]:
+        """Name what is done to it; the name stays behind where the FMU ends its process."""
+        self.doing = what
+        yield
+        self.doing = ""
 
     def running(
         self, name: str = "fmu", point: Point | None = None, parameters: Mapping[str, float | bool] | None = None
@@ -156,7 +154,7 @@ class Subject:
 class Running:
     """An initialised instance that knows its time."""
 
-    def __init__(self, subject: Subject, component: Component, point: Point | None = None,
+    def __init__(self, subject: Subject, component: HostedComponent, point: Point | None = None,
                  parameters: Mapping[str, float | bool] | None = None) -> None:  # fmt: skip
         self.subject, self.component, self.point = subject, component, point
         self.parameters = dict(parameters or {})
@@ -165,7 +163,6 @@ class Running:
     def begin(self) -> None:
         """Initialise the instance, new or reset."""
         subject, component = self.subject, self.component
-        subject.progress.call.value = 1
         self.time = 0.0
         if subject.starts:
             point = self.point or Point()
@@ -182,42 +179,46 @@ class Running:
 
     def feed(self, deviation: Vector) -> None:
         """Set the inputs to their start values plus a deviation."""
-        self.subject.progress.call.value = 3
         self._in.values[:] = self.rest + deviation
         self._in.write()
 
     def read(self) -> Vector:
-        self.subject.progress.call.value = 4
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:
-        progress = self.subject.progress
-        progress.call.value, progress.time.value = 2, self.time
         self.component.step(self.time, step_size)
         self.time += step_size
 
     def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Vector:
         """Step and read, shape (steps + 1, n); the first row is before the stimulus."""
-        rows = np.empty((steps + 1, len(self._out.names)))
-        rows[0] = self.read()
         begin = self.time
-        for k in range(steps):
-            self.time = begin + k * step_size  # not accumulated, so that equal runs have equal times
-            self.feed(stimulus(self.time))
-            self.step(step_size)
-            rows[k + 1] = self.read()
-        return rows
+        before = self.read()
+        rows = [stimulus(begin + k * step_size) for k in range(steps)]  # not accumulated: equal runs have equal times
+        return np.vstack([before, self.hold(np.array(rows).reshape(steps, len(self.rest)), steps, step_size)])
+
+    def hold(self, deviations: Vector, steps: int, step_size: float) -> Vector:
+        """Step many times at once, shape (steps, n): what was read after each.
+
+        Parameters
+        ----------
+        deviations
+            Of the inputs before the first steps, one row each; after the last row they stay.
+        """
+        begin = self.time
+        if not steps:
+            return np.empty((0, len(self._out.names)))
+        rows = self.rest + deviations if len(self.rest) else np.empty((0, 0))
+        values = self.component.run(self._in, rows, self._out, steps, begin, step_size)
+        self.time = begin + steps * step_size
+        return values
 
     def save(self) -> Any:
-        self.subject.progress.call.value = 5
         return self.component.save_state()
 
     def restore(self, state: Any) -> None:
-        self.subject.progress.call.value = 6
         self.component.restore_state(state)
 
     def reset(self) -> None:
-        self.subject.progress.call.value = 7
         self.component.reset()
         self.begin()
 
@@ -227,7 +228,6 @@ class Running:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.subject.progress.call.value = 8
         self.component.close()
 
 
