@@ -66,11 +66,11 @@ def _not_finite(subject: Subject, values: Vector, time: float) -> Result:
     )
 
 
-def affordable(subject: Subject, steps: int) -> int:
+def affordable(subject: Subject, steps: int, step_size: float | None = None) -> int:
     """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
     fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
     ends = subject.description.stop_time
-    return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / subject.step_size)))
+    return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size))))
 
 
 @check("repeatability", "Does it give the same answer twice?", needs=("independence",))

@@ -49,6 +49,8 @@ class Subject:
         Whether it takes the power flow's start values.
     step_size
         Communication step of the tests [s].
+    step_is_given
+        Whether the file declares it or the user asks for it.
     inputs, outputs
         Names of the Real inputs and outputs.
     process
@@ -61,7 +63,7 @@ class Subject:
 
     process: Callable[[], FmuProcess]
 
-    def __init__(self, description: FmuDescription, directory: Path) -> None:
+    def __init__(self, description: FmuDescription, directory: Path, step_size: float | None = None) -> None:
         self.description, self.directory, self.doing = description, directory, ""
         self.memory: dict[str, Any] = {}
         variables = description.variables
@@ -74,7 +76,8 @@ class Subject:
         bound = description.port.start if isinstance(description, BoundDescription) else dict.fromkeys(START)
         wanted = ("P_0", "Q_0", "v_0", "theta_0")
         self.starts = self.port and all(n in bound and n in variables for n in wanted)
-        self.step_size = self._step_size()
+        self.step_is_given = step_size is not None or description.default_step_size is not None
+        self.step_size = step_size or self._step_size()
 
     def _step_size(self) -> float:
         described = self.description
@@ -144,6 +147,10 @@ class Subject:
     def one_step(self) -> Stimulus:
         """All inputs step at the beginning and stay."""
         return lambda time: self.amplitudes
+
+    def motion(self, step_size: float) -> Stimulus:
+        """All inputs move with every step."""
+        return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Vector:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs)."""

@@ -14,6 +14,9 @@ _LARGE = 0.1
 _CLEARLY = 0.15
 """Part of a difference that a shift may leave, and be its cause."""
 
+_RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
+"""Other communication steps: a times the step where b of them last a steps; none is a multiple of another."""
+
 _DELAYS = 5
 """Communication steps of delay that are looked for."""
 
@@ -227,15 +230,15 @@ def _typical(a: Vector, b: Vector) -> float:
 )
 def internal_step(subject: Subject) -> Result:
     h = subject.memory.get("base step", subject.step_size)
-    rounds = max(2, affordable(subject, 400) // 10)
     evens = subject.memory.get("step sizes")
     if isinstance(evens, str):
         return not_applicable("internal_step", f"because it runs with one communication step only: {evens}")
+    total = max(20, 7 * affordable(subject, 400) // 10)
     try:
-        plain = subject.trajectory(7 * rounds, h, subject.one_step())
+        plain = subject.trajectory(total, h, subject.one_step())
         odd = {
-            f"{share:g}": subject.trajectory(many * rounds, share * h, subject.one_step())[::many]
-            for share, many in ((0.7, 10), (1.4, 5), (1.75, 4))
+            f"{span}/{many}": (subject.trajectory(many * (total // span), span / many * h, subject.one_step()), span, many)
+            for span, many in _RATIOS
         }
     except ComponentError as error:
         return remarked(
@@ -243,8 +246,9 @@ def internal_step(subject: Subject) -> Result:
             f"it refuses communication steps that are no multiple of its own: {error}",
             "couple it with multiples of its own step only",
         )
-    even = plain[::7]
-    worst, share = max((_typical(run[: len(even)], even[: len(run)]), name) for name, run in odd.items())
+    worst, share = max(
+        (_typical(run[::many], plain[::span][: total // span + 1]), name) for name, (run, span, many) in odd.items()
+    )
     one_step = _typical(plain[1:], plain[:-1])
     figures = {"difference": worst, "of_one_step": one_step}
     seen = f"with {share} times the step of {h:g} s the answer differs by {worst:.3g} of the range"

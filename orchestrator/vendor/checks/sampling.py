@@ -1,0 +1,105 @@
+"""How often an FMU's outputs change: whether it takes the steps that it is asked to take."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ComponentError
+from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.vendor.checks.running import affordable
+from orchestrator.vendor.checks.subject import Subject
+
+_FINER = 8
+"""It is also looked at with steps so many times smaller."""
+
+_IDLE = 2.01
+"""Steps from one change to the next above which more than half of all steps do nothing."""
+
+_LENGTHS = (200, 2000, 20000)
+"""Steps of a run; the next longer one where the last one saw too few changes."""
+
+_SINGLE = 400
+"""Steps of a run in which every input is set, and every output read, by itself."""
+
+_CHANGES = 4
+"""Times from change to change that a sample time takes to be seen."""
+
+_MOST_STEPS = 1.05
+"""Mean number of steps from change to change up to which it is every step; it may rest where a number is rounded."""
+
+
+@check("sample_time", "Do its outputs change with every step, or at times of its own?", needs=(*SAME, "reading"))
+def sample_time(subject: Subject) -> Result:
+    """Move all inputs before every step and see in which steps the outputs move."""
+    h = subject.step_size
+    own = _sample_time(subject, h)
+    if own is None:
+        return not_applicable("sample_time", "because its outputs change too seldom to tell")
+    if own <= h * 1.001:
+        try:
+            finer = _sample_time(subject, h / _FINER)
+        except ComponentError:
+            finer = None  # it has steps of its own size only, which is no fault
+        if finer is None or finer <= h / _FINER * 1.001:
+            return passed("sample_time", f"its outputs change with every step of {h:g} s", sample_time=None)
+        said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
+        return passed("sample_time", said, sample_time=finer)
+    idle = f"its outputs change every {_seconds(own)} only: of {own / h:.3g} steps of {_seconds(h)} all but one do nothing"
+    if own > _IDLE * h and subject.step_is_given:
+        return failed("sample_time", "step not honoured", idle, sample_time=own)
+    remedy = f"couple it with steps of {_seconds(own)} or multiples of it; what it answers in between is old"
+    return remarked("sample_time", idle, remedy, sample_time=own)
+
+
+def _sample_time(subject: Subject, step_size: float) -> float | None:
+    """Mean time from one change of the outputs to the next; None where they change too seldom, or by chance."""
+    for length in _LENGTHS:
+        steps = affordable(subject, length, step_size)
+        gaps = [_gap(column) for column in _changes(subject, steps, step_size).T]
+        found = [gap for gap in gaps if gap is not None]
+        if found:
+            return min(found) * step_size
+        if steps < length:
+            break
+    return None
+
+
+def _changes(subject: Subject, steps: int, step_size: float) -> NDArray[np.bool_]:
+    """For each step whether it moved each output, shape (steps, outputs).
+
+    Where an output follows an input at once, that would hide that nothing else moves: there it is read before the step
+    as well, after the inputs were set.
+    """
+    stimulus = subject.motion(step_size)
+    with subject.running() as running:
+        if not any(subject.memory.get("feedthrough", {"": True}).values()):
+            rows = running.record(steps, step_size, stimulus)
+            before, after = rows[:-1], rows[1:]
+        else:
+            pairs = []
+            for k in range(min(steps, _SINGLE)):
+                running.time = k * step_size
+                running.feed(stimulus(running.time))
+                start = running.read()
+                running.step(step_size)
+                pairs.append((start, running.read()))
+            before, after = np.array(pairs).transpose(1, 0, 2)
+    size = np.maximum(np.abs(after).max(axis=0, initial=0.0), 1e-12)
+    return np.abs(after - before) > 1e-13 * size
+
+
+def _gap(changed: NDArray[np.bool_]) -> float | None:
+    """Mean number of steps from change to change, where these are as even as samples are."""
+    gaps = np.diff(np.flatnonzero(changed))
+    if len(gaps) < _CHANGES:
+        return None
+    mean = float(gaps.mean())
+    if gaps.max() - gaps.min() <= 1:
+        return mean if mean > _MOST_STEPS else 1.0
+    return 1.0 if np.median(gaps) == 1 else None  # it rests at times
+
+
+def _seconds(time: float) -> str:
+    unit, size = next((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)) if time >= 0.0999 * s or u == "µs")
+    if unit == "ms" and time < 0.999e-3:
+        unit, size = "µs", 1e-6
+    return f"{time / size:.4g} {unit}"
