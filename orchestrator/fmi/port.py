@@ -88,6 +88,8 @@ class PortMap:
         For each of `START` the variables that take it; none for those that the FMU does not know.
     settings
         Values of the FMU's own parameters and inputs.
+    current_limit
+        Largest current that it gives, as somebody declares it [pu, rating].
     """
 
     rating: float
@@ -97,6 +99,7 @@ class PortMap:
     start: Mapping[str, tuple[StartMap, ...]]
     signals: Mapping[str, SignalMap]
     settings: Mapping[str, float | bool]
+    current_limit: float | None = None
 
     @property
     def omega(self) -> float:

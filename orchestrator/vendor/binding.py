@@ -117,7 +117,9 @@ class _Reader:
             voltage, current = self._voltage(bases), self._current(bases, own_rating)
             start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
             if voltage is not None and current is not None:
-                port = PortMap(bases.rating, bases.frequency, voltage, current, start, signals, settings)
+                port = PortMap(
+                    bases.rating, bases.frequency, voltage, current, start, signals, settings, self._current_limit()
+                )
                 self._check_once(port)
         if self._problems or port is None:
             raise BindingError(self._source, self._problems)
@@ -150,6 +152,15 @@ class _Reader:
             V_n = None if rating.V_n is None else amount(rating.V_n, "kV", "V_n")
             bases = Bases(amount(rating.S_n, "MVA", "S_n"), V_n, amount(rating.f_n, "Hz", "f_n"))
         return bases
+
+    def _current_limit(self) -> float | None:
+        declared = self._table.rating.I_max
+        with self._at("rating"):
+            limit = None if declared is None else to_unit(str(declared).removesuffix("pu").strip(), "1")
+            if limit is not None and not 0 < limit < 100:
+                raise ValueError(f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current")
+            return limit
+        return None
 
     # -- voltage and current ---------------------------------------------------------------------
 

@@ -34,11 +34,12 @@ class FileTable(Table):
 
 
 class RatingTable(Table):
-    """The FMU as delivered: rating, rated line-to-line voltage at its port, rated frequency."""
+    """The FMU as delivered: rating, rated line-to-line voltage at its port, rated frequency, largest current."""
 
     S_n: str | float
     V_n: str | float | None = None
     f_n: str | float = "50 Hz"
+    I_max: str | float | None = None
 
 
 class QuantityTable(Table):

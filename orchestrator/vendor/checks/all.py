@@ -1,15 +1,15 @@
 """All checks in the order in which they run: what others need comes before them."""
 
-from orchestrator.vendor.checks import base, extremes, file, instances, port, resources, running, sampling, state, timing
+from orchestrator.vendor.checks import base, extremes, file, instances, port, resources, ride_through, running, sampling, signs, state, timing
 
-MODULES = (file, running, instances, state, sampling, timing, port, extremes, resources)
+MODULES = (file, running, instances, state, sampling, timing, port, signs, ride_through, extremes, resources)
 """Importing them enters their checks."""
 
 ORDER = (
     "fmi_validity", "units", "declared_starts", "declared_dependencies",
     "runs", "start_values", "call_order", "independence", "repeatability", "reading", "reset", "reinstantiation",
     "state", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
-    "steady_state", "power_balance", "limits", "nan_input", "extreme_inputs", "memory",
+    "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 
 CHECKS = {name: base.CHECKS[name] for name in ORDER}

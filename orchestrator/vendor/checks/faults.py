@@ -47,6 +47,10 @@ REMEDIES = {
     "not a number": "an FMU must return fmi2Error where it has no answer, or limit what it is given",
     "not a number stays": "look for static variables",
     # the port
+    "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for",
+    "unstable": "look for a measurement of the wrong sign, or ask at which network impedance it is stable",
+    "above its current limit": "ask how it limits its current in a dip, or declare the limit that it has",
+    "no current limit": "have its current limited as the converter's is; a machine's binding says I_max",
     "does not start": "it must start from a power flow within its ratings",
     "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
     "wrong sign": "turn 'direction', 'form', 'signs' or 'frame_angle' of the binding, or have the FMU corrected",

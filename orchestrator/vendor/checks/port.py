@@ -1,18 +1,18 @@
 """Whether a converter at its port does what a power flow expects of it."""
 
-from cmath import phase, rect
+from cmath import phase
 from collections.abc import Sequence
-from math import isinf, isnan, pi, sqrt
+from math import isinf, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.port import SYSTEM_BASE_MVA
+from orchestrator.fmi.port import SYSTEM_BASE_MVA, BoundDescription
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.vendor.checks.running import affordable
-from orchestrator.vendor.checks.subject import Point, Running, Subject
+from orchestrator.vendor.checks.subject import Point, Running, Subject, Vector
 
 Complexes = NDArray[np.complex128]
 
@@ -29,7 +29,7 @@ _BALANCE = 0.02
 _DRIFT = 1e-3
 """Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
 
-_WHY = {
+WHY = {
     "no port": "because it has no port: give a binding with --binding (`gfor bind` drafts one)",
     "no start": "because the binding has no start values (P_0, Q_0, v_0, theta_0) to start from a power flow",
 }
@@ -38,6 +38,30 @@ _WHY = {
 def _rating(running: Running) -> float:
     info = running.component.description.variables.get("S_n")
     return SYSTEM_BASE_MVA if info is None else float(info.start or SYSTEM_BASE_MVA)
+
+
+def current_limit(subject: Subject) -> float | None:
+    """The largest current that the binding or the FMU declares [pu, S_n]; None where neither does."""
+    described = subject.description
+    if isinstance(described, BoundDescription):
+        return described.port.current_limit
+    info = described.variables.get("I_max")
+    return float(info.start) if info is not None and info.start and info.unit in ("pu", "p.u.") else None
+
+
+def currents(running: Running, deviation: complex, steps: int) -> Complexes:
+    """Step with the voltage moved by a deviation [pu]; the injected current after each step [pu, S_n]."""
+    names = running.subject.inputs
+    change = np.zeros((1, len(names)))
+    change[0, names.index("v_re")], change[0, names.index("v_im")] = deviation.real, deviation.imag
+    return of_current(running, running.hold(change, steps, running.subject.step_size))
+
+
+def of_current(running: Running, values: Vector) -> Complexes:
+    """The injected current [pu, S_n] in rows of outputs."""
+    names = running.subject.outputs
+    found: Complexes = values[:, names.index("i_re")] + 1j * values[:, names.index("i_im")]
+    return found * SYSTEM_BASE_MVA / _rating(running)
 
 
 def _current(running: Running) -> complex:
@@ -49,20 +73,15 @@ def _current(running: Running) -> complex:
 @check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
 def steady_state(subject: Subject) -> Result:
     if not subject.starts:
-        return not_applicable("steady_state", _WHY["no start" if subject.port else "no port"])
+        return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
     steps, worst = affordable(subject, 5000), 0.0
     refused = []
     for point in POINTS[:3]:
         try:
             with subject.running(point=point) as running:
                 begin = _current(running)
-                running.feed(np.zeros(len(running.rest)))
-                for k in range(steps):
-                    running.time = k * subject.step_size
-                    running.step(subject.step_size)
-                    if k % 50 == 0 or k == steps - 1:
-                        moved = abs(_current(running) - begin)
-                        worst = max(worst, np.inf if isnan(moved) else moved)
+                moved = np.abs(currents(running, 0j, steps) - begin)
+                worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:
@@ -82,7 +101,7 @@ def steady_state(subject: Subject) -> Result:
 def power_balance(subject: Subject) -> Result:
     """Fit x = a·x_0 + b·conj(x_0) + c over several operating points, for powers and for currents."""
     if not subject.starts:
-        return not_applicable("power_balance", _WHY["no start" if subject.port else "no port"])
+        return not_applicable("power_balance", WHY["no start" if subject.port else "no port"])
     best: Result | None = None
     settle = 0 if subject.memory.get("drift", 0.0) <= _DRIFT else affordable(subject, 20000)
     for steps in dict.fromkeys((0, settle)):
@@ -104,9 +123,8 @@ def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex],
     for point in POINTS:
         try:
             with subject.running(point=point) as running:
-                for k in range(steps):
-                    running.time = k * subject.step_size
-                    running.step(subject.step_size)
+                if steps:
+                    currents(running, 0j, steps)
                 power = point.voltage * _current(running).conjugate()
         except ComponentError:
             continue
@@ -188,52 +206,3 @@ def _known(ratio: float) -> str:
 
 def _text(power: complex) -> str:
     return f"{power.real:.4g}{power.imag:+.4g}j"
-
-
-@check("limits", "Does it keep to its limits, and come back from a voltage dip and a phase jump?")
-def limits(subject: Subject) -> Result:
-    if not subject.port:
-        return not_applicable("limits", _WHY["no port"])
-    h, texts = subject.step_size, []
-    figures, bad = {}, False
-    stay = max(20, min(affordable(subject, 4000), round(0.3 / h)))
-    cases = {"dip to 0.2 pu": 0.2, "phase jump of 60°": rect(1, pi / 3), "1.3 pu": 1.3}
-    for name, factor in cases.items():
-        try:
-            with subject.running() as running:
-                normal = Point().voltage
-                begin = _current(running)
-                peak = _hold(running, (factor - 1) * normal, stay, h)
-                _hold(running, 0j, 3 * stay, h)
-                back = abs(_current(running) - begin)
-        except ComponentError as error:
-            texts.append(f"{name}: it ends with an error: {error.log}")
-            continue
-        if not np.isfinite(peak + back):
-            return failed(
-                "limits", "not a number", f"{name}: its current is no number, and fmi2DoStep returned OK", case=name
-            )
-        figures[name] = {"peak": peak, "after": back}
-        texts.append(f"{name}: peak {peak:.3g} pu, {back:.2g} pu away {3 * stay * h:.2g} s later")
-        bad |= peak > 10 or back > 1.0
-    seen = "; ".join(texts)
-    if bad or len(figures) < len(cases):
-        return remarked("limits", seen, "ask how it limits its current and rides through", **figures)
-    return passed("limits", seen, **figures)
-
-
-def _hold(running: Running, deviation: complex, steps: int, step_size: float) -> float:
-    """Step with another voltage; returns the largest current [pu, S_n]."""
-    names = running.subject.inputs
-    change = np.zeros(len(names))
-    change[names.index("v_re")], change[names.index("v_im")] = deviation.real, deviation.imag
-    running.feed(change)
-    begin, peak = running.time, 0.0
-    for k in range(steps):
-        running.time = begin + k * step_size
-        running.step(step_size)
-        size = abs(_current(running))
-        peak = float("nan") if isnan(size) else max(peak, size)
-        if isnan(peak):
-            return peak
-    return peak

@@ -119,6 +119,11 @@ class Subject:
         variables = self.description.variables.values()
         return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
 
+    @property
+    def start_voltage(self) -> complex:
+        """Bus voltage [pu] at which it starts."""
+        return Point().voltage
+
     def start_inputs(self, point: Point | None) -> Vector:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
         voltage = (point or Point()).voltage
