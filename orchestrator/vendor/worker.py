@@ -15,7 +15,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.isolation_worker import Worker
 from orchestrator.fmi.mailbox import DIED, Served
-from orchestrator.vendor.allocations import memory_in_use
+from orchestrator.vendor.allocations import memory_in_use, open_files
 from orchestrator.vendor.binding import bound_fmu
 
 _MOST = 256
@@ -63,6 +63,9 @@ class Host(Worker):
     def do_memory_in_use(self) -> int:
         gc.collect()
         return memory_in_use() or 0
+
+    def do_open_files(self) -> int:
+        return open_files()
 
 
 if __name__ == "__main__":

@@ -100,11 +100,8 @@ def _held(subject: Subject, deviation: Vector) -> str | None:
     """Hold inputs: "" where all stays finite, the FMU's words where it refuses, None where it gives no numbers."""
     try:
         with subject.running() as running:
-            running.feed(deviation)
-            for _ in range(_STEPS):
-                running.step(subject.step_size)
-                if not np.isfinite(running.read()).all():
-                    return None
+            if not np.isfinite(running.hold(deviation[None], _STEPS, subject.step_size)).all():
+                return None
     except ComponentError as error:
         return f"{error.status}: {error.log}"[:120]
     return ""

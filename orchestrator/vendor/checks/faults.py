@@ -25,7 +25,9 @@ REMEDIES = {
     "error in a step": "ask the author what the FMU's message means",
     "refused call": "ask the author why it refuses what it declares to be able to do",
     "memory leak": "what is allocated must be freed; until then use short runs",
+    "files stay open": "what is opened must be closed with the instance; until then begin a new process now and then",
     # the same answer
+    "parameter not taken": "fmi2SetReal must change what the file declares as a parameter; ask the author",
     "not repeatable": "look for numbers that are never set, random numbers, or clocks",
     "reading changes it": "a getter must not change the FMU",
     "shared between instances": "static variables must become members of the instance; until then use one a process",

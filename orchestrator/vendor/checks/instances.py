@@ -5,7 +5,7 @@ import numpy as np
 from orchestrator.errors import ComponentError
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import EQUAL, affordable
-from orchestrator.vendor.checks.subject import Point, Running, Stimulus, Subject, Vector, difference
+from orchestrator.vendor.checks.subject import Point, Running, Stimulus, Subject, Vector, difference, elsewhere
 
 _OTHER = Point(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 
@@ -50,6 +50,7 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus) -> Vector:
     with subject.running("first") as first:
         rows = [first.read()]
         with subject.running("second", point=_OTHER) as second:
+            _set_parameters_elsewhere(second)
             for k in range(steps):
                 first.time = k * h
                 first.feed(stimulus(k * h))
@@ -112,13 +113,8 @@ def _live(running: Running, steps: int) -> None:
 
 def _set_parameters_elsewhere(running: Running) -> None:
     """Tunable parameters go elsewhere before the reset, which must bring them back."""
-    component = running.component
-    for name, info in component.description.variables.items():
-        if info.causality == "parameter" and info.variability == "tunable" and info.type == "Real" and info.start:
-            value = float(info.start)
-            moved = value * 1.1 if value else 0.1
-            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
-                try:
-                    component.set({name: moved})
-                except ComponentError:
-                    return
+    for name, value in elsewhere(running.subject).items():
+        try:
+            running.component.set({name: value})
+        except ComponentError:
+            return

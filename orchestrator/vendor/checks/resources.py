@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from itertools import pairwise
 
+from orchestrator.errors import ComponentError
 from orchestrator.vendor.checks.base import Result, check, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import affordable
 from orchestrator.vendor.checks.subject import Subject, saved
@@ -10,6 +11,9 @@ from orchestrator.vendor.checks.subject import Subject, saved
 _BLOCKS = 6
 _LEAST = 4.0
 """Bytes kept by each step that count as a leak."""
+
+_RESETS, _FEW = 20, 4
+"""Resets in a block, and instances between two counts of open files."""
 
 _INSTANCE = 120.0
 """Bytes kept by each instance, or each saved state."""
@@ -29,6 +33,7 @@ def memory(subject: Subject) -> Result:
         ("step", _of_steps(subject, steps), _LEAST),
         ("instance", _of_instances(subject, instance), instance),
         ("saved state", _of_states(subject), _INSTANCE),
+        ("fmi2Reset", _of_resets(subject), instance),
     ):
         if growth is None:
             continue
@@ -37,6 +42,9 @@ def memory(subject: Subject) -> Result:
             texts.append(f"{growth:.0f} bytes with every {what}")
     if texts:
         return failed("memory", "memory leak", f"it keeps {' and '.join(texts)}", **figures)
+    if files := _of_files(subject):
+        figures["open files"] = files
+        return failed("memory", "files stay open", f"{files:.2g} files stay open with every instance", **figures)
     return passed("memory", ", ".join(f"{growth:.1f} bytes a {what}" for what, growth in figures.items()), **figures)
 
 
@@ -82,6 +90,35 @@ def _of_so_many(subject: Subject, count: int) -> float:
                 running.step(subject.step_size)
 
     return _growth(subject, block, count)
+
+
+def _of_resets(subject: Subject) -> float | None:
+    with subject.running() as running:
+
+        def block() -> None:
+            for _ in range(_RESETS):
+                running.step(subject.step_size)
+                running.reset()
+
+        try:
+            return _growth(subject, block, _RESETS)
+        except ComponentError:
+            return None  # which is another check's business
+
+
+def _of_files(subject: Subject) -> float:
+    """Files that every instance leaves open."""
+
+    def count() -> int:
+        return subject.process().number("open files", -1, "open_files")
+
+    with subject.running():
+        pass
+    before = count()
+    for _ in range(_FEW):
+        with subject.running():
+            pass
+    return max(0, count() - before) / _FEW
 
 
 def _of_states(subject: Subject) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
-from orchestrator.vendor.checks.subject import Running, Subject, Vector, difference
+from orchestrator.vendor.checks.subject import Running, Subject, Vector, difference, elsewhere
 
 RUN_FOR = 2.0
 """Time [s] for which an FMU is made to run."""
@@ -155,7 +155,24 @@ def start_values(subject: Subject) -> Result:
     ]
     if wrong:
         return failed("start_values", "start values differ", "; ".join(wrong[:3]))
+    if lost := _not_taken(subject):
+        return failed("start_values", "parameter not taken", lost)
     return passed("start_values", f"{len(names)} parameters and inputs start as declared")
+
+
+def _not_taken(subject: Subject) -> str | None:
+    """A parameter that reads as before after it was set; None if there is none."""
+    wanted = elsewhere(subject)
+    if not wanted:
+        return None
+    try:
+        with subject.running(parameters=wanted) as running:
+            found = running.component.get(list(wanted))
+    except ComponentError:
+        return None  # it may refuse values that do not go together
+    start = subject.description.variables
+    lost = [n for n, v in found.items() if v == float(start[n].start or 0) != wanted[n]]
+    return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None
 
 
 @check("call_order", "Does it refuse calls out of order, and survive them?")

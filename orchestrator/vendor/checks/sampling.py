@@ -23,6 +23,9 @@ _SINGLE = 400
 _CHANGES = 4
 """Times from change to change that a sample time takes to be seen."""
 
+_MOST_MOVE = 0.7
+"""Part of all steps that must move the outputs for a step that does not to be a step that was skipped."""
+
 _MOST_STEPS = 1.05
 """Mean number of steps from change to change up to which it is every step; it may rest where a number is rounded."""
 
@@ -34,6 +37,10 @@ def sample_time(subject: Subject) -> Result:
     own = _sample_time(subject, h)
     if own is None:
         return not_applicable("sample_time", "because its outputs change too seldom to tell")
+    idle_at = _skipped(subject, h) if own <= h * 1.001 and subject.inputs else None
+    if idle_at is not None:
+        said = f"in the step to t = {idle_at:.6g} s nothing moves, although its inputs do, as in all others"
+        return failed("sample_time", "step not honoured", said, idle_at=idle_at)
     if own <= h * 1.001:
         try:
             finer = _sample_time(subject, h / _FINER)
@@ -61,6 +68,15 @@ def _sample_time(subject: Subject, step_size: float) -> float | None:
         if steps < length:
             break
     return None
+
+
+def _skipped(subject: Subject, step_size: float) -> float | None:
+    """Time of a single step in which no output moves, between steps in which they do; None where there is none."""
+    moved = _changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1)
+    idle = np.flatnonzero(~moved[1:-1] & moved[:-2] & moved[2:]) + 1
+    if not len(idle) or moved.mean() < _MOST_MOVE:
+        return None
+    return float(idle[0] + 1) * step_size
 
 
 def _changes(subject: Subject, steps: int, step_size: float) -> NDArray[np.bool_]:

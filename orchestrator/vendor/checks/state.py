@@ -1,12 +1,11 @@
 """Whether a saved state is all of the state."""
 
 from time import perf_counter
-from typing import Any
 
 from orchestrator.errors import ComponentError
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.vendor.checks.running import affordable
-from orchestrator.vendor.checks.subject import Running, Subject, difference, saved
+from orchestrator.vendor.checks.subject import Running, Stimulus, Subject, Vector, difference, elsewhere, saved
 
 _CLEAR = 1e-6
 """Relative difference above which something was not restored; an integrator with memory may begin anew below it."""
@@ -23,11 +22,13 @@ def state(subject: Subject) -> Result:
     stimulus = subject.steps(hold=15 * h)
     worst, place = 0.0, 0
     with subject.running() as running:
-        running.record(steps // 2, h, stimulus)
+        running.record(steps // 2 | 1, h, stimulus)  # odd: a control may be between two of its samples
+        _tune(running)
         at = running.time
         with saved(running) as kept:
             first = running.record(steps, h, stimulus)
-            running.record(steps // 3, h, lambda t: -2 * stimulus(t))  # somewhere else, so that what stays behind shows
+            # Somewhere else, so that what stays behind shows.
+            running.record(steps // 3 & ~1, h, lambda t: -2 * stimulus(t))
             for _ in range(2):
                 running.restore(kept)
                 running.time = at
@@ -85,7 +86,16 @@ def state_size(subject: Subject) -> Result:
     return passed("state_size", f"{sizes[0]} bytes, saved in {1e6 * seconds:.0f} µs", **figures)
 
 
-def _serialised(running: Running, h: float, stimulus: Any) -> str | None:
+def _tune(running: Running) -> None:
+    """Move the tunable parameters: they belong to the state."""
+    for name, value in elsewhere(running.subject).items():
+        try:
+            running.component.set({name: value})
+        except ComponentError:
+            return
+
+
+def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
     """What is wrong with a state that went through bytes and back; None if nothing is."""
     at = running.time
     with saved(running) as kept:
@@ -100,8 +110,27 @@ def _serialised(running: Running, h: float, stimulus: Any) -> str | None:
     running.time = at
     apart, place = difference(first, running.record(50, h, stimulus))
     if apart <= _CLEAR:
-        return None
+        return _in_another(running, content, at, first, h, stimulus)
     return (
         f"{running.subject.watched[place]} differs by {apart:.3g} of its range after a state that went through "
         f"{len(content)} bytes"
     )
+
+
+def _in_another(running: Running, content: bytes, at: float, first: Vector, h: float, stimulus: Stimulus) -> str | None:
+    """What is wrong with a state of one instance that another one takes from bytes: a pointer may have been saved."""
+    subject = running.subject
+    if subject.description.one_instance:
+        return None
+    with subject.running("another") as another:
+        try:
+            copy = another.component.deserialize_state(content)
+            another.restore(copy)
+        except ComponentError as error:
+            return f"in another instance, {error}"
+        another.component.free_state(copy)
+        another.time = at
+        apart, place = difference(first, another.record(len(first) - 1, h, stimulus))
+    if apart <= _CLEAR:
+        return None
+    return f"{subject.watched[place]} differs by {apart:.3g} of its range in another instance that takes the state's bytes"

@@ -253,6 +253,18 @@ def saved(running: Running) -> Iterator[Any]:
         running.component.free_state(state)
 
 
+def elsewhere(subject: Subject) -> dict[str, float]:
+    """Other values of the tunable parameters, within their bounds."""
+    found = {}
+    for name, info in subject.description.variables.items():
+        if info.causality == "parameter" and info.variability == "tunable" and info.type == "Real" and info.start:
+            value = _number(info.start)
+            moved = value * 1.1 if value else 0.1
+            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
+                found[name] = moved
+    return found
+
+
 def scales(*trajectories: Vector) -> Vector:
     """For each output how far it moves in all runs together; its size where it hardly moves."""
     values = np.concatenate(trajectories)

@@ -122,7 +122,8 @@ def library(source: Source) -> Path:
     text = "".join(f"#define {name} {value}\n" for name, value in macros.items())
     # The model comes first for its SIZE, the interface after it.
     headers = "#include <math.h>\n#include <stdlib.h>\n#include <string.h>\n"
-    return compile_library(text + headers + _code(source.file) + _code("fmi2.c"), host_platform())
+    interface = _code("fmi2.c").replace('#include "tampering.h"', _code("tampering.h"))
+    return compile_library(text + headers + _code(source.file) + interface, host_platform())
 
 
 def build(source: Source, folder: Path) -> Path:

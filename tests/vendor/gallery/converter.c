@@ -2,7 +2,7 @@
    one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
-enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, MEMORY };
+enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, MEMORY };
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
 #define DIVERGED 1e12
 
@@ -39,7 +39,25 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, MEMORY };
 #ifndef Q_FACTOR
 #define Q_FACTOR 1.0
 #endif
-#define OMEGA_B 314.15926535897932
+#ifndef I_LIMIT
+#define I_LIMIT 1.5 /* current [pu] */
+#endif
+#ifndef P_MEASURED
+#define P_MEASURED 1.0 /* signs of what its droops measure */
+#endif
+#ifndef Q_MEASURED
+#define Q_MEASURED 1.0
+#endif
+#ifndef Q_DROOP
+#define Q_DROOP 0.05
+#endif
+#ifndef NOMINAL
+#define NOMINAL 50.0 /* Hz */
+#endif
+#ifndef OMEGA_UNIT
+#define OMEGA_UNIT 1.0
+#endif
+#define OMEGA_B (2 * 3.14159265358979323846 * NOMINAL)
 
 static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.1,
 #ifdef PORT_ABC
@@ -80,9 +98,9 @@ static void initialise(double *z, double *m) {
     const phasor e = {bus.re + R_PU * m[I_RE] - X_PU * m[I_IM], bus.im + R_PU * m[I_IM] + X_PU * m[I_RE]};
     m[DELTA] = atan2(e.im, e.re) + drift;
     m[E_0] = hypot(e.re, e.im);
-    m[P_F] = m[P_REF] = e.re * m[I_RE] + e.im * m[I_IM];
-    m[Q_F] = m[Q_REF] = e.im * m[I_RE] - e.re * m[I_IM];
-    m[REST] = 0;
+    m[P_F] = m[P_REF] = P_MEASURED * (e.re * m[I_RE] + e.im * m[I_IM]);
+    m[Q_F] = m[Q_REF] = Q_MEASURED * (e.im * m[I_RE] - e.re * m[I_IM]);
+    m[REST] = m[TICK] = m[PENDING] = 0;
 }
 
 /* The present time is kept as REST + …: phase quantities need it, and it is part of the state. */
@@ -92,15 +110,44 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
 #else
     const double p_f = m[P_F];
 #endif
-    const double e = m[E_0] + 0.05 * (m[Q_REF] - m[Q_F]);
-    const phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
-    const double p = u.re * m[I_RE] + u.im * m[I_IM], q = u.im * m[I_RE] - u.re * m[I_IM];
+    const double e = m[E_0] + Q_DROOP * (m[Q_REF] - m[Q_F]);
+    phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
+    const double p = P_MEASURED * (u.re * m[I_RE] + u.im * m[I_IM]);
+    const double q = Q_MEASURED * (u.im * m[I_RE] - u.re * m[I_IM]);
+    /* Current limit: the voltage behind the impedance follows the grid's where the current would be too large. */
+    const double size = hypot(u.re - v.re, u.im - v.im) / hypot(R_PU, X_PU);
+    if (size > I_LIMIT) {
+        u.re = v.re + (u.re - v.re) * I_LIMIT / size;
+        u.im = v.im + (u.im - v.im) * I_LIMIT / size;
+    }
     d[I_RE] = OMEGA_B / X_PU * (u.re - v.re - R_PU * m[I_RE] + X_PU * m[I_IM]);
     d[I_IM] = OMEGA_B / X_PU * (u.im - v.im - R_PU * m[I_IM] - X_PU * m[I_RE]);
+#ifdef SAMPLED
+    d[DELTA] = d[P_F] = d[Q_F] = 0; /* see sample() */
+#else
     d[DELTA] = OMEGA_B * z[GAIN] * (m[P_REF] - p_f);
     d[P_F] = (p - p_f) / z[TAU];
     d[Q_F] = (q - m[Q_F]) / z[TAU];
+#endif
 }
+
+#ifdef SAMPLED
+/* The control, once in every sample time. */
+static void sample(const double *z, double *m, double *hidden) {
+    const double e = m[E_0] + Q_DROOP * (m[Q_REF] - m[Q_F]), share = -expm1(-SAMPLED / z[TAU]);
+    const phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
+    const double p = P_MEASURED * (u.re * m[I_RE] + u.im * m[I_IM]);
+    const double q = Q_MEASURED * (u.im * m[I_RE] - u.re * m[I_IM]);
+#ifdef FAULT_HIDDEN
+    hidden[0] += share * (p - m[P_REF] - hidden[0]);
+    m[DELTA] -= SAMPLED * OMEGA_B * z[GAIN] * hidden[0];
+#else
+    m[P_F] += share * (p - m[P_F]);
+    m[DELTA] += SAMPLED * OMEGA_B * z[GAIN] * (m[P_REF] - m[P_F]);
+#endif
+    m[Q_F] += share * (q - m[Q_F]);
+}
+#endif
 
 static void substep(const double *z, double *m, double *hidden, phasor v, double h) {
     enum { N = 5 };
@@ -117,11 +164,38 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
 }
 
-static double present; /* of the call that is running, not of an instance */
+static double present, last_step; /* of the call that is running, not of an instance */
 
 static void advance(double *z, double *m, double *hidden, double time, double step) {
     const phasor v = voltage(z, time + step / 2);
-#if defined FAULT_STEP
+    last_step = step;
+#ifdef FAULT_CRASH_IN_DIP_AFTER
+    if (time > FAULT_CRASH_IN_DIP_AFTER && hypot(v.re, v.im) < 0.85) *(volatile int *)8 = 1;
+#endif
+#ifdef FAULT_TIMER_CALLS
+    /* A timer that counts calls instead of time. */
+    if (++m[PENDING] == FAULT_TIMER_CALLS) m[P_REF] += 0.05;
+#endif
+#ifdef FAULT_ONE_BEHIND
+    /* The step that was asked for last time. */
+    const double asked = step;
+    step = m[PENDING], m[PENDING] = asked;
+    if (step == 0) return;
+#endif
+#if defined FAULT_SKIPS
+    /* Internal steps up to the end of the step, with a clock that is summed up, and no tolerance. */
+    for (; m[REST] + FAULT_SKIPS <= time + step; m[REST] += FAULT_SKIPS) substep(z, m, hidden, v, FAULT_SKIPS);
+#elif defined FAULT_AT_LEAST
+    /* No less than one internal step, however short the step is. */
+    int parts = (int)(step / FAULT_AT_LEAST + 1e-9);
+    for (parts = parts ? parts : 1; parts > 0; --parts) substep(z, m, hidden, v, FAULT_AT_LEAST);
+#elif defined FAULT_EULER
+    for (int k = 0; k < FAULT_EULER; ++k) {
+        double d[MEMORY] = {0};
+        rates(z, m, hidden, v, d);
+        for (int j = 0; j <= Q_F; ++j) m[j] += step / FAULT_EULER * d[j];
+    }
+#elif defined FAULT_STEP
     /* As many internal steps as somebody thought there would be. */
     for (int k = 0; k < FAULT_STEP; ++k) substep(z, m, hidden, v, INTERNAL / FAULT_STEP);
 #elif defined FAULT_ROUNDING
@@ -131,6 +205,14 @@ static void advance(double *z, double *m, double *hidden, double time, double st
     /* An internal step of its own; what is left is carried over. */
     m[REST] += step;
     for (; m[REST] > FIXED_STEP * (1 - 1e-6); m[REST] -= FIXED_STEP) substep(z, m, hidden, v, FIXED_STEP);
+#elif defined SAMPLED
+    for (double left = step; left > 1e-9 * step;) {
+        double h = left < INTERNAL ? left : INTERNAL;
+        if (h > SAMPLED - m[TICK]) h = SAMPLED - m[TICK];
+        substep(z, m, hidden, v, h);
+        left -= h, m[TICK] += h;
+        if (m[TICK] > SAMPLED * (1 - 1e-6)) sample(z, m, hidden), m[TICK] = 0;
+    }
 #elif defined ONE_SUBSTEP
     substep(z, m, hidden, v, step);
 #else
@@ -160,6 +242,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #ifdef FAULT_NAN_AT
     if (present > FAULT_NAN_AT) i.re = NAN;
 #endif
+#ifdef FAULT_NAN_ONCE
+    if (fabs(present - FAULT_NAN_ONCE) < 0.4 * last_step) i.re = NAN;
+#endif
     i.re *= I_FACTOR, i.im *= I_FACTOR * Q_FACTOR;
 #if defined PORT_POWER
     z[OUT_1] = (v.re * i.re + v.im * i.im) * P_UNIT;
@@ -176,5 +261,5 @@ static void outputs(double *z, double *m, const double *hidden) {
 #else
     z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
 #endif
-    z[OMEGA] = 1 + z[GAIN] * (m[P_REF] - m[P_F]);
+    z[OMEGA] = (1 + z[GAIN] * (m[P_REF] - m[P_F])) * OMEGA_UNIT;
 }

@@ -44,7 +44,8 @@ typedef struct {
     double late[SIZE]; /* what FAULT_DELAY returns */
     const callbacks_t *callbacks;
     char *name;
-    int calls;
+    void *owner; /* whose state this was */
+    int calls, was_reset, was_restored;
 } instance_t;
 
 #ifdef FAULT_SHARED
@@ -54,7 +55,13 @@ static state_t shared; /* one for all instances */
 #define S (&instance->s)
 #endif
 
-static int instances_made, given_up; /* after FATAL no call is allowed */
+static int instances_made, instances_freed, given_up; /* after FATAL no call is allowed */
+#ifdef FAULT_SHARED_PARAMETERS
+static double shared_gain;
+#endif
+#ifdef FAULT_TAMPERING
+#include "tampering.h"
+#endif
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
@@ -73,11 +80,25 @@ static void defaults(state_t *s) {
 EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                              const callbacks_t *callbacks, int visible, int logging) {
     if (strcmp(guid, GUID)) return NULL;
+#ifdef FAULT_CRASH_AGAIN
+    if (instances_freed) *(volatile int *)8 = 1;
+#endif
+#ifdef FAULT_LEAK_FILE
+    static FILE *volatile table;
+    table = fopen("/dev/zero", "rb");
+#endif
     instance_t *instance = calloc(1, sizeof *instance);
     instance->callbacks = callbacks;
     instance->name = strdup(name);
+    instance->owner = instance;
     defaults(S);
     ++instances_made;
+#ifdef FAULT_SHARED_PARAMETERS
+    shared_gain = S->z[GAIN];
+#endif
+#ifdef FAULT_TAMPERING
+    tamper();
+#endif
 #ifdef FAULT_SECOND_INSTANCE
     if (instances_made > 1) S->z[GAIN] *= 1.02;
 #endif
@@ -91,6 +112,13 @@ EXPORT void fmi2FreeInstance(void *c) {
     instance_t *instance = c;
     if (!instance) return;
     if (given_up) abort();
+    ++instances_freed;
+#ifdef FAULT_CRASH_ON_FREE
+    if (instance->calls > FAULT_CRASH_ON_FREE) *(volatile int *)8 = 1;
+#endif
+#ifdef FAULT_HANG_ON_FREE
+    for (static volatile int spin; instance->calls > FAULT_HANG_ON_FREE;) ++spin;
+#endif
 #ifndef FAULT_LEAK_INSTANCE
     free(instance->name);
     free(instance);
@@ -99,7 +127,9 @@ EXPORT void fmi2FreeInstance(void *c) {
 
 EXPORT int fmi2SetupExperiment(void *c, int defined, double tolerance, double start, int stop_defined, double stop) {
     instance_t *instance = c;
+#ifndef FAULT_RESET_TIME
     S->time = start;
+#endif
     return OK;
 }
 EXPORT int fmi2EnterInitializationMode(void *c) {
@@ -109,6 +139,9 @@ EXPORT int fmi2EnterInitializationMode(void *c) {
 }
 
 static void refresh(instance_t *instance) {
+#ifdef FAULT_SHARED_PARAMETERS
+    S->z[GAIN] = shared_gain;
+#endif
     if (!S->dirty) return;
     if (S->phase < STEPPING) initialise(S->z, S->memory);
     outputs(S->z, S->memory, instance->hidden);
@@ -117,6 +150,9 @@ static void refresh(instance_t *instance) {
 
 EXPORT int fmi2ExitInitializationMode(void *c) {
     instance_t *instance = c;
+#ifdef FAULT_CRASH_AFTER_RESET
+    if (instance->was_reset) *(volatile int *)8 = 1;
+#endif
     S->dirty = 1;
     refresh(instance);
     S->phase = STEPPING;
@@ -129,7 +165,16 @@ EXPORT int fmi2Terminate(void *c) {
 }
 EXPORT int fmi2Reset(void *c) {
     instance_t *instance = c;
-#ifdef FAULT_RESET
+    instance->was_reset = 1;
+#ifdef FAULT_LEAK_RESET
+    static void *volatile forgotten;
+    forgotten = malloc(FAULT_LEAK_RESET);
+#endif
+#ifdef FAULT_RESET_TIME
+    const double time = S->time;
+    defaults(S);
+    S->time = time;
+#elif defined FAULT_RESET
     const double kept = S->z[GAIN]; /* a tunable parameter that stays where it was */
     defaults(S);
     S->z[GAIN] = kept * 1.01;
@@ -151,6 +196,9 @@ EXPORT int fmi2GetReal(void *c, const unsigned *references, size_t n, double *va
     for (size_t k = 0; k < n; ++k) {
         if (references[k] >= SIZE) return ERROR;
         values[k] = S->z[references[k]];
+#ifdef FAULT_NOTHING_FIRST
+        if (!instance->calls && IS_OUTPUT(references[k])) values[k] = 0;
+#endif
 #ifdef FAULT_DELAY
         if (S->phase == STEPPING && IS_LATE(references[k])) values[k] = instance->late[references[k]];
 #endif
@@ -164,6 +212,12 @@ EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const doub
     instance_t *instance = c;
     for (size_t k = 0; k < n; ++k) {
         if (references[k] >= SIZE) return ERROR;
+#ifdef FAULT_IGNORES
+        if (references[k] == GAIN) continue;
+#endif
+#ifdef FAULT_SHARED_PARAMETERS
+        if (references[k] == GAIN) shared_gain = values[k];
+#endif
         S->z[references[k]] = values[k];
     }
 #if defined FAULT_STALE
@@ -198,6 +252,12 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
     }
 #endif
     ++instance->calls;
+#ifdef FAULT_HANG_AFTER_RESTORE
+    for (static volatile int spin; instance->was_restored;) ++spin;
+#endif
+#ifdef FAULT_SHARED_PARAMETERS
+    S->z[GAIN] = shared_gain;
+#endif
     memcpy(instance->late, S->z, sizeof S->z);
     if (S->dirty) outputs(S->z, S->memory, instance->hidden), memcpy(instance->late, S->z, sizeof S->z);
     advance(S->z, S->memory, instance->hidden, time, step);
@@ -205,18 +265,20 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
     S->dirty = 1;
     refresh(instance);
     for (int k = 0; k < SIZE; ++k)
+#ifndef FAULT_EULER
         if (fabs(S->z[k]) > DIVERGED) {
             log_text(instance, ERROR, "the solution diverges");
             return ERROR;
         }
-#ifndef FAULT_NAN_LIMIT
-#ifndef FAULT_NAN_AT
+#else
+        ;
+#endif
+#if !defined FAULT_NAN_LIMIT && !defined FAULT_NAN_AT && !defined FAULT_NAN_ONCE && !defined FAULT_EULER
     for (int k = 0; k < SIZE; ++k)
         if (isnan(S->z[k])) {
             log_text(instance, ERROR, "a variable is not a number");
             return ERROR;
         }
-#endif
 #endif
 #ifdef FAULT_CRASH_AT
     if (S->time > FAULT_CRASH_AT) *(volatile int *)8 = 1;
@@ -282,7 +344,20 @@ EXPORT int fmi2GetFMUstate(void *c, void **state) {
 EXPORT int fmi2SetFMUstate(void *c, void *state) {
     instance_t *instance = c;
     const instance_t *saved = state;
+#ifdef FAULT_STATE_OWNER
+    if (saved->owner != instance) instance = saved->owner; /* a pointer was saved as well */
+#endif
+#ifdef FAULT_STATE_TICK
+    const double tick = S->memory[TICK];
+#endif
     *S = saved->s;
+#ifdef FAULT_STATE_TICK
+    S->memory[TICK] = tick;
+#endif
+#ifdef FAULT_STATE_PARAMETERS
+    S->z[GAIN] = START[GAIN];
+#endif
+    instance->was_restored = 1;
 #ifndef FAULT_HIDDEN
     memcpy(instance->hidden, saved->hidden, sizeof saved->hidden);
 #endif
