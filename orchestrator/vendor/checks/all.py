@@ -1,6 +1,19 @@
 """All checks in the order in which they run: what others need comes before them."""
 
-from orchestrator.vendor.checks import base, extremes, file, instances, port, resources, ride_through, running, sampling, signs, state, timing
+from orchestrator.vendor.checks import (
+    base,
+    extremes,
+    file,
+    instances,
+    port,
+    resources,
+    ride_through,
+    running,
+    sampling,
+    signs,
+    state,
+    timing,
+)
 
 MODULES = (file, running, instances, state, sampling, timing, port, signs, ride_through, extremes, resources)
 """Importing them enters their checks."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from orchestrator.errors import ComponentError
 from orchestrator.vendor.checks.base import Result, check, failed, not_applicable, passed, remarked
-from orchestrator.vendor.checks.port import WHY, currents, current_limit
-from orchestrator.vendor.checks.subject import Running, Subject
+from orchestrator.vendor.checks.port import WHY, current_limit, currents
+from orchestrator.vendor.checks.subject import Subject
 
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 """When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
@@ -139,7 +139,13 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
         f"rating over the last cycle in {worst.event}, peak {highest.peak:.3g} pu in {highest.event}"
     )
     seen += f"; {left_out} more were left out for time" if left_out else ""
-    figures = {"peak": highest.peak, "mean": worst.mean, "declared": declared, "tried": len(answers), "left_out": left_out}
+    figures = {
+        "peak": highest.peak,
+        "mean": worst.mean,
+        "declared": declared,
+        "tried": len(answers),
+        "left_out": left_out,
+    }
     if declared is not None and worst.mean > 1.05 * declared:
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
     if declared is None and worst.mean > NO_LIMIT:

@@ -50,7 +50,9 @@ def sample_time(subject: Subject) -> Result:
             return passed("sample_time", f"its outputs change with every step of {h:g} s", sample_time=None)
         said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
         return passed("sample_time", said, sample_time=finer)
-    idle = f"its outputs change every {_seconds(own)} only: of {own / h:.3g} steps of {_seconds(h)} all but one do nothing"
+    idle = (
+        f"its outputs change every {_seconds(own)} only: of {own / h:.3g} steps of {_seconds(h)} all but one do nothing"
+    )
     if own > _IDLE * h and subject.step_is_given:
         return failed("sample_time", "step not honoured", idle, sample_time=own)
     remedy = f"couple it with steps of {_seconds(own)} or multiples of it; what it answers in between is old"

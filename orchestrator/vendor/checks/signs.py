@@ -1,23 +1,17 @@
 """Whether a converter answers changes of voltage and frequency with the signs that it should, and rests at its frequency."""
 
-from dataclasses import dataclass
-from math import log, pi
+from collections.abc import Callable
+from math import pi
 
 import numpy as np
 
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.vendor.checks.droop import FREQUENCY, POINT, POINTS, SETTLED, VOLTAGE, Answer, droop
 from orchestrator.vendor.checks.port import WHY, Complexes, of_current
 from orchestrator.vendor.checks.running import affordable
 from orchestrator.vendor.checks.subject import Point, Subject, Vector
-
-_POINT = Point(1.0, 0.0, 0.7, 0.1)
-"""With much active power, so that Q follows P at constant voltage and the internal voltage shows in Q."""
-
-_VOLTAGE = 0.02
-_FREQUENCY = 0.001
-"""Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
 
 _LASTS = 3.0
 """Time [s] in which an answer settles."""
@@ -25,6 +19,9 @@ _LASTS = 3.0
 _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
 frequency have no mean over it."""
+
+_MORE = 0.97
+"""Reactive power in the end, in parts of that in the first cycle, from which it is looked closer; a droop leaves less."""
 
 _SOME = 1e-3
 """Change of power [pu, S_n] that is an answer."""
@@ -44,10 +41,14 @@ def rated_frequency(subject: Subject) -> Result:
     """An FMU for 60 Hz that is bound as one of 50 Hz has omega = 1.2."""
     info = subject.description.variables.get("omega")
     if not subject.port or info is None or info.causality != "output" or info.unit not in _PLAIN:
-        return not_applicable("rated_frequency", "because it has no output 'omega' in pu (a binding's [signals] may name one)")
+        return not_applicable(
+            "rated_frequency", "because it has no output 'omega' in pu (a binding's [signals] may name one)"
+        )
     steps = affordable(subject, 2000)
     with subject.running() as running:
-        omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[:, subject.outputs.index("omega")]
+        omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[
+            :, subject.outputs.index("omega")
+        ]
     rest, f_n = float(np.median(omega[-max(1, steps // 10) :])), _rated(subject)
     seen = f"omega is {rest:.6g} at rest, in a network of its rated frequency"
     if abs(rest - 1) > 0.02:
@@ -63,46 +64,25 @@ def _rated(subject: Subject) -> float:
     return described.port.f_n if isinstance(described, BoundDescription) else 50.0
 
 
-@dataclass(frozen=True)
-class _Answer:
-    """Half the difference of what a change up and the same one down bring [pu, S_n], early and settled.
-
-    Attributes
-    ----------
-    i
-        Current, in the frame of the voltage.
-    moving
-        How much P and Q still move in the end.
-    far
-        How far they go away at most.
-    """
-
-    early_i: complex
-    i: complex
-    early_power: complex
-    power: complex
-    moving: float
-    far: float
-
-
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
 def signs(subject: Subject) -> Result:
     if not subject.port:
         return not_applicable("signs", WHY["no port"])
-    steps = affordable(subject, round(_LASTS / subject.step_size))
+    fit = 1.0 / subject.memory.get("seconds_per_step", 1e-6)
+    steps = int(min(_LASTS / subject.step_size, fit))
     if steps * subject.step_size < 0.5:
-        return not_applicable("signs", f"because {steps} steps of {subject.step_size:g} s show too little of its answer")
+        return not_applicable(
+            "signs", f"because {steps} steps of {subject.step_size:g} s show too little of its answer"
+        )
     try:
-        voltage = _answer(subject, steps, lambda sign, time: np.full(len(time), 1 - sign * _VOLTAGE, complex))
-        omega = 2 * pi * _rated(subject) * _FREQUENCY
-        frequency = _answer(subject, steps, lambda sign, time: np.exp(-1j * sign * omega * time))
+        voltage, frequency = _answers(subject, steps, POINT)
     except ComponentError as error:
         return remarked("signs", f"small changes of voltage or frequency end with an error: {error}", "ask why")
     figures = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
     }  # fmt: skip
-    wrong = _wrong(voltage, frequency)
+    wrong = _wrong(voltage, frequency) or _wrong_droop(subject, steps, voltage, frequency)
     said = f"{_said(voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
@@ -115,17 +95,26 @@ def signs(subject: Subject) -> Result:
     return passed("signs", said, **figures)
 
 
-def _answer(subject: Subject, steps: int, factor: object) -> _Answer:
+def _answers(subject: Subject, steps: int, point: Point) -> tuple[Answer, Answer]:
+    """To lower voltage, and to lower frequency."""
+    omega = 2 * pi * _rated(subject) * FREQUENCY
+    return (
+        _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * VOLTAGE, complex)),
+        _answer(subject, steps, point, lambda sign, time: np.exp(-1j * sign * omega * time)),
+    )
+
+
+def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float, Vector], Complexes]) -> Answer:
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
     time = np.arange(steps) * h
     found, far = [], 0.0
     names = subject.inputs
     for sign in (1.0, -1.0):
-        with subject.running(point=_POINT if subject.starts else None) as running:
+        with subject.running(point=point if subject.starts else None) as running:
             rest = complex(*(running.rest[names.index(n)] for n in ("v_re", "v_im")))
             begin = of_current(running, running.read()[None])[0]
-            turned = factor(sign, time)  # type: ignore[operator]
+            turned = factor(sign, time)
             rows = np.zeros((steps, len(names)))
             for name, part in (("v_re", np.real), ("v_im", np.imag)):
                 rows[:, names.index(name)] = part(rest * (turned - 1))
@@ -138,7 +127,7 @@ def _answer(subject: Subject, steps: int, factor: object) -> _Answer:
     early, late, later = (slice(round(a / h), max(round(a / h) + 1, round(b / h))) for a, b in _windows(steps * h))
     i, s = ([part[window].mean() for window in (early, late, later)] for part in half)
     moving = max(abs(s[2].real - s[1].real), abs(s[2].imag - s[1].imag))
-    return _Answer(complex(i[0]), complex(i[2]), complex(s[0]), complex(s[2]), float(moving), far)
+    return Answer(complex(i[2]), complex(s[0]), complex(s[2]), float(moving), far)
 
 
 def _windows(end: float) -> tuple[tuple[float, float], ...]:
@@ -146,14 +135,11 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
     return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 
-def _wrong(voltage: _Answer, frequency: _Answer) -> tuple[str, str] | None:
+def _wrong(voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
     """Name of a fault, and what shows it."""
-    droop = _reversed_droop(voltage, frequency)
-    if droop:
-        return "wrong sign", droop
     steady = [a.moving < max(_SOME, _SETTLED * abs(a.power)) for a in (voltage, frequency)]
     # Constant current or impedance takes so much with the voltage, and is no answer.
-    least = 3 * _VOLTAGE * abs(_POINT.Q) + _SOME
+    least = 3 * VOLTAGE * abs(POINT.Q) + _SOME
     if steady[0] and voltage.power.imag < -least:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
     if steady[1] and frequency.power.real < -_SOME:
@@ -163,48 +149,30 @@ def _wrong(voltage: _Answer, frequency: _Answer) -> tuple[str, str] | None:
     return None
 
 
-def _reversed_droop(voltage: _Answer, frequency: _Answer) -> str | None:
-    """Whether the internal voltage rises with the reactive power that it gives, by whatever Q is brought about.
-
-    The impedance behind which it acts shows in the first cycle after a step of the voltage. Behind it the voltage E is
-    found from what is settled; dE against dQ is the droop, once where the voltage was changed and once where the
-    frequency was. A controller of the terminal voltage raises E in the first case only, a machine by far more in
-    the first than in the second; reversed droop does the same in both.
-    """
-    if abs(voltage.early_i) < _VOLTAGE / 2 or min(abs(voltage.power.imag), abs(frequency.power.imag)) < _SOME:
+def _wrong_droop(subject: Subject, steps: int, voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
+    """Look closer where lower voltage brings more reactive power in the end than in the first cycle."""
+    if not subject.starts or voltage.power.imag < _MORE * voltage.early_power.imag or not voltage.early_power.imag > 0:
         return None
-    z = _VOLTAGE / voltage.early_i
-    i_0 = complex(_POINT.P, -_POINT.Q)
-    if z.imag < 0.05 or z.real < -0.5 * z.imag:
-        return None  # not a source behind an impedance
-    e_0 = 1 + z * i_0
-    slopes = []
-    for answer, v in ((voltage, -_VOLTAGE), (frequency, 0.0)):
-        if answer.moving > _SETTLED * abs(answer.power.imag) + _SOME / 10:
-            return None
-        e = abs(1 + v + z * (i_0 + answer.i)) - abs(e_0)
-        slopes.append(e / answer.power.imag)
-    first, second = slopes
-    if min(first, second) < _LEAST * abs(z):
+    if max(voltage.moving, frequency.moving) > SETTLED:
+        steps *= 3
+    found = [] if max(voltage.moving, frequency.moving) > SETTLED else [(POINT, voltage, frequency)]
+    for point in (POINT, *POINTS)[len(found) :]:
+        try:
+            found.append((point, *_answers(subject, steps, point)))
+        except ComponentError:
+            continue  # it may not be able to work there
+    slope = droop(found) if found else None
+    if slope is None or slope > 0:
         return None
-    gains = [1 / max(1e-3, 1 - slope / abs(z)) for slope in slopes]
-    if abs(log(gains[0] / gains[1])) > _ALIKE:
-        return None
-    return f"its internal voltage rises with its reactive power, by {100 * first:.2g} and {100 * second:.2g} % a pu, and should fall"
+    says = f"the voltage behind its impedance rises by {-100 * slope:.2g} % for every pu of reactive power, and should fall"
+    return "wrong sign", f"{says}: look for the sign of Q in its droop"
 
 
-_LEAST = 0.06
-"""Rise of the internal voltage with Q, in parts of the impedance, that is no error of the estimate."""
-
-_ALIKE = 0.3
-"""Logarithm of the ratio of both gains up to which one law makes both."""
-
-
-def _said(voltage: _Answer, frequency: _Answer) -> str:
+def _said(voltage: Answer, frequency: Answer) -> str:
     q, p = voltage.power.imag, frequency.power.real
-    first = f"{100 * _VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
-    second = f"{100 * _FREQUENCY:g} % less frequency {p:+.3g} pu of active power"
-    if abs(q) < 3 * _VOLTAGE * abs(_POINT.Q) + _SOME:
+    first = f"{100 * VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
+    second = f"{100 * FREQUENCY:g} % less frequency {p:+.3g} pu of active power"
+    if abs(q) < 3 * VOLTAGE * abs(POINT.Q) + _SOME:
         first += " (it does not support the voltage)"
     if abs(p) < _SOME:
         second += " (it does not support the frequency)"

@@ -133,4 +133,6 @@ def _in_another(running: Running, content: bytes, at: float, first: Vector, h: f
         apart, place = difference(first, another.record(len(first) - 1, h, stimulus))
     if apart <= _CLEAR:
         return None
-    return f"{subject.watched[place]} differs by {apart:.3g} of its range in another instance that takes the state's bytes"
+    return (
+        f"{subject.watched[place]} differs by {apart:.3g} of its range in another instance that takes the state's bytes"
+    )

@@ -237,7 +237,11 @@ def internal_step(subject: Subject) -> Result:
     try:
         plain = subject.trajectory(total, h, subject.one_step())
         odd = {
-            f"{span}/{many}": (subject.trajectory(many * (total // span), span / many * h, subject.one_step()), span, many)
+            f"{span}/{many}": (
+                subject.trajectory(many * (total // span), span / many * h, subject.one_step()),
+                span,
+                many,
+            )
             for span, many in _RATIOS
         }
     except ComponentError as error:

@@ -2,7 +2,7 @@
 
 import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -18,6 +18,7 @@ BASE_UNITS = {
     "1": {},
     "rad": {"rad": "1"},
     "s": {"s": "1"},
+    "Hz": {"s": "-1"},
     "kV": {"kg": "1", "m": "2", "s": "-3", "A": "-1", "factor": "1000"},
     "V": {"kg": "1", "m": "2", "s": "-3", "A": "-1"},
     "kA": {"A": "1", "factor": "1000"},
@@ -41,7 +42,13 @@ class Variable:
 
 @dataclass(frozen=True)
 class Source:
-    """What an FMU is made from: a C file, macros, variables, and what its description says."""
+    """What an FMU is made from: a C file, macros, variables, and what its description says.
+
+    Attributes
+    ----------
+    change
+        What is done to its description in the end.
+    """
 
     name: str
     file: str
@@ -50,6 +57,7 @@ class Source:
     step_size: str | None = "1e-4"
     stop_time: str = "1"
     state: bool = True
+    change: Callable[[bytes], bytes] | None = None
     units: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -131,7 +139,8 @@ def build(source: Source, folder: Path) -> Path:
     path = folder / f"{source.name}.fmu"
     binary = f"binaries/{fmpy.platform}/{source.name}{ENDINGS[host_platform()]}"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("modelDescription.xml", description(source))
+        text = description(source)
+        archive.writestr("modelDescription.xml", source.change(text) if source.change else text)
         archive.write(library(source), binary)
         for name, content in source.files.items():
             archive.writestr(name, content)

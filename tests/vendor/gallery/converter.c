@@ -166,6 +166,21 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 
 static double present, last_step; /* of the call that is running, not of an instance */
 
+/* An internal step; a sampled control has its samples in it, at times of its own. */
+static void internal_step(const double *z, double *m, double *hidden, phasor v, double step) {
+#ifdef SAMPLED
+    for (double left = step; left > 1e-9 * step;) {
+        double h = left < INTERNAL ? left : INTERNAL;
+        if (h > SAMPLED - m[TICK]) h = SAMPLED - m[TICK];
+        substep(z, m, hidden, v, h);
+        left -= h, m[TICK] += h;
+        if (m[TICK] > SAMPLED * (1 - 1e-6)) sample(z, m, hidden), m[TICK] = 0;
+    }
+#else
+    substep(z, m, hidden, v, step);
+#endif
+}
+
 static void advance(double *z, double *m, double *hidden, double time, double step) {
     const phasor v = voltage(z, time + step / 2);
     last_step = step;
@@ -184,11 +199,11 @@ static void advance(double *z, double *m, double *hidden, double time, double st
 #endif
 #if defined FAULT_SKIPS
     /* Internal steps up to the end of the step, with a clock that is summed up, and no tolerance. */
-    for (; m[REST] + FAULT_SKIPS <= time + step; m[REST] += FAULT_SKIPS) substep(z, m, hidden, v, FAULT_SKIPS);
+    for (; m[REST] + FAULT_SKIPS <= time + step; m[REST] += FAULT_SKIPS) internal_step(z, m, hidden, v, FAULT_SKIPS);
 #elif defined FAULT_AT_LEAST
     /* No less than one internal step, however short the step is. */
     int parts = (int)(step / FAULT_AT_LEAST + 1e-9);
-    for (parts = parts ? parts : 1; parts > 0; --parts) substep(z, m, hidden, v, FAULT_AT_LEAST);
+    for (parts = parts ? parts : 1; parts > 0; --parts) internal_step(z, m, hidden, v, FAULT_AT_LEAST);
 #elif defined FAULT_EULER
     for (int k = 0; k < FAULT_EULER; ++k) {
         double d[MEMORY] = {0};
@@ -197,27 +212,19 @@ static void advance(double *z, double *m, double *hidden, double time, double st
     }
 #elif defined FAULT_STEP
     /* As many internal steps as somebody thought there would be. */
-    for (int k = 0; k < FAULT_STEP; ++k) substep(z, m, hidden, v, INTERNAL / FAULT_STEP);
+    for (int k = 0; k < FAULT_STEP; ++k) internal_step(z, m, hidden, v, INTERNAL / FAULT_STEP);
 #elif defined FAULT_ROUNDING
     /* What is left of the communication step is lost. */
-    for (int k = (int)(step / FAULT_ROUNDING + 1e-9); k > 0; --k) substep(z, m, hidden, v, FAULT_ROUNDING);
+    for (int k = (int)(step / FAULT_ROUNDING + 1e-9); k > 0; --k) internal_step(z, m, hidden, v, FAULT_ROUNDING);
 #elif defined FIXED_STEP
     /* An internal step of its own; what is left is carried over. */
     m[REST] += step;
-    for (; m[REST] > FIXED_STEP * (1 - 1e-6); m[REST] -= FIXED_STEP) substep(z, m, hidden, v, FIXED_STEP);
-#elif defined SAMPLED
-    for (double left = step; left > 1e-9 * step;) {
-        double h = left < INTERNAL ? left : INTERNAL;
-        if (h > SAMPLED - m[TICK]) h = SAMPLED - m[TICK];
-        substep(z, m, hidden, v, h);
-        left -= h, m[TICK] += h;
-        if (m[TICK] > SAMPLED * (1 - 1e-6)) sample(z, m, hidden), m[TICK] = 0;
-    }
+    for (; m[REST] > FIXED_STEP * (1 - 1e-6); m[REST] -= FIXED_STEP) internal_step(z, m, hidden, v, FIXED_STEP);
 #elif defined ONE_SUBSTEP
-    substep(z, m, hidden, v, step);
+    internal_step(z, m, hidden, v, step);
 #else
     const int parts = (int)ceil(step / INTERNAL - 1e-9);
-    for (int k = 0; k < parts; ++k) substep(z, m, hidden, v, step / parts);
+    for (int k = 0; k < parts; ++k) internal_step(z, m, hidden, v, step / parts);
 #endif
 #ifdef FAULT_RANDOM
     m[P_F] += FAULT_RANDOM * ((double)rand() / RAND_MAX - 0.5);

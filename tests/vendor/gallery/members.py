@@ -1,5 +1,6 @@
 """The members of the gallery: good FMUs of several kinds, and faulty ones, each with the name of its fault."""
 
+import re
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -25,11 +26,17 @@ class Member:
         Its name, as `gfor check` gives it; empty for a good one.
     binding
         Text of its binding; None for an FMU that has none.
+    thread
+        Where somebody reported that fault of an exporter, as ``owner/repository#number``.
+    only
+        Checks to ask; all of them where empty.
     """
 
     source: Source
     fault: str = ""
     binding: str | None = None
+    thread: str = ""
+    only: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -37,8 +44,9 @@ class Member:
 
 
 def converter(
-    name, form="rectangular", *, units=None, depends=(), state=True, step_size="1e-4", stop_time="1", **defines
-):
+    name, form="rectangular", *, units=None, depends=(), state=True, step_size="1e-4", stop_time="1",
+    omega=("omega", "pu"), **defines,
+):  # fmt: skip
     """The converter of converter.c; ``units`` are those of voltage, current, power."""
     macro, inputs, outputs = FORMS[form]
     v_unit, i_unit, p_unit = units or ("pu", "pu", "pu")
@@ -60,7 +68,7 @@ def converter(
     else:
         i_units = [i_unit, "rad" if angle else i_unit, i_unit]
     variables += [Variable(n, 10 + k, "output", None, i_units[k], depends=depends) for k, n in enumerate(outputs)]
-    variables += [Variable("omega", 13, "output", None, "pu")]
+    variables += [Variable(omega[0], 13, "output", None, omega[1])]
     return Source(name, "converter.c", {macro: 1, **defines}, tuple(variables), step_size, stop_time, state)
 
 
@@ -112,10 +120,39 @@ def _si(form):
     return value, current
 
 
+COMPARING = ("runs", "independence", "repeatability", "reading", "feedthrough")
+"""What must be known before two runs are compared."""
+
+
+def carriers(name, fault="", *, only=(), thread="", rating=1500, **options):
+    """The converter on the three kinds of carrier: continuous, control sampled every 200 µs, black box in SI units."""
+    signal = ""
+    if "omega" in options:
+        signal = f'[signals.omega]\nvariable = "{options["omega"][0]}"\nunit = "{options["omega"][1]}"'
+    plain = (
+        binding("rectangular", rating=rating, current='base = "100 MVA"', start=f"{START}\n{signal}")
+        if signal
+        else None
+    )
+    value, current = _si("qd")
+    start = START.replace('variable = "v_0"', 'variable = "v_0"\nvalue = "phase peak"')
+    box = binding("qd", rating=rating, voltage=value, current=current, start=f"{start}\n{signal}")
+    si = {"units": ("kV", "kA", "MW"), "state": False, **V_PEAK}
+    asked = tuple(dict.fromkeys((*COMPARING, *only))) if only else ()
+    return [
+        Member(converter(name, **options), fault, plain, thread, asked),
+        Member(converter(f"{name}_sampled", SAMPLED="2e-4", **options), fault, plain, thread, asked),
+        Member(converter(f"{name}_black_box", "qd", **{**si, **options}), fault, box, thread, asked),
+    ]
+
+
 def good():
     """FMUs with nothing wrong."""
     members = [
-        Member(converter("converter")),
+        *carriers("converter"),
+        *carriers("converter_in_hz", omega=("f_meas", "Hz"), OMEGA_UNIT=50.0, only=("rated_frequency", "signs")),
+        *carriers("converter_stiff", X_PU=0.12, R_PU=0.01, only=("steady_state", "power_balance", "signs", "limits")),
+        *carriers("converter_no_droop_of_q", Q_DROOP=0.0, only=("steady_state", "power_balance", "signs", "limits")),
         Member(converter("converter_other_numbers", RATING=40.0, DROOP=0.01, X_PU=0.4, R_PU=0.02)),
         Member(converter("converter_without_state", state=False)),
         Member(converter("converter_internal_step", FIXED_STEP="2.5e-5")),
@@ -216,6 +253,103 @@ def faulty():
         wrong("order_of_calls", "crash", FAULT_NO_ORDER=1),
         *_wrong_units(),
         *_invalid(),
+        *missed(),
+        *reported(),
+        *tampering(),
+    ]
+
+
+def missed():
+    """What once passed every check, on each carrier."""
+    signs = ("steady_state", "power_balance", "signs")
+    return [
+        *carriers("q_measured", "wrong sign", only=signs, Q_MEASURED=-1.0),
+        *carriers("q_measured_stiff", "wrong sign", only=signs, Q_MEASURED=-1.0, X_PU=0.15, Q_DROOP=0.03),
+        *carriers("p_measured", "unstable", only=signs, P_MEASURED=-1.0),
+        *carriers("nan_once", "not a number", only=("runs",), FAULT_NAN_ONCE=5.0, stop_time="10"),
+        *carriers("crash_in_dip", "crash", only=("limits",), FAULT_CRASH_IN_DIP_AFTER=2.0),
+        *carriers("held", "step not honoured", only=("sample_time",), FIXED_STEP="1e-3"),
+        *carriers("sixty_hertz", "wrong rated frequency", only=("rated_frequency",), NOMINAL=60.0, OMEGA_UNIT=60.0,
+                  omega=("f_meas", "Hz")),
+        *carriers("no_limit", "no current limit", only=("limits",), I_LIMIT=1e9),
+    ]  # fmt: skip
+
+
+def reported():
+    """Faults of exporters that somebody reported in public."""
+    state, reset = ("state", "state_size"), ("reset", "reinstantiation")
+
+    def one(name, fault, thread, /, **options):
+        return carriers(name, fault, thread=thread, **options)
+
+    def with_state(name, fault, thread, /, **options):
+        return one(name, fault, thread, **options)[:2]  # a black box has none
+
+    return [
+        *one("one_behind", "delayed output", "CATIA-Systems/FMIKit-Simulink#200", only=("delay",), FAULT_ONE_BEHIND=1),
+        *one("skips_a_step", "step not honoured", "CATIA-Systems/FMIKit-Simulink#133", only=("sample_time",),
+             FAULT_SKIPS="1e-4")[::2],
+        *one("so_many_steps", "step-dependent answer", "CATIA-Systems/FMIKit-Simulink#68",
+             only=("delay", "step_invariance"), FAULT_STEP=2),
+        *one("at_least_its_step", "step-dependent answer", "hyumo/qFMU#23", only=("delay", "step_invariance"),
+             FAULT_AT_LEAST="1e-3")[::2],
+        *one("timer_of_calls", "step-dependent answer", "lbl-srg/modelica-buildings#3412",
+             only=("delay", "step_invariance"), FAULT_TIMER_CALLS=60),
+        *one("euler", "not a number", "CogniPilot/rumoca#347", only=("runs",), FAULT_EULER=10, step_size="4e-2",
+             stop_time="20")[::2],
+        *one("nan_with_ok", "not a number", "CATIA-Systems/FMPy#278", only=("runs",), FAULT_NAN_AT=18.0, stop_time="20"),
+        *one("nothing_first", "no steady state", "CATIA-Systems/FMPy#440", only=("steady_state",),
+             FAULT_NOTHING_FIRST=1),
+        *one("ignores_parameters", "parameter not taken", "CATIA-Systems/FMPy#163", only=("start_values",),
+             FAULT_IGNORES=1),
+        *one("shared_parameters", "shared between instances", "CATIA-Systems/FMIKit-Simulink#326",
+             only=("independence",), FAULT_SHARED_PARAMETERS=1),
+        *one("crash_again", "crash", "NTNU-IHB/PythonFMU#213", only=("call_order", "independence"), FAULT_CRASH_AGAIN=1),
+        *one("crash_after_reset", "crash", "OpenModelica/OpenModelica#6703", only=reset, FAULT_CRASH_AFTER_RESET=1),
+        *one("crash_on_free", "crash", "OpenModelica/OpenModelica#16321", only=("runs",), FAULT_CRASH_ON_FREE=100),
+        *one("hang_on_free", "hang", "OpenModelica/OMSimulator#1391", only=("runs",), FAULT_HANG_ON_FREE=100)[:1],
+        *one("reset_time", "reset fails", "modelica/Reference-FMUs#204", only=reset, FAULT_RESET_TIME=1, STRICT_TIME=1),
+        *one("reset_of_parameters", "reset leaves something", "CATIA-Systems/FMIKit-Simulink#412", only=reset,
+             FAULT_RESET=1),
+        *with_state("hang_after_restore", "hang", "OpenModelica/OpenModelica#12260", only=("state",),
+                    FAULT_HANG_AFTER_RESTORE=1)[:1],
+        *with_state("state_of_parameters", "hidden state", "OpenModelica/OpenModelica#15216", only=("state",),
+                    FAULT_STATE_PARAMETERS=1),
+        *with_state("state_of_tick", "hidden state", "modelica/Reference-FMUs#652", only=("state",),
+                    FAULT_STATE_TICK=1)[1:],
+        *with_state("state_of_owner", "serialised state", "CATIA-Systems/FMPy#811", only=state, FAULT_STATE_OWNER=1),
+        *one("leaking_resets", "memory leak", "OpenModelica/OpenModelica#7444", only=("memory",), FAULT_LEAK_RESET=500),
+        *one("leaking_files", "files stay open", "CATIA-Systems/FMPy#110", only=("memory",), FAULT_LEAK_FILE=1),
+        *_described(),
+    ]  # fmt: skip
+
+
+def _described():
+    """Faults of model descriptions."""
+
+    def without_units(text):
+        return re.sub(rb"<UnitDefinitions>.*</UnitDefinitions>", b"", text, flags=re.DOTALL)
+
+    def kinds(text):
+        return text.replace(b'dependencies="8 9"', b'dependencies="8 9" dependenciesKind="constant"')
+
+    file = ("fmi_validity", "units")
+    plain, fed = (
+        converter("no_unit_definitions"),
+        converter("kinds_of_dependencies", SHUNT=0.05, depends=("v_re", "v_im")),
+    )
+    return [
+        Member(replace(plain, change=without_units), "invalid FMI", None, "OpenModelica/OpenModelica#5845", file),
+        Member(replace(fed, change=kinds), "invalid FMI", None, "modelica/Reference-FMUs#675", file),
+    ]
+
+
+def tampering():
+    """FMUs that write results of their own; the first one is faulty besides."""
+    return [
+        *carriers("forged_results", "not a number", FAULT_TAMPERING=0, FAULT_NAN_AT=0.0),
+        Member(converter("forged_everywhere", FAULT_TAMPERING=1), "exit"),
+        Member(converter("forged_in_binary", FAULT_TAMPERING=255), "exit"),
     ]
 
 
