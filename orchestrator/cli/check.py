@@ -7,9 +7,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.cases.use import use_in_case
 from orchestrator.cli.arguments import positive
+from orchestrator.errors import InputError
 from orchestrator.fmi.limits import Limits
 from orchestrator.vendor.checks.base import Verdict
+from orchestrator.vendor.checks.subject import Use
 from orchestrator.vendor.junit import write_junit
 from orchestrator.vendor.runner import Report, check_fmu
 
@@ -20,6 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor check``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
     parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what its variables mean (`gfor bind`)")
+    parser.add_argument("--step", type=positive, metavar="H", help="communication step of use [s]")
+    parser.add_argument("--case", metavar="CASE", help="with a case's step, operating point, values and binding")
+    parser.add_argument("--component", metavar="NAME", help="which of the case's components it is")
     parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
@@ -32,7 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Check, print, and write what is asked for; 1 if a check failed."""
     limits = Limits(seconds=options.time_limit, memory=int(options.memory_limit * 1024**2))
-    report = check_fmu(options.file, options.binding, limits, tuple(options.only))
+    use, binding = Use(options.step), options.binding
+    if options.case:
+        use, of_case = use_in_case(options.case, options.component, options.file, options.step)
+        binding = binding or of_case
+    elif options.component:
+        raise InputError("--component names a component of a case; give --case as well")
+    report = check_fmu(options.file, binding, limits, tuple(options.only), use=use)
     if options.junit:
         write_junit(report, options.junit)
     if options.json:

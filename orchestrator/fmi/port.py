@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from math import pi
-from typing import Self
+from typing import Any, Self
 
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 
@@ -100,6 +100,23 @@ class PortMap:
     signals: Mapping[str, SignalMap]
     settings: Mapping[str, float | bool]
     current_limit: float | None = None
+
+    @classmethod
+    def of_dict(cls, values: Mapping[str, Any]) -> Self:
+        """From what `dataclasses.asdict` made of one, perhaps through JSON."""
+
+        def phasor(part: Mapping[str, Any]) -> PhasorMap:
+            return PhasorMap(**{**part, "form": Form(part["form"]), "variables": tuple(part["variables"])})
+
+        return cls(
+            **{
+                **values,
+                "voltage": phasor(values["voltage"]),
+                "current": phasor(values["current"]),
+                "start": {n: tuple(StartMap(**m) for m in maps) for n, maps in values["start"].items()},
+                "signals": {n: SignalMap(**m) for n, m in values["signals"].items()},
+            }
+        )
 
     @property
     def omega(self) -> float:

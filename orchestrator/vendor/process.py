@@ -29,6 +29,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
 from orchestrator.fmi.messages import FLOODED, texts
+from orchestrator.fmi.port import BoundDescription
 
 Vector = NDArray[np.float64]
 
@@ -58,8 +59,8 @@ class FmuProcess:
 
     Parameters
     ----------
-    description, binding, directory
-        The FMU, the file that binds it, and where its archive is extracted.
+    description, directory
+        The FMU, bound or not, and where its archive is extracted.
     limits
         What it may take.
 
@@ -71,7 +72,7 @@ class FmuProcess:
         What could not be limited, in words.
     """
 
-    def __init__(self, description: FmuDescription, binding: Path | None, directory: Path, limits: Limits) -> None:
+    def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
         self.description, self.limits = description, limits
         self.deadline = inf
         self.time = 0.0
@@ -84,15 +85,16 @@ class FmuProcess:
             self.box = Mailbox(self._folder / "mailbox", create=True)
             self._into, self._out = (self.box.array(which, np.uint32, MOST) for which in (0, 1))
             self._room = self.box.array(2, np.float64, ROOM)
-            self._start(binding, directory)
+            self._start(directory)
         except BaseException:
             self.close()
             raise
 
-    def _start(self, binding: Path | None, directory: Path) -> None:
+    def _start(self, directory: Path) -> None:
+        described = self.description
         request = {
             "fmu": str(self.description.path.resolve()),
-            "binding": None if binding is None else str(binding.resolve()),
+            "port": asdict(described.port) if isinstance(described, BoundDescription) else None,
             "directory": str(directory),
             "folder": str(self._folder),
             "limits": asdict(self.limits),
@@ -294,7 +296,8 @@ class HostedComponent(Component):
         self._open = False
         self.pointer = self.number = process.number("fmi2Instantiate", -1, "open", name)
         self._open = True
-        self.set_real, self.get_real, self.do_step = self._set_real, self._get_real, self._do_step
+        functions: Any = (self._set_real, self._get_real, self._do_step)
+        self.set_real, self.get_real, self.do_step = functions
 
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._process.box.read_log(), least)
@@ -387,7 +390,8 @@ _EMPTY = np.empty((0, 0))
 def _at(address: int, count: int) -> NDArray[np.uint32]:
     if not count:
         return _NONE
-    return np.frombuffer((c_uint * count).from_address(address), np.uint32)
+    numbers: Any = (c_uint * count).from_address(address)
+    return np.frombuffer(numbers, np.uint32)
 
 
 def _references(batch: RealBatch) -> NDArray[np.uint32]:

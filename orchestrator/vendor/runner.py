@@ -21,7 +21,7 @@ from orchestrator.vendor.binding import bind, read_table
 from orchestrator.vendor.checks.all import CHECKS
 from orchestrator.vendor.checks.base import Check, Result, Verdict, failed, not_applicable, passed
 from orchestrator.vendor.checks.running import RUN_FOR
-from orchestrator.vendor.checks.subject import Subject
+from orchestrator.vendor.checks.subject import Subject, Use
 from orchestrator.vendor.process import FmuProcess, ProcessEndedError
 
 _PATIENCE = 10
@@ -85,6 +85,7 @@ def check_fmu(
     limits: Limits | None = None,
     only: tuple[str, ...] = (),
     run_for: float = RUN_FOR,
+    use: Use | None = None,
 ) -> Report:
     """Run the acceptance tests.
 
@@ -94,6 +95,8 @@ def check_fmu(
         Wall-clock time for which it is made to run [s].
     only
         Names of checks; all of them where empty.
+    use
+        Step, operating point and values with which it is used; what the file declares where None.
 
     Raises
     ------
@@ -119,10 +122,9 @@ def check_fmu(
         report.results.append(passed("archive", "unpacked within limits, and read"))
         bound = None if binding is None else _bound(report, native, binding)
         compile_adapters(bound or native)  # here, where nobody waits for the FMU
-        checked = binding if bound else None
-        subject = Subject(bound or native, directory)
+        subject = Subject(bound or native, directory, use)
         subject.memory["run_for"] = run_for
-        runner = _Runner(report, subject, checked, limits or Limits())
+        runner = _Runner(report, subject, limits or Limits())
         try:
             runner.run(list(only or CHECKS))
         finally:
@@ -147,8 +149,8 @@ def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescri
 class _Runner:
     """Asks every question, in this process, of an FMU that is in another."""
 
-    def __init__(self, report: Report, subject: Subject, binding: Path | None, limits: Limits) -> None:
-        self._report, self._subject, self._binding, self._limits = report, subject, binding, limits
+    def __init__(self, report: Report, subject: Subject, limits: Limits) -> None:
+        self._report, self._subject, self._limits = report, subject, limits
         self._process: FmuProcess | None = None
         self._deadline = 0.0
         subject.process = self.process
@@ -158,7 +160,7 @@ class _Runner:
         if self._process is None or not self._process.alive:
             self.close()
             subject = self._subject
-            self._process = FmuProcess(subject.description, self._binding, subject.directory, self._limits)
+            self._process = FmuProcess(subject.description, subject.directory, self._limits)
             self._report.unlimited = self._process.unlimited
         self._process.deadline = self._deadline
         return self._process

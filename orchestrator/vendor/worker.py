@@ -1,4 +1,4 @@
-"""The process in which a foreign FMU is checked: it has instances of it and does what it is asked; started by `process`.
+"""The process in which a foreign FMU is checked: it does what it is asked; started by `process`.
 
 No check runs here and no verdict is made here: code of the FMU can change whatever is in its process.
 """
@@ -15,8 +15,8 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.isolation_worker import Worker
 from orchestrator.fmi.mailbox import DIED, Served
+from orchestrator.fmi.port import BoundDescription, PortMap
 from orchestrator.vendor.allocations import memory_in_use, open_files
-from orchestrator.vendor.binding import bound_fmu
 
 _MOST = 256
 """Instances at the same time."""
@@ -32,7 +32,8 @@ class Host(Worker):
         self._asked = 0
 
     def _described(self) -> FmuDescription:
-        return bound_fmu(self._request["fmu"], self._request["binding"])
+        native, port = super()._described(), self._request["port"]
+        return native if port is None else BoundDescription.of(native, PortMap.of_dict(port))
 
     def serve(self) -> None:
         """Answer the mailbox: runs in C, everything else here."""

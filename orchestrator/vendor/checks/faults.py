@@ -44,7 +44,7 @@ REMEDIES = {
     "delayed output": "outputs must be those of the communication point, computed when they are read",
     "step-dependent answer": "the answer must follow communicationStepSize and not the number of calls",
     "internal step leaks": "time left between internal steps must be carried over, not dropped or rounded",
-    "step not honoured": "after fmi2DoStep it must be where the step ends: couple it with its own step, or have it mended",
+    "step not honoured": "fmi2DoStep must lead to where the step ends: couple it with its own step, or have it mended",
     # numbers
     "not a number": "an FMU must return fmi2Error where it has no answer, or limit what it is given",
     "not a number stays": "look for static variables",

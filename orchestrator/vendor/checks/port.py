@@ -36,7 +36,10 @@ WHY = {
 
 
 def _rating(running: Running) -> float:
+    set_to = running.subject.use.values.get("S_n")
     info = running.component.description.variables.get("S_n")
+    if set_to is not None:
+        return float(set_to)
     return SYSTEM_BASE_MVA if info is None else float(info.start or SYSTEM_BASE_MVA)
 
 
@@ -70,13 +73,18 @@ def _current(running: Running) -> complex:
     return complex(*values) * SYSTEM_BASE_MVA / _rating(running)
 
 
+def _points(subject: Subject) -> tuple[Point, ...]:
+    """The operating point of use, and others."""
+    return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
+
+
 @check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
 def steady_state(subject: Subject) -> Result:
     if not subject.starts:
         return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
     steps, worst = affordable(subject, 5000), 0.0
     refused = []
-    for point in POINTS[:3]:
+    for point in _points(subject)[:3]:
         try:
             with subject.running(point=point) as running:
                 begin = _current(running)
@@ -108,7 +116,7 @@ def power_balance(subject: Subject) -> Result:
         asked, found, voltages = _powers(subject, steps)
         if len(asked) < 3:
             return not_applicable(
-                "power_balance", f"because it starts at {len(asked)} of {len(POINTS)} operating points only"
+                "power_balance", f"because it starts at {len(asked)} of {len(_points(subject))} operating points only"
             )
         result = _judged(asked, found, voltages, steps * subject.step_size)
         if best is None or result.verdict == "pass":
@@ -120,7 +128,7 @@ def power_balance(subject: Subject) -> Result:
 def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex], list[complex]]:
     """Powers asked for, found, and the voltages at which it starts."""
     asked, found, voltages = [], [], []
-    for point in POINTS:
+    for point in _points(subject):
         try:
             with subject.running(point=point) as running:
                 if steps:

@@ -31,8 +31,9 @@ _CYCLE = 0.02
 NO_LIMIT = 3.0
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
 
-Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overrated; ours, with limits of 1.1 in either axis,
-gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 2.9. More must be declared (`I_max`).
+Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overrated; ours, with limits of 1.1 in either
+axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 2.9. More must be declared
+(`I_max` of the binding).
 """
 
 _BACK = 0.3
@@ -135,8 +136,9 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     lost = [a for a in answers if a.away > _BACK]
     declared = current_limit(subject)
     seen = (
-        f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s: at most {worst.mean:.3g} pu of its "
-        f"rating over the last cycle in {worst.event}, peak {highest.peak:.3g} pu in {highest.event}"
+        f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s: at most "
+        f"{worst.mean:.3g} pu of its rating over the last cycle in {worst.event}, "
+        f"peak {highest.peak:.3g} pu in {highest.event}"
     )
     seen += f"; {left_out} more were left out for time" if left_out else ""
     figures = {

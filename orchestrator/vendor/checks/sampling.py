@@ -74,7 +74,7 @@ def _sample_time(subject: Subject, step_size: float) -> float | None:
 
 def _skipped(subject: Subject, step_size: float) -> float | None:
     """Time of a single step in which no output moves, between steps in which they do; None where there is none."""
-    moved = _changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1)
+    moved = np.asarray(_changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1))
     idle = np.flatnonzero(~moved[1:-1] & moved[:-2] & moved[2:]) + 1
     if not len(idle) or moved.mean() < _MOST_MOVE:
         return None
@@ -102,7 +102,8 @@ def _changes(subject: Subject, steps: int, step_size: float) -> NDArray[np.bool_
                 pairs.append((start, running.read()))
             before, after = np.array(pairs).transpose(1, 0, 2)
     size = np.maximum(np.abs(after).max(axis=0, initial=0.0), 1e-12)
-    return np.abs(after - before) > 1e-13 * size
+    changed: NDArray[np.bool_] = np.abs(after - before) > 1e-13 * size
+    return changed
 
 
 def _gap(changed: NDArray[np.bool_]) -> float | None:

@@ -1,4 +1,4 @@
-"""Whether a converter answers changes of voltage and frequency with the signs that it should, and rests at its frequency."""
+"""Whether a converter answers voltage and frequency with the right signs, and rests at its frequency."""
 
 from collections.abc import Callable
 from math import pi
@@ -21,7 +21,7 @@ _EARLY = (0.005, 0.025)
 frequency have no mean over it."""
 
 _MORE = 0.97
-"""Reactive power in the end, in parts of that in the first cycle, from which it is looked closer; a droop leaves less."""
+"""Reactive power in the end, in parts of the first cycle's, from which it is looked closer: a droop leaves less."""
 
 _SOME = 1e-3
 """Change of power [pu, S_n] that is an answer."""
@@ -89,7 +89,7 @@ def signs(subject: Subject) -> Result:
     if max(voltage.far, frequency.far) > _AWAY:
         return remarked(
             "signs", f"it goes {max(voltage.far, frequency.far):.3g} pu away ({said})",
-            "it is unstable at a stiff bus, or its answer is large; ask for the shortest network impedance that it bears",
+            "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears",
             **figures,
         )  # fmt: skip
     return passed("signs", said, **figures)
@@ -107,7 +107,7 @@ def _answers(subject: Subject, steps: int, point: Point) -> tuple[Answer, Answer
 def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float, Vector], Complexes]) -> Answer:
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
-    time = np.arange(steps) * h
+    time: Vector = np.arange(steps, dtype=np.float64) * h
     found, far = [], 0.0
     names = subject.inputs
     for sign in (1.0, -1.0):
@@ -164,7 +164,7 @@ def _wrong_droop(subject: Subject, steps: int, voltage: Answer, frequency: Answe
     slope = droop(found) if found else None
     if slope is None or slope > 0:
         return None
-    says = f"the voltage behind its impedance rises by {-100 * slope:.2g} % for every pu of reactive power, and should fall"
+    says = f"the voltage behind its impedance rises by {-100 * slope:.2g} % a pu of reactive power, and should fall"
     return "wrong sign", f"{says}: look for the sign of Q in its droop"
 
 

@@ -3,7 +3,7 @@
 from cmath import rect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -38,6 +38,26 @@ class Point:
         return rect(self.v, self.theta)
 
 
+@dataclass(frozen=True)
+class Use:
+    """How somebody uses it: what a case gives it.
+
+    Attributes
+    ----------
+    step_size
+        Communication step [s].
+    point
+        Where the power flow puts it.
+    values, inputs
+        Of its parameters, and of inputs that nothing feeds.
+    """
+
+    step_size: float | None = None
+    point: Point | None = None
+    values: Mapping[str, float | bool] = field(default_factory=dict)
+    inputs: Mapping[str, float] = field(default_factory=dict)
+
+
 class Subject:
     """One FMU, opened as often as a check wants.
 
@@ -55,6 +75,8 @@ class Subject:
         Names of the Real inputs and outputs.
     process
         Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
+    use
+        How somebody uses it.
     doing
         What is done to it, for the report of a crash.
     memory
@@ -63,8 +85,9 @@ class Subject:
 
     process: Callable[[], FmuProcess]
 
-    def __init__(self, description: FmuDescription, directory: Path, step_size: float | None = None) -> None:
+    def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None) -> None:
         self.description, self.directory, self.doing = description, directory, ""
+        self.use = use or Use()
         self.memory: dict[str, Any] = {}
         variables = description.variables
         self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
@@ -76,8 +99,8 @@ class Subject:
         bound = description.port.start if isinstance(description, BoundDescription) else dict.fromkeys(START)
         wanted = ("P_0", "Q_0", "v_0", "theta_0")
         self.starts = self.port and all(n in bound and n in variables for n in wanted)
-        self.step_is_given = step_size is not None or description.default_step_size is not None
-        self.step_size = step_size or self._step_size()
+        self.step_is_given = self.use.step_size is not None or description.default_step_size is not None
+        self.step_size = self.use.step_size or self._step_size()
 
     def _step_size(self) -> float:
         described = self.description
@@ -120,14 +143,19 @@ class Subject:
         return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
 
     @property
+    def point(self) -> Point:
+        """Where it starts, where nobody says otherwise."""
+        return self.use.point or Point()
+
+    @property
     def start_voltage(self) -> complex:
         """Bus voltage [pu] at which it starts."""
-        return Point().voltage
+        return self.point.voltage
 
     def start_inputs(self, point: Point | None) -> Vector:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
-        voltage = (point or Point()).voltage
-        known = {"v_re": voltage.real, "v_im": voltage.imag} if self.port else {}
+        voltage = (point or self.point).voltage
+        known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
         return np.array([known.get(n, _number(self.description.variables[n].start)) for n in self.inputs])
 
     # -- stimuli ---------------------------------------------------------------------------------
@@ -177,10 +205,10 @@ class Running:
         subject, component = self.subject, self.component
         self.time = 0.0
         if subject.starts:
-            point = self.point or Point()
+            point = self.point or subject.point
             start = {"P_0": point.P, "Q_0": point.Q, "v_0": point.v, "theta_0": point.theta}
             component.set({n: v for n, v in start.items() if n in subject.description.variables})
-        component.set(self.parameters)
+        component.set({**subject.use.values, **self.parameters})
         component.setup(0.0, None)
         component.enter_initialization_mode()
         self.rest = subject.start_inputs(self.point)

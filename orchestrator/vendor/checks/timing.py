@@ -237,11 +237,7 @@ def internal_step(subject: Subject) -> Result:
     try:
         plain = subject.trajectory(total, h, subject.one_step())
         odd = {
-            f"{span}/{many}": (
-                subject.trajectory(many * (total // span), span / many * h, subject.one_step()),
-                span,
-                many,
-            )
+            (span, many): subject.trajectory(many * (total // span), span / many * h, subject.one_step())
             for span, many in _RATIOS
         }
     except ComponentError as error:
@@ -251,7 +247,8 @@ def internal_step(subject: Subject) -> Result:
             "couple it with multiples of its own step only",
         )
     worst, share = max(
-        (_typical(run[::many], plain[::span][: total // span + 1]), name) for name, (run, span, many) in odd.items()
+        (_typical(run[::many], plain[::span][: total // span + 1]), f"{span}/{many}")
+        for (span, many), run in odd.items()
     )
     one_step = _typical(plain[1:], plain[:-1])
     figures = {"difference": worst, "of_one_step": one_step}
