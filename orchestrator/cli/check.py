@@ -59,7 +59,7 @@ def _print(report: Report) -> None:
     for result in report.results:
         mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
         fault = f"[bold]{result.fault}:[/] " if result.fault else ""
-        console.print(f"{mark} {result.check:<22} {fault}{escape(result.evidence)}")
+        console.print(f"{mark} {result.check:<22} {fault}{escape(_in_one_line(result.evidence))}")
         if result.remedy:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
     console.print("")
@@ -69,3 +69,8 @@ def _print(report: Report) -> None:
         console.print(f"{report.fmu.name}: no check failed.")
     else:
         console.print(f"[bold red]{report.fmu.name}: do not use it as it is: {', '.join(report.faults)}[/]")
+
+
+def _in_one_line(text: str) -> str:
+    """What an FMU says, without what moves a terminal's cursor: it could write lines of its own otherwise."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

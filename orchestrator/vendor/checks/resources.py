@@ -12,7 +12,7 @@ _BLOCKS = 6
 _LEAST = 4.0
 """Bytes kept by each step that count as a leak."""
 
-_RESETS, _FEW = 20, 4
+_RESETS, _FEW = 6, 4
 """Resets in a block, and instances between two counts of open files."""
 
 _INSTANCE = 120.0
@@ -33,7 +33,7 @@ def memory(subject: Subject) -> Result:
         ("step", _of_steps(subject, steps), _LEAST),
         ("instance", _of_instances(subject, instance), instance),
         ("saved state", _of_states(subject), _INSTANCE),
-        ("fmi2Reset", _of_resets(subject), instance),
+        ("fmi2Reset", _of_resets(subject, instance), instance),
     ):
         if growth is None:
             continue
@@ -79,7 +79,7 @@ def _of_steps(subject: Subject, steps: int) -> float | None:
 
 def _of_instances(subject: Subject, least: float) -> float:
     """A quick look, and a longer one where that sees something: an interpreter's own memory moves as well."""
-    quick = _of_so_many(subject, max(3, affordable(subject, 4000) // 130))
+    quick = _of_so_many(subject, max(3, affordable(subject, 4000) // 400))
     return quick if quick <= least else _of_so_many(subject, max(5, affordable(subject, 4000) // 30))
 
 
@@ -92,18 +92,24 @@ def _of_so_many(subject: Subject, count: int) -> float:
     return _growth(subject, block, count)
 
 
-def _of_resets(subject: Subject) -> float | None:
+def _of_resets(subject: Subject, least: float) -> float | None:
+    """A quick look, and a longer one where that sees something."""
+    try:
+        quick = _of_so_many_resets(subject, _RESETS)
+        return quick if quick <= least else _of_so_many_resets(subject, 5 * _RESETS)
+    except ComponentError:
+        return None  # which is another check's business
+
+
+def _of_so_many_resets(subject: Subject, count: int) -> float:
     with subject.running() as running:
 
         def block() -> None:
-            for _ in range(_RESETS):
+            for _ in range(count):
                 running.step(subject.step_size)
                 running.reset()
 
-        try:
-            return _growth(subject, block, _RESETS)
-        except ComponentError:
-            return None  # which is another check's business
+        return _growth(subject, block, count)
 
 
 def _of_files(subject: Subject) -> float:

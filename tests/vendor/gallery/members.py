@@ -351,6 +351,7 @@ def tampering():
         *carriers("forged_results", "not a number", FAULT_TAMPERING=0, FAULT_NAN_AT=0.0),
         Member(converter("forged_everywhere", FAULT_TAMPERING=1), "exit"),
         Member(converter("forged_in_binary", FAULT_TAMPERING=255), "exit"),
+        Member(converter("forged_and_stays", FAULT_TAMPERING=1, FAULT_TAMPERING_STAYS=1), "tampering"),
     ]
 
 

@@ -40,6 +40,8 @@ static void tamper(void) {
 #if FAULT_TAMPERING
     for (int fd = 3; fd < 1024; ++fd) forge(fd);
     scribble();
+#ifndef FAULT_TAMPERING_STAYS
     _exit(0);
+#endif
 #endif
 }
