@@ -214,8 +214,8 @@ class FmuProcess:
         while not (answered := wait(box.address, self._number, _LOOK)):
             now = monotonic()
             if self._process.poll() is not None:
-                if (answered := wait(box.address, self._number, 0.0)) == 1:
-                    break
+                if answered := wait(box.address, self._number, 0.0):
+                    break  # with its last breath
                 raise self._died(call)
             if box.head.steps != steps:
                 steps, begin = box.head.steps, now

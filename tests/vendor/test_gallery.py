@@ -52,7 +52,7 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
 @pytest.mark.parametrize(
     ("name", "only", "words"),
     [
-        ("held", "sample_time", "its outputs change every 1 ms only: of 10 steps of 100 µs all but one do nothing"),
+        ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
         (
             "sixty_hertz",
             "rated_frequency",

@@ -40,11 +40,11 @@ def memory(subject: Subject) -> Result:
         figures[what] = growth
         if growth > least:
             texts.append(f"{growth:.0f} bytes with every {what}")
-    if texts:
-        return failed("memory", "memory leak", f"it keeps {' and '.join(texts)}", **figures)
     if files := _of_files(subject):
         figures["open files"] = files
         return failed("memory", "files stay open", f"{files:.2g} files stay open with every instance", **figures)
+    if texts:
+        return failed("memory", "memory leak", f"it keeps {' and '.join(texts)}", **figures)
     return passed("memory", ", ".join(f"{growth:.1f} bytes a {what}" for what, growth in figures.items()), **figures)
 
 

@@ -50,9 +50,7 @@ def sample_time(subject: Subject) -> Result:
             return passed("sample_time", f"its outputs change with every step of {h:g} s", sample_time=None)
         said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
         return passed("sample_time", said, sample_time=finer)
-    idle = (
-        f"its outputs change every {_seconds(own)} only: of {own / h:.3g} steps of {_seconds(h)} all but one do nothing"
-    )
+    idle = f"its outputs change every {_seconds(own)} only: {1 - h / own:.0%} of all steps of {_seconds(h)} do nothing"
     if own > _IDLE * h and subject.step_is_given:
         return failed("sample_time", "step not honoured", idle, sample_time=own)
     remedy = f"couple it with steps of {_seconds(own)} or multiples of it; what it answers in between is old"
@@ -61,15 +59,16 @@ def sample_time(subject: Subject) -> Result:
 
 def _sample_time(subject: Subject, step_size: float) -> float | None:
     """Mean time from one change of the outputs to the next; None where they change too seldom, or by chance."""
+    found: float | None = None
     for length in _LENGTHS:
         steps = affordable(subject, length, step_size)
         gaps = [_gap(column) for column in _changes(subject, steps, step_size).T]
-        found = [gap for gap in gaps if gap is not None]
-        if found:
-            return min(found) * step_size
-        if steps < length:
-            break
-    return None
+        found = min((gap for gap in gaps if gap is not None), default=found)
+        if steps < length or (found is not None and (length > _LENGTHS[0] or found == round(found))):
+            break  # what is no multiple of the step is known better after more of them
+    if found is None:
+        return None
+    return found * step_size if found == round(found) else float(f"{found * step_size:.2g}")
 
 
 def _skipped(subject: Subject, step_size: float) -> float | None:
@@ -121,4 +120,4 @@ def _seconds(time: float) -> str:
     unit, size = next((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)) if time >= 0.0999 * s or u == "µs")
     if unit == "ms" and time < 0.999e-3:
         unit, size = "µs", 1e-6
-    return f"{time / size:.4g} {unit}"
+    return f"{time / size:.3g} {unit}"

@@ -28,7 +28,7 @@ def state(subject: Subject) -> Result:
         with saved(running) as kept:
             first = running.record(steps, h, stimulus)
             # Somewhere else, so that what stays behind shows.
-            running.record(steps // 3 & ~1, h, lambda t: -2 * stimulus(t))
+            running.record(steps // 3 | 1, h, lambda t: -2 * stimulus(t))
             for _ in range(2):
                 running.restore(kept)
                 running.time = at

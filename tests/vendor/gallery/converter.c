@@ -189,7 +189,7 @@ static void advance(double *z, double *m, double *hidden, double time, double st
 #endif
 #ifdef FAULT_TIMER_CALLS
     /* A timer that counts calls instead of time. */
-    if (++m[PENDING] == FAULT_TIMER_CALLS) m[P_REF] += 0.05;
+    if (++m[PENDING] == FAULT_TIMER_CALLS) m[E_0] += 0.1;
 #endif
 #ifdef FAULT_ONE_BEHIND
     /* The step that was asked for last time. */

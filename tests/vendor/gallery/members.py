@@ -297,15 +297,15 @@ def reported():
              only=("delay", "step_invariance"), FAULT_TIMER_CALLS=60),
         *one("euler", "not a number", "CogniPilot/rumoca#347", only=("runs",), FAULT_EULER=10, step_size="4e-2",
              stop_time="20")[::2],
-        *one("nan_with_ok", "not a number", "CATIA-Systems/FMPy#278", only=("runs",), FAULT_NAN_AT=18.0,
-             stop_time="20"),
+        *one("nan_with_ok", "not a number", "CATIA-Systems/FMPy#278", only=("runs",), FAULT_NAN_AT=3.0,
+             stop_time="4"),
         *one("nothing_first", "no steady state", "CATIA-Systems/FMPy#440", only=("steady_state",),
              FAULT_NOTHING_FIRST=1),
         *one("ignores_parameters", "parameter not taken", "CATIA-Systems/FMPy#163", only=("start_values",),
              FAULT_IGNORES=1),
         *one("shared_parameters", "shared between instances", "CATIA-Systems/FMIKit-Simulink#326",
              only=("independence",), FAULT_SHARED_PARAMETERS=1),
-        *one("crash_again", "crash", "NTNU-IHB/PythonFMU#213", only=("call_order",), FAULT_CRASH_AGAIN=1),
+        *one("crash_again", "crash", "NTNU-IHB/PythonFMU#213", only=("reinstantiation",), FAULT_CRASH_AGAIN=1),
         *one("crash_after_reset", "crash", "OpenModelica/OpenModelica#6703", only=reset, FAULT_CRASH_AFTER_RESET=1),
         *one("crash_on_free", "crash", "OpenModelica/OpenModelica#16321", only=("runs",), FAULT_CRASH_ON_FREE=100),
         *one("hang_on_free", "hang", "OpenModelica/OMSimulator#1391", only=("runs",), FAULT_HANG_ON_FREE=100)[:1],
@@ -349,8 +349,8 @@ def tampering():
     """FMUs that write results of their own; the first one is faulty besides."""
     return [
         *carriers("forged_results", "not a number", FAULT_TAMPERING=0, FAULT_NAN_AT=0.0),
-        Member(converter("forged_everywhere", FAULT_TAMPERING=1), "exit"),
-        Member(converter("forged_in_binary", FAULT_TAMPERING=255), "exit"),
+        Member(converter("forged_everywhere", FAULT_TAMPERING=1), "tampering"),
+        Member(converter("forged_in_binary", FAULT_TAMPERING=255), "tampering"),
         Member(converter("forged_and_stays", FAULT_TAMPERING=1, FAULT_TAMPERING_STAYS=1), "tampering"),
     ]
 
