@@ -13,10 +13,6 @@ from orchestrator.cases import two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
 from orchestrator.cli.check import _in_one_line
-from orchestrator.cases.use import use_in_case
-from orchestrator.cli.check import _in_one_line
-from orchestrator.cases.use import use_in_case
-from orchestrator.cli.check import _in_one_line
 from orchestrator.study.sweep import plan_sweep
 from orchestrator.study.sweep_axes import parse_vary
 from orchestrator.vendor.checks.all import CHECKS, MODULES, ORDER
@@ -136,86 +132,6 @@ def test_a_check_as_a_case_uses_it(gfor, gallery, case):
     use, found = use_in_case(str(path), None, fmu, None)
     assert (use.step_size, use.point.P) == (1e-4, pytest.approx(0.9))
     assert use.values["S_n"] > 0
-    assert found.samefile(binding)
-    code, text, error = gfor("check", fmu, "--case", path, "--only", "power_balance", "--json")
-    assert code == 0, error
-    assert "at 6 points" in json.loads(text)["checks"][-1]["evidence"]
-    code, _, error = gfor("check", gallery("gain")[0], "--case", path)
-    assert code == 2
-    assert "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)" in error
-    code, _, error = gfor("check", fmu, "--component", "gfor")
-    assert code == 2
-    assert "give --case as well" in error
-
-
-def test_what_an_fmu_says_stays_in_its_line():
-    """An FMU could write a verdict of its own on the terminal."""
-    assert _in_one_line("x\n\x1b[1Apass runs") == "x\\n\\x1b[1Apass runs"
-
-
-@pytest.mark.parametrize(
-    ("fmu", "step", "verdict", "words"),
-    [
-        ("held", "1e-4", "fail", "every 1 ms only"),
-        ("held", "1e-3", "pass", "with every step of 0.001 s"),
-        ("van_der_pol", "0.007", "remark", "every 10 ms only: of 1.43 steps of 7 ms all but one do nothing"),
-    ],
-)
-def test_a_check_at_the_step_of_use(fmu, step, verdict, words, gfor, gallery):
-    """Of the last one, an own step of 10 ms, every third step does nothing at 7 ms, and runs agree at common times."""
-    code, text, _ = gfor("check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json")
-    result = json.loads(text)["checks"][-1]
-    assert code == (verdict == "fail")
-    assert result["verdict"] == verdict
-    assert words in result["evidence"]
-
-
-def test_a_check_as_a_case_uses_it(gfor, gallery, case):
-    """Step, operating point, values and binding are the case's."""
-    fmu, binding = gallery("converter_qd_si")
-    path = case(fmu, binding, "parameters.R_f = 0.05\n")
-    use, found = use_in_case(str(path), None, fmu, None)
-    assert (use.step_size, use.point.P, use.values["R_f"]) == (1e-4, pytest.approx(0.9), 0.05)
-    assert found.samefile(binding)
-    code, text, error = gfor("check", fmu, "--case", path, "--only", "power_balance", "--json")
-    assert code == 0, error
-    assert "at 6 points" in json.loads(text)["checks"][-1]["evidence"]
-    code, _, error = gfor("check", gallery("gain")[0], "--case", path)
-    assert code == 2
-    assert "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)" in error
-    code, _, error = gfor("check", fmu, "--component", "gfor")
-    assert code == 2
-    assert "give --case as well" in error
-
-
-def test_what_an_fmu_says_stays_in_its_line():
-    """An FMU could write a verdict of its own on the terminal."""
-    assert _in_one_line("x\n\x1b[1Apass runs") == "x\\n\\x1b[1Apass runs"
-
-
-@pytest.mark.parametrize(
-    ("fmu", "step", "verdict", "words"),
-    [
-        ("held", "1e-4", "fail", "every 1 ms only"),
-        ("held", "1e-3", "pass", "with every step of 0.001 s"),
-        ("van_der_pol", "0.007", "remark", "every 10 ms only: of 1.43 steps of 7 ms all but one do nothing"),
-    ],
-)
-def test_a_check_at_the_step_of_use(fmu, step, verdict, words, gfor, gallery):
-    """Of the last one, an own step of 10 ms, every third step does nothing at 7 ms, and runs agree at common times."""
-    code, text, _ = gfor("check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json")
-    result = json.loads(text)["checks"][-1]
-    assert code == (verdict == "fail")
-    assert result["verdict"] == verdict
-    assert words in result["evidence"]
-
-
-def test_a_check_as_a_case_uses_it(gfor, gallery, case):
-    """Step, operating point, values and binding are the case's."""
-    fmu, binding = gallery("converter_qd_si")
-    path = case(fmu, binding, "parameters.R_f = 0.05\n")
-    use, found = use_in_case(str(path), None, fmu, None)
-    assert (use.step_size, use.point.P, use.values["R_f"]) == (1e-4, pytest.approx(0.9), 0.05)
     assert found.samefile(binding)
     code, text, error = gfor("check", fmu, "--case", path, "--only", "power_balance", "--json")
     assert code == 0, error
