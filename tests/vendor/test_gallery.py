@@ -61,7 +61,7 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
         (
             "crash_in_dip",
             "limits",
-            "in the dip to 0.7 pu at 2.5 s: its process died with SIGSEGV in fmi2DoStep",
+            "in the dip to 0.2 pu at 2.5 s: its process died with SIGSEGV in fmi2DoStep",
         ),
     ],
 )

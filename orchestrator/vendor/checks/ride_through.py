@@ -16,9 +16,6 @@ from orchestrator.vendor.checks.subject import Subject
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 """When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
 
-_DEPTHS = (0.5, 0.0, 0.7, 0.2, 0.9)
-_SWELLS = (1.1, 1.3)
-_JUMPS = (60.0, -60.0, 20.0)
 _LASTS = 0.15
 """Duration of a disturbance [s]; a fault is cleared within it."""
 
@@ -71,9 +68,11 @@ class Answer:
 
 def _runs() -> Iterator[list[Event]]:
     """Every kind of event at every time, one at each time of a run; the first run has the most telling ones."""
-    kinds = [(f"dip to {v:g} pu", complex(v)) for v in _DEPTHS]
-    kinds += [(f"overvoltage of {v:g} pu", complex(v)) for v in _SWELLS]
-    kinds += [(f"phase jump of {a:g}°", rect(1, a * pi / 180)) for a in _JUMPS]
+    dips = {v: (f"dip to {v:g} pu", complex(v)) for v in (0.9, 0.7, 0.5, 0.2, 0.0)}
+    swells = {v: (f"overvoltage of {v:g} pu", complex(v)) for v in (1.1, 1.3)}
+    jumps = {a: (f"phase jump of {a:g}°", rect(1, a * pi / 180)) for a in (60.0, -60.0, 20.0)}
+    kinds = [jumps[60.0], dips[0.7], swells[1.3], dips[0.9], dips[0.2],
+             jumps[-60.0], dips[0.5], swells[1.1], dips[0.0], jumps[20.0]]  # fmt: skip
     to, at, lasts = _LONG
     for k in range(len(kinds)):
         if k == 1:

@@ -82,6 +82,8 @@ def signs(subject: Subject) -> Result:
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
     }  # fmt: skip
+    if not np.isfinite([voltage.far, frequency.far]).all():
+        return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")
     wrong = _wrong(voltage, frequency) or _wrong_droop(subject, steps, voltage, frequency)
     said = f"{_said(voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if wrong:
