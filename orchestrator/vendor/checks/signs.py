@@ -139,6 +139,8 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
 
 def _wrong(voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
     """Name of a fault, and what shows it."""
+    if frequency.far > _AWAY and voltage.far > _AWAY:
+        return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
     steady = [a.moving < max(_SOME, _SETTLED * abs(a.power)) for a in (voltage, frequency)]
     # Constant current or impedance takes so much with the voltage, and is no answer.
     least = 3 * VOLTAGE * abs(POINT.Q) + _SOME
@@ -146,8 +148,6 @@ def _wrong(voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
     if steady[1] and frequency.power.real < -_SOME:
         return "wrong sign", "its active power falls with the frequency, and should rise"
-    if frequency.far > _AWAY and voltage.far > _AWAY:
-        return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
     return None
 
 

@@ -266,7 +266,7 @@ def missed():
         *carriers("q_measured", "wrong sign", only=signs, Q_MEASURED=-1.0),
         *carriers("q_measured_stiff", "wrong sign", only=signs, Q_MEASURED=-1.0, X_PU=0.15, Q_DROOP=0.03),
         *carriers("p_measured", "unstable", only=signs, P_MEASURED=-1.0),
-        *carriers("nan_once", "not a number", only=("runs",), FAULT_NAN_ONCE=5.0, stop_time="10"),
+        *carriers("nan_once", "not a number", only=("runs",), FAULT_NAN_ONCE=5.0001, stop_time="10"),
         *carriers("crash_in_dip", "crash", only=("limits",), FAULT_CRASH_IN_DIP_AFTER=2.0),
         *carriers("held", "step not honoured", only=("sample_time",), FIXED_STEP="1e-3"),
         *carriers("sixty_hertz", "wrong rated frequency", only=("rated_frequency",), NOMINAL=60.0, OMEGA_UNIT=60.0,
