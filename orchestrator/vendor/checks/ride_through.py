@@ -25,11 +25,11 @@ _LONG = (0.85, 1.0, 2.0)
 _CYCLE = 0.02
 """Time [s] over which a current is averaged: what heats the semiconductors and what protection sees."""
 
-NO_LIMIT = 3.0
+NO_LIMIT = 3.3
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
 
 Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overrated; ours, with limits of 1.1 in either
-axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 2.9. More must be declared
+axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 3.1. More must be declared
 (`I_max` of the binding).
 """
 
