@@ -23,6 +23,14 @@ class FmuFileError(InputError):
     """A file is not an FMU that can be loaded here."""
 
 
+class UnsupportedFmuError(FmuFileError):
+    """An FMU cannot be run by this program, or on this machine, and may be sound; ``kind`` names what is missing."""
+
+    def __init__(self, message: str, kind: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
 class HostileFmuError(FmuFileError):
     """A file is made so that unpacking or reading it would do harm; ``kind`` says how."""
 
@@ -73,6 +81,19 @@ class NotFiniteError(ComponentError):
         seen = "" if value is None else f" ({value})"
         said = f"{variable} is no finite number{seen}"
         super().__init__(component, "fmi2GetReal", "not a number", said, time)
+
+
+class EndedError(ComponentError):
+    """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s]."""
+
+    def __init__(self, component: str, call: str, status: str, log: str, time: float, ended_at: float) -> None:
+        super().__init__(component, call, status, log, time)
+        self.ended_at = ended_at
+        said = f" (it says: {log})" if log else ""
+        self.args = (
+            f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error{said}; "
+            "let the run stop by then",
+        )
 
 
 class RunInterruptedError(CosimError):

@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -10,18 +11,28 @@ from xml.etree import ElementTree
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.errors import ComponentError, EndedError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
+from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.messages import Messages, callbacks_for, texts
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-_ERROR, _FATAL = 3, 4
+_DISCARD, _ERROR, _FATAL, _PENDING = 2, 3, 4, 5
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
+"""Kinds of ``fmi2Get…Status``."""
+
+_SILENT = {
+    _DISCARD: "by FMI it has no answer to this call",
+    _ERROR: "by FMI it cannot go on from here",
+    _FATAL: "by FMI all its instances in this process are lost",
+    _PENDING: "by FMI it will answer later, which this master does not wait for",
+}
+"""What a status means where an FMU says nothing."""
 
 
 class RealBatch:
@@ -67,6 +78,13 @@ class RealBatch:
                 self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")
 
 
+def _partly(reached: float | None, time: float) -> str:
+    """What FMI says of a step that an FMU discards without a word."""
+    if reached is not None and reached > time:
+        return f"it logs no text; by FMI it computed the step up to t = {reached:.6g} s only, and a shorter one may do"
+    return "it logs no text; by FMI it did not compute the whole step, and a shorter one may do"
+
+
 class Component:
     """An instance of an FMU; always released, also after an error.
 
@@ -96,6 +114,9 @@ class Component:
             self._fmu = self._loaded(Path(directory or self._own_directory or ""))
             with calls:
                 self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except UnsupportedFmuError:
+            self.close()
+            raise
         except Exception as error:  # fmpy raises a bare Exception here
             said = "; ".join(self._texts()) or str(error)
             self.close()
@@ -108,7 +129,18 @@ class Component:
         """Load the binary; that of an FMU of FMI 3.0 goes behind an adapter."""
         self._compare_guid(directory)
         newer = self.description.fmi_version == "3.0"
-        fmu = FMU2Slave(
+        library = load(self.description, directory)
+        missing, spare = absent_functions(self.description, library)
+        if missing:
+            raise FmuFileError(
+                f"{self.description.path}: its binary has no function {missing[0]}, which an FMU that declares what it "
+                "does must have; export it again"
+            )
+        if newer:
+            self._behind = Fmi3Library(self.description, directory, library)
+        fmu = FMU2Tolerant(
+            in_words_of_2(set(spare)) if newer else set(spare),
+            self._refuse_absent,
             guid=self.description.guid,
             unzipDirectory=str(directory),
             modelIdentifier=self.description.model_identifier,
@@ -116,9 +148,12 @@ class Component:
             libraryPath=str(adapter_path()) if newer else None,
         )
         if newer:
-            self._behind = Fmi3Library(self.description, directory)
             self._behind.prepare(fmu.dll)
         return fmu
+
+    def _refuse_absent(self, call: str) -> None:
+        call = self._in_its_words(call)
+        raise ComponentError(self.name, call, "nothing", "its binary has no such function, and its file declares no need")
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
@@ -145,9 +180,33 @@ class Component:
         """Raise unless a call's status is OK or Warning."""
         if status > 1:
             self._lost = self._lost or status == _FATAL
-            name = STATUS[status] if status < len(STATUS) else f"status {status}"
+            name = self._in_its_words(STATUS[status] if status < len(STATUS) else f"status {status}")
             said = "; ".join(self._texts(1) or self._texts())
-            raise ComponentError(self.name, self._in_its_words(call), self._in_its_words(name), said, time)
+            words = self._in_its_words(call)
+            if status == _DISCARD and call == "fmi2DoStep" and time is not None:
+                ended, reached = self.progress_of_step()
+                if ended:
+                    at = time if reached is None else reached
+                    raise EndedError(self.name, words, name, said, time, at)
+                said = said or _partly(reached, time)
+            said = said or f"it logs no text; {_SILENT.get(status, 'FMI knows no such status')}"
+            raise ComponentError(self.name, words, name, said, time)
+
+    def progress_of_step(self) -> tuple[bool, float | None]:
+        """After a step that was refused: whether the FMU ended its simulation by itself, and how far it came [s]."""
+        flag, number = ctypes.c_int(0), ctypes.c_double(0.0)
+        ended = self._asked("fmi2GetBooleanStatus", _TERMINATED, flag) and bool(flag.value)
+        reached = self._asked("fmi2GetRealStatus", _LAST_SUCCESSFUL_TIME, number)
+        return ended, number.value if reached and isfinite(number.value) else None
+
+    def _asked(self, function: str, kind: int, answer: Any) -> bool:
+        """Whether an FMU answers a question after its status."""
+        try:
+            with calls:
+                getattr(self._fmu, function)(self._fmu.component, kind, ctypes.byref(answer))
+        except (FMICallException, ComponentError):
+            return False
+        return True
 
     def _in_its_words(self, text: str) -> str:
         """A call or status by the name that the FMU's own version of FMI has for it."""

@@ -2,8 +2,8 @@
 
 import re
 import zipfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription
 
-from orchestrator.errors import FmuFileError
+from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
+from orchestrator.fmi.clocks import Clock, clocks_of, special_variables
 
 VENDOR = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
@@ -26,6 +27,9 @@ VERSIONS = ("2.0", "3.0")
 _TYPES_OF_3 = {"Float64": "Real", "Float32": "Real"} | {
     f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
 }
+
+
+_OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,13 @@ class FmuDescription:
         Exponents of SI base units, factor and offset of every unit that the FMU defines, as text.
     default_step_size
         Communication step that the FMU suggests [s].
+    has_event_mode, returns_early
+        Of FMI 3.0: whether its events can be handled from outside, and whether it may return early from a step.
+    clocks
+        Of FMI 3.0, where it has an event mode.
+    specials
+        Of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references; of
+        every other variable whose change is an event, and nothing.
     """
 
     path: Path
@@ -107,6 +118,10 @@ class FmuDescription:
     stop_time: float | None = None
     fmi_version: str = "2.0"
     rates: tuple[str, ...] = ()
+    has_event_mode: bool = False
+    returns_early: bool = False
+    clocks: tuple[Clock, ...] = ()
+    specials: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -135,16 +150,18 @@ def read_description(path: Path | str) -> FmuDescription:
     Raises
     ------
     FmuFileError
-        If the file is missing, not a zip archive, without (or with an unreadable) modelDescription.xml,
-        of another FMI version, for Model Exchange only, or without a binary for this platform.
+        If the file is missing, not a zip archive, or without (or with an unreadable) modelDescription.xml.
+    UnsupportedFmuError
+        If it is of another FMI version, not for co-simulation, or without a binary for this platform.
     """
     path = Path(path)
     text = read_model_description_text(path)
     version = _fmi_version(path, text)
     if version not in VERSIONS:
-        raise FmuFileError(
+        raise UnsupportedFmuError(
             f"{path}: it is an FMU of FMI {version[:20]}; this master runs co-simulation of FMI 2.0 and 3.0, ask for "
-            "one of these"
+            "one of these",
+            "another version of FMI",
         )
     try:
         description = fmpy.read_model_description(_only(text), validate=False)
@@ -158,15 +175,18 @@ def read_description(path: Path | str) -> FmuDescription:
             f"{path}: modelDescription.xml cannot be read: {told(error)}; run `fmpy validate` on the file"
         ) from error
     if described is None:
-        raise FmuFileError(
-            f"{path}: it is not an FMU for co-simulation (for Model Exchange only, mostly), which this master needs; "
-            "ask for that export"
+        kinds = [words for name, words in _OTHER_KINDS.items() if ElementTree.fromstring(text).find(name) is not None]
+        raise UnsupportedFmuError(
+            f"{path}: it is not an FMU for co-simulation ({' and '.join(kinds) or 'of no kind'} only), which this master "
+            "needs; ask for that export",
+            "no co-simulation",
         )
     if fmpy.platform not in platforms:
         has = ", ".join(platforms) or "none"
-        raise FmuFileError(
+        raise UnsupportedFmuError(
             f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
-            f"ask its author for a {fmpy.platform} build"
+            f"ask its author for a {fmpy.platform} build",
+            "another platform",
         )
     return described
 
@@ -222,7 +242,20 @@ def _describe(
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
         fmi_version=version,
         rates=tuple(unknown.variable.name for unknown in md.derivatives),
+        **_events(root, version),
     )
+
+
+def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
+    """What an FMU of FMI 3.0 says of events, early returns and clocks."""
+    interface = root.find("CoSimulation")
+    if version != "3.0" or interface is None:
+        return {}
+    says = {name: interface.get(name) in ("true", "1") for name in ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate")}
+    found: dict[str, Any] = {"has_event_mode": says["hasEventMode"], "returns_early": any(says.values())}
+    if says["hasEventMode"]:
+        found |= {"clocks": clocks_of(root), "specials": special_variables(root)}
+    return found
 
 
 def _gives_directional_derivatives(root: ElementTree.Element) -> bool:

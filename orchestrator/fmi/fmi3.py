@@ -6,22 +6,24 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import fmpy
-
-from fmus.toolchain.compiler import compile_here
-from orchestrator.errors import FmuFileError
+from fmus.toolchain.compiler import compile_library, host_platform
+from orchestrator.errors import FmuFileError, UnsupportedFmuError
+from orchestrator.fmi.clocks import MOST_CLOCKS, Clock, start_of
 from orchestrator.fmi.description import FmuDescription
 
-_SOURCE = Path(__file__).with_name("fmi3_as_fmi2.c")
+_SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
+"""Compiled as one, in this order."""
 
 _KINDS = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
 _ALIKE = {"Enumeration": "Int64"}
 """A type that goes through the functions of another."""
 
-_FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "EnterInitializationMode",
-              "ExitInitializationMode", "Terminate", "Reset", "DoStep", "GetFMUState", "SetFMUState", "FreeFMUState",
-              "SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState", "GetDirectionalDerivative",
-              *(f"Get{kind}" for kind in _KINDS), *(f"Set{kind}" for kind in _KINDS))  # fmt: skip
+FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "EnterInitializationMode",
+             "ExitInitializationMode", "Terminate", "Reset", "DoStep", "GetFMUState", "SetFMUState", "FreeFMUState",
+             "SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState", "GetDirectionalDerivative",
+             "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates", "GetIntervalDecimal", "GetShiftDecimal",
+             "SetClock", "GetClock",
+             *(f"Get{kind}" for kind in _KINDS), *(f"Set{kind}" for kind in _KINDS))  # fmt: skip
 """In the order of the adapter's table."""
 
 _NAMES = {
@@ -34,6 +36,9 @@ _NAMES = {
 }
 """Parts of names in FMI 2.0, and what they are in FMI 3.0; replaced in this order."""
 
+_CLOCK_KINDS = ("periodic", "changing", "countdown", "output")
+_DISCRETE_INPUT, _CLOCKED_INPUT, _CLOCKED = range(3)
+
 
 def in_words_of_3(call: str) -> str:
     """The name of a function or status of FMI 2.0 in FMI 3.0."""
@@ -42,14 +47,41 @@ def in_words_of_3(call: str) -> str:
     return call
 
 
+class _Clock(ctypes.Structure):
+    _fields_ = (
+        ("interval", ctypes.c_double),
+        ("shift", ctypes.c_double),
+        ("reference", ctypes.c_uint),
+        ("kind", ctypes.c_int32),
+        ("asked", ctypes.c_int32),
+        ("tunable", ctypes.c_int32),
+    )
+
+
+class _Special(ctypes.Structure):
+    _fields_ = (
+        ("clocks", ctypes.c_uint64),
+        ("start", ctypes.c_double),
+        ("reference", ctypes.c_uint),
+        ("kind", ctypes.c_int32),
+        ("role", ctypes.c_int32),
+    )
+
+
 class _Table(ctypes.Structure):
     _fields_ = (
-        ("functions", ctypes.c_void_p * len(_FUNCTIONS)),
+        ("functions", ctypes.c_void_p * len(FUNCTIONS)),
         ("resources", ctypes.c_char_p),
         ("references", ctypes.c_void_p),
         ("kinds", ctypes.c_void_p),
         ("n", ctypes.c_size_t),
         ("narrow", ctypes.c_int64),
+        ("events", ctypes.c_int64),
+        ("early", ctypes.c_int64),
+        ("clocks", ctypes.c_void_p),
+        ("n_clocks", ctypes.c_size_t),
+        ("specials", ctypes.c_void_p),
+        ("n_specials", ctypes.c_size_t),
     )
 
 
@@ -62,59 +94,114 @@ def adapter_path() -> Path:
     FmuFileError
         If it cannot be compiled here.
     """
+    platform = host_platform()
     try:
-        return compile_here(_SOURCE)
+        if platform is None:
+            raise RuntimeError("there is no compiler for this platform")
+        texts = [Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES]
+        return compile_library("\n".join(texts), platform)
     except (OSError, RuntimeError) as error:
         raise FmuFileError(f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0") from error
+
+
+def needed_functions(description: FmuDescription) -> set[str]:
+    """Functions without which an FMU of FMI 3.0 cannot be run, by what it declares; without ``fmi3``."""
+    needed = {"InstantiateCoSimulation", "FreeInstance", "EnterInitializationMode", "ExitInitializationMode",
+              "Terminate", "Reset", "DoStep", "GetFloat64", "SetFloat64"}  # fmt: skip
+    for kind in {_kind(v.declared_type) for v in description.variables.values() if v.type != "Array"} & set(_KINDS):
+        needed |= {f"Get{kind}", f"Set{kind}"}
+    if description.can_save_state:
+        needed |= {"GetFMUState", "SetFMUState", "FreeFMUState"}
+    if description.can_serialize_state:
+        needed |= {"SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState"}
+    if description.gives_directional_derivatives:
+        needed.add("GetDirectionalDerivative")
+    if description.has_event_mode:
+        needed |= {"EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"}
+    ticking = [c for c in description.clocks if c.variability != "triggered"]
+    asked = [c for c in ticking if c.interval is None]
+    needed |= {"SetClock"} if ticking else set()
+    needed |= {"GetClock"} if len(ticking) < len(description.clocks) else set()
+    needed |= {"GetIntervalDecimal"} if asked else set()
+    return needed | ({"GetShiftDecimal"} if any(c.periodic for c in asked) else set())
+
+
+def refuse_other_clocks(description: FmuDescription) -> None:
+    """Raise where a clock ticks only with those of other FMUs, which this master does not connect.
+
+    Raises
+    ------
+    UnsupportedFmuError
+    """
+    others = [c.name for c in description.clocks if c.needs_another]
+    if others:
+        raise UnsupportedFmuError(
+            f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has clocks "
+            "that tick by the time only; ask for an export with periodic clocks",
+            "triggered clocks",
+        )
+    if len(description.clocks) > MOST_CLOCKS:
+        raise UnsupportedFmuError(
+            f"{description.path}: it has {len(description.clocks)} clocks, and this master has room for {MOST_CLOCKS}; ask "
+            "for an export with fewer",
+            "too many clocks",
+        )
+
+
+def _kind(declared: str) -> str:
+    return _ALIKE.get(declared, declared)
 
 
 class Fmi3Library:
     """The binary of an extracted FMU of FMI 3.0, and what the adapter has to know of it; kept as long as instances."""
 
-    def __init__(self, description: FmuDescription, directory: Path) -> None:
-        self._library = _loaded(description, directory)
+    def __init__(self, description: FmuDescription, directory: Path, library: ctypes.CDLL) -> None:
+        refuse_other_clocks(description)
+        self._library = library
         known = sorted(
             (v.reference, _KINDS.index(kind))
             for v in description.variables.values()
-            if v.type != "Array" and (kind := _ALIKE.get(v.declared_type, v.declared_type)) in _KINDS
+            if v.type != "Array" and (kind := _kind(v.declared_type)) in _KINDS
         )
         self._references = (ctypes.c_uint * len(known))(*(reference for reference, _ in known))
         self._kinds = (ctypes.c_ubyte * len(known))(*(kind for _, kind in known))
-        self._table = _Table()
-        for place, name in enumerate(_FUNCTIONS):
-            self._table.functions[place] = ctypes.cast(self._function(description, name), ctypes.c_void_p)
+        self._clocks = (_Clock * len(description.clocks))(*map(_described, description.clocks))
+        specials = _specials(description)
+        self._specials = (_Special * len(specials))(*specials)
+        self._table = table = _Table()
         resources = (directory / "resources").resolve()
-        self._table.resources = f"{resources}{os.sep}".encode() if resources.is_dir() else None
-        self._table.references = ctypes.addressof(self._references)
-        self._table.kinds = ctypes.addressof(self._kinds)
-        self._table.n = len(known)
-        self._table.narrow = any(kind == _KINDS.index("Float32") for _, kind in known)
-
-    def _function(self, description: FmuDescription, name: str) -> Any:
-        try:
-            return getattr(self._library, f"fmi3{name}")
-        except AttributeError:
-            raise FmuFileError(
-                f"{description.path}: its binary has no function fmi3{name}, which every FMU of FMI 3.0 must have; "
-                "export it again"
-            ) from None
+        table.resources = f"{resources}{os.sep}".encode() if resources.is_dir() else None
+        table.references, table.kinds = ctypes.addressof(self._references), ctypes.addressof(self._kinds)
+        table.n, table.narrow = len(known), any(kind == _KINDS.index("Float32") for _, kind in known)
+        table.events, table.early = description.has_event_mode, description.returns_early
+        table.clocks, table.n_clocks = ctypes.addressof(self._clocks), len(description.clocks)
+        table.specials, table.n_specials = ctypes.addressof(self._specials), len(specials)
 
     def prepare(self, adapter: Any) -> None:
         """Make the adapter's next instance one of this FMU."""
+        for place, name in enumerate(FUNCTIONS):
+            function = getattr(self._library, f"fmi3{name}", adapter.fmi3_absent)
+            self._table.functions[place] = ctypes.cast(function, ctypes.c_void_p)
         adapter.fmi3_prepare(ctypes.byref(self._table))
 
 
-def _loaded(description: FmuDescription, directory: Path) -> ctypes.CDLL:
-    folder = (directory / "binaries" / fmpy.platform_tuple).resolve()
-    library = folder / f"{description.model_identifier}{fmpy.sharedLibraryExtension}"
-    if not library.is_file():
-        raise FmuFileError(
-            f"{description.path}: it has no binaries/{folder.name}/{library.name}, where an FMU of FMI 3.0 has its "
-            "binary for this platform; export it again"
-        )
-    before = os.getcwd()
-    os.chdir(folder)  # where some binaries look for what they depend on
-    try:
-        return ctypes.CDLL(str(library))
-    finally:
-        os.chdir(before)
+def _described(clock: Clock) -> _Clock:
+    kind = "periodic" if clock.periodic else "output" if clock.variability == "triggered" else clock.variability
+    asked = kind != "output" and clock.interval is None
+    interval = 0.0 if clock.interval is None else clock.interval
+    return _Clock(interval, clock.shift, clock.reference, _CLOCK_KINDS.index(kind), asked, clock.variability == "tunable")
+
+
+def _specials(description: FmuDescription) -> list[_Special]:
+    place = {clock.reference: k for k, clock in enumerate(description.clocks)}
+    variables = {v.reference: v for v in description.variables.values() if v.type != "Array"}
+    found = []
+    for reference, clocks in sorted(description.specials.items()):
+        variable = variables.get(reference)
+        if variable is None or (kind := _kind(variable.declared_type)) not in _KINDS:
+            continue
+        inside = variable.causality == "input"
+        role = (_CLOCKED_INPUT if inside else _CLOCKED) if clocks else _DISCRETE_INPUT
+        bits = sum(1 << place[clock] for clock in set(clocks) if clock in place)
+        found.append(_Special(bits, start_of(variable.start), reference, _KINDS.index(kind), role))
+    return found

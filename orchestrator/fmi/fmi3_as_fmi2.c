@@ -1,131 +1,15 @@
-/* The functions of FMI 2.0 on top of an FMU of FMI 3.0, so that one master runs both.
-   `fmi3.py` describes the table to Python and fills it. Neither events nor early returns are asked for: the FMU steps
-   as one of FMI 2.0 does. */
-#include <limits.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
-enum { OK, WARNING, DISCARD, ERROR };
-enum { FLOAT64, FLOAT32, INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, BOOLEAN, KINDS };
-
-typedef void (*fmi3_log)(void *, int, const char *, const char *);
-typedef int (*values)(void *, const unsigned *, size_t, void *, size_t);
-
-struct table {
-    void *(*instantiate)(const char *, const char *, const char *, bool, bool, bool, bool, const unsigned *, size_t, void *,
-                         fmi3_log, void *);
-    void (*free_instance)(void *);
-    int (*set_debug_logging)(void *, bool, size_t, const char *const *);
-    int (*enter_initialization)(void *, bool, double, double, bool, double);
-    int (*exit_initialization)(void *);
-    int (*terminate)(void *);
-    int (*reset)(void *);
-    int (*do_step)(void *, double, double, bool, bool *, bool *, bool *, double *);
-    int (*get_state)(void *, void **);
-    int (*set_state)(void *, void *);
-    int (*free_state)(void *, void **);
-    int (*state_size)(void *, void *, size_t *);
-    int (*serialize)(void *, void *, unsigned char *, size_t);
-    int (*deserialize)(void *, const unsigned char *, size_t, void **);
-    int (*derivative)(void *, const unsigned *, size_t, const unsigned *, size_t, const double *, size_t, double *, size_t);
-    values get[KINDS], set[KINDS];
-    const char *resources;
-    const unsigned *references; /* of all variables, sorted */
-    const unsigned char *kinds; /* of the same */
-    size_t n;
-    int64_t narrow; /* whether there is a Float32 */
-};
-
-struct callbacks {
-    void (*logger)(void *, const char *, int, const char *, const char *, ...);
-    void *allocate, *free, *finished, *environment;
-};
-
-struct instance {
-    struct table fmu;
-    const struct callbacks *callbacks;
-    void *inner;
-    char *name;
-    double start, stop, tolerance;
-    int stops, tolerates;
-};
-
-static const struct table *next; /* for the next instance */
-
-EXPORT void fmi3_prepare(const struct table *table) { next = table; }
-
-/* The logger takes a printf format. That '#' has a meaning as well is left alone: the master's logger gives it none. */
-static void receive(void *environment, int status, const char *category, const char *text) {
-    struct instance *s = environment;
-    char format[2048];
-    size_t k = 0;
-    if (!s || !s->callbacks->logger) return;
-    for (text = text ? text : ""; *text && k < sizeof format - 2; ++text) {
-        if (*text == '%') format[k++] = *text;
-        format[k++] = *text;
-    }
-    format[k] = 0;
-    s->callbacks->logger(s->callbacks->environment, s->name, status, category ? category : "", format);
-}
-
-static int say(struct instance *s, int status, const char *format, ...) {
-    char text[256];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    receive(s, status, "", text);
-    return status;
-}
-
-static int kind_of(const struct instance *s, unsigned reference) {
-    size_t low = 0, high = s->fmu.n;
-    while (low < high) {
-        const size_t middle = (low + high) / 2;
-        if (s->fmu.references[middle] < reference)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < s->fmu.n && s->fmu.references[low] == reference ? s->fmu.kinds[low] : KINDS;
-}
-
-#define WORST(worst, call) \
-    do { \
-        const int status_ = (call); \
-        if (status_ > worst) worst = status_; \
-    } while (0)
+/* The functions of FMI 2.0 on top of an FMU of FMI 3.0, so that one master runs both. fmi3_instance.c and fmi3_events.c
+   come before it. An FMU without events and early returns steps as one of FMI 2.0 does, to the last bit. */
 
 /* -- values ------------------------------------------------------------------------------------ */
 
-union any {
-    float f32;
-    int8_t i8;
-    uint8_t u8;
-    int16_t i16;
-    uint16_t u16;
-    int32_t i32;
-    uint32_t u32;
-    int64_t i64;
-    uint64_t u64;
-    bool truth;
-};
-
 EXPORT int fmi2GetReal(struct instance *s, const unsigned *r, size_t n, double *x) {
-    if (!s->fmu.narrow) return s->fmu.get[FLOAT64](s->inner, r, n, x, n);
+    MUST(settle(s));
+    if (!s->fmu.narrow && !s->fmu.n_specials) return s->fmu.get[FLOAT64](s->inner, r, n, x, n);
     int worst = OK;
     for (size_t k = 0; k < n; ++k) {
         float narrow;
+        if (held(s, r[k], x + k)) continue;
         if (kind_of(s, r[k]) != FLOAT32) {
             WORST(worst, s->fmu.get[FLOAT64](s->inner, r + k, 1, x + k, 1));
         } else {
@@ -137,10 +21,13 @@ EXPORT int fmi2GetReal(struct instance *s, const unsigned *r, size_t n, double *
 }
 
 EXPORT int fmi2SetReal(struct instance *s, const unsigned *r, size_t n, double *x) {
-    if (!s->fmu.narrow) return s->fmu.set[FLOAT64](s->inner, r, n, x, n);
+    if (!s->fmu.narrow && !s->fmu.n_specials) return s->fmu.set[FLOAT64](s->inner, r, n, x, n);
     int worst = OK;
     for (size_t k = 0; k < n; ++k) {
         float narrow = (float)x[k];
+        bool waits;
+        MUST(before_setting(s, r[k], x[k], &waits));
+        if (waits) continue;
         if (kind_of(s, r[k]) != FLOAT32)
             WORST(worst, s->fmu.set[FLOAT64](s->inner, r + k, 1, x + k, 1));
         else
@@ -151,22 +38,16 @@ EXPORT int fmi2SetReal(struct instance *s, const unsigned *r, size_t n, double *
 
 EXPORT int fmi2GetInteger(struct instance *s, const unsigned *r, size_t n, int *x) {
     int worst = OK;
+    MUST(settle(s));
     for (size_t k = 0; k < n; ++k) {
         const int kind = kind_of(s, r[k]);
         union any v;
-        int64_t whole = 0;
+        double whole;
         if (kind < INT8 || kind > UINT64) return say(s, ERROR, "value reference %u is of no integer type", r[k]);
-        WORST(worst, s->fmu.get[kind](s->inner, r + k, 1, &v, 1));
-        if (worst > WARNING) return worst;
-        switch (kind) {
-            case INT8: whole = v.i8; break;
-            case UINT8: whole = v.u8; break;
-            case INT16: whole = v.i16; break;
-            case UINT16: whole = v.u16; break;
-            case INT32: whole = v.i32; break;
-            case UINT32: whole = v.u32; break;
-            case INT64: whole = v.i64; break;
-            default: whole = v.u64 > INT_MAX ? INT64_MAX : (int64_t)v.u64;
+        if (!held(s, r[k], &whole)) {
+            WORST(worst, s->fmu.get[kind](s->inner, r + k, 1, &v, 1));
+            if (worst > WARNING) return worst;
+            whole = number(kind, &v);
         }
         if (whole < INT_MIN || whole > INT_MAX) return say(s, DISCARD, "value reference %u: its value takes more than 32 bits", r[k]);
         x[k] = (int)whole;
@@ -181,19 +62,13 @@ EXPORT int fmi2SetInteger(struct instance *s, const unsigned *r, size_t n, const
     for (size_t k = 0; k < n; ++k) {
         const int kind = kind_of(s, r[k]);
         union any v;
+        bool waits;
         if (kind < INT8 || kind > UINT64) return say(s, ERROR, "value reference %u is of no integer type", r[k]);
         if (x[k] < LOW[kind - INT8] || x[k] > HIGH[kind - INT8])
             return say(s, DISCARD, "value reference %u cannot be %d: its type does not reach so far", r[k], x[k]);
-        switch (kind) {
-            case INT8: v.i8 = (int8_t)x[k]; break;
-            case UINT8: v.u8 = (uint8_t)x[k]; break;
-            case INT16: v.i16 = (int16_t)x[k]; break;
-            case UINT16: v.u16 = (uint16_t)x[k]; break;
-            case INT32: v.i32 = x[k]; break;
-            case UINT32: v.u32 = (uint32_t)x[k]; break;
-            case INT64: v.i64 = x[k]; break;
-            default: v.u64 = (uint64_t)x[k];
-        }
+        MUST(before_setting(s, r[k], x[k], &waits));
+        if (waits) continue;
+        v = typed(kind, x[k]);
         WORST(worst, s->fmu.set[kind](s->inner, r + k, 1, &v, 1));
     }
     return worst;
@@ -201,8 +76,14 @@ EXPORT int fmi2SetInteger(struct instance *s, const unsigned *r, size_t n, const
 
 EXPORT int fmi2GetBoolean(struct instance *s, const unsigned *r, size_t n, int *x) {
     int worst = OK;
+    MUST(settle(s));
     for (size_t k = 0; k < n; ++k) {
         bool truth = false;
+        double kept;
+        if (held(s, r[k], &kept)) {
+            x[k] = kept != 0;
+            continue;
+        }
         WORST(worst, s->fmu.get[BOOLEAN](s->inner, r + k, 1, &truth, 1));
         x[k] = truth;
     }
@@ -212,7 +93,9 @@ EXPORT int fmi2GetBoolean(struct instance *s, const unsigned *r, size_t n, int *
 EXPORT int fmi2SetBoolean(struct instance *s, const unsigned *r, size_t n, const int *x) {
     int worst = OK;
     for (size_t k = 0; k < n; ++k) {
-        bool truth = x[k] != 0;
+        bool truth = x[k] != 0, waits;
+        MUST(before_setting(s, r[k], truth, &waits));
+        if (waits) continue;
         WORST(worst, s->fmu.set[BOOLEAN](s->inner, r + k, 1, &truth, 1));
     }
     return worst;
@@ -220,9 +103,19 @@ EXPORT int fmi2SetBoolean(struct instance *s, const unsigned *r, size_t n, const
 
 /* -- life cycle -------------------------------------------------------------------------------- */
 
+/* In the table's place of a function that the FMU does not have, and need not. */
+EXPORT int fmi3_absent(void) { return ERROR; }
+
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+
+static void release(struct instance *s) {
+    free(s->name);
+    free(s->paces);
+    free(s->cells);
+    free(s);
+}
 
 EXPORT struct instance *fmi2Instantiate(const char *name, int type, const char *token, const char *resources,
                                         const struct callbacks *callbacks, int visible, int logging) {
@@ -231,21 +124,23 @@ EXPORT struct instance *fmi2Instantiate(const char *name, int type, const char *
     if (!s) return NULL;
     s->fmu = *next, s->callbacks = callbacks;
     s->name = calloc(1, strlen(name) + 1);
-    if (s->name) strcpy(s->name, name);
-    s->inner = s->name ? s->fmu.instantiate(name, token, s->fmu.resources, visible != 0, logging != 0, false, false, NULL, 0,
-                                            s, receive, NULL)
-                       : NULL;
+    s->paces = calloc(s->fmu.n_clocks + 1, sizeof *s->paces);
+    s->cells = calloc(s->fmu.n_specials + 1, sizeof *s->cells);
+    if (s->name && s->paces && s->cells) {
+        strcpy(s->name, name);
+        begin(s);
+        s->inner = s->fmu.instantiate(name, token, s->fmu.resources, visible != 0, logging != 0, s->fmu.events != 0,
+                                      s->fmu.early != 0, NULL, 0, s, receive, NULL);
+    }
     if (s->inner) return s;
-    free(s->name);
-    free(s);
+    release(s);
     return NULL;
 }
 
 EXPORT void fmi2FreeInstance(struct instance *s) {
     if (!s) return;
     s->fmu.free_instance(s->inner);
-    free(s->name);
-    free(s);
+    release(s);
 }
 
 EXPORT int fmi2SetDebugLogging(struct instance *s, int on, size_t n, const char *const *categories) {
@@ -261,44 +156,80 @@ EXPORT int fmi2EnterInitializationMode(struct instance *s) {
     return s->fmu.enter_initialization(s->inner, s->tolerates != 0, s->tolerance, s->start, s->stops != 0, s->stop);
 }
 
-EXPORT int fmi2ExitInitializationMode(struct instance *s) { return s->fmu.exit_initialization(s->inner); }
+EXPORT int fmi2ExitInitializationMode(struct instance *s) {
+    if (s->fmu.events) MUST(first_ticks(s));
+    const int status = s->fmu.exit_initialization(s->inner);
+    if (status > WARNING) return status;
+    s->course.running = 1, s->course.now = s->start, s->course.open = s->fmu.events; /* it begins with an event */
+    MUST(settle(s));
+    return status;
+}
 
 EXPORT int fmi2Terminate(struct instance *s) { return s->fmu.terminate(s->inner); }
 
-EXPORT int fmi2Reset(struct instance *s) { return s->fmu.reset(s->inner); }
+EXPORT int fmi2Reset(struct instance *s) {
+    begin(s);
+    return s->fmu.reset(s->inner);
+}
 
 EXPORT int fmi2DoStep(struct instance *s, double time, double step, int no_return) {
-    bool event = false, stop = false, early = false;
-    double reached = time + step;
-    const int status = s->fmu.do_step(s->inner, time, step, no_return != 0, &event, &stop, &early, &reached);
-    if (status > WARNING) return status;
-    if (stop) return say(s, DISCARD, "the FMU asks to end the simulation at t = %g s", reached);
-    if (early) return say(s, DISCARD, "the FMU returned early from its step, at t = %g s, which it was not allowed to", reached);
-    return status;
+    if (s->course.ended) return DISCARD;
+    if (!s->course.running || !(step > 0)) { /* what no master may do is the FMU's to refuse */
+        bool event = false, stop = false, early = false;
+        double reached = time;
+        return s->fmu.do_step(s->inner, time, step, no_return != 0, &event, &stop, &early, &reached);
+    }
+    return step_with_events(s, time, step, no_return != 0);
+}
+
+/* What a step that was refused leaves behind: whether the FMU ended by itself, and how far it came. */
+enum { LAST_SUCCESSFUL_TIME = 2, TERMINATED = 3 };
+
+EXPORT int fmi2GetBooleanStatus(struct instance *s, int kind, int *x) {
+    if (kind != TERMINATED) return DISCARD;
+    *x = s->course.ended != 0;
+    return OK;
+}
+
+EXPORT int fmi2GetRealStatus(struct instance *s, int kind, double *x) {
+    if (kind != LAST_SUCCESSFUL_TIME || !s->course.ended) return DISCARD;
+    *x = s->course.reached;
+    return OK;
 }
 
 /* -- state and derivatives --------------------------------------------------------------------- */
 
-EXPORT int fmi2GetFMUstate(struct instance *s, void **state) { return s->fmu.get_state(s->inner, state); }
+EXPORT int fmi2GetFMUstate(struct instance *s, void **state) {
+    return plain(s) ? s->fmu.get_state(s->inner, state) : save(s, state);
+}
 
-EXPORT int fmi2SetFMUstate(struct instance *s, void *state) { return s->fmu.set_state(s->inner, state); }
+EXPORT int fmi2SetFMUstate(struct instance *s, void *state) {
+    s->course.ended = 0;
+    return plain(s) ? s->fmu.set_state(s->inner, state) : restore(s, state);
+}
 
-EXPORT int fmi2FreeFMUstate(struct instance *s, void **state) { return s->fmu.free_state(s->inner, state); }
+EXPORT int fmi2FreeFMUstate(struct instance *s, void **state) {
+    return plain(s) ? s->fmu.free_state(s->inner, state) : discard(s, state);
+}
 
 EXPORT int fmi2SerializedFMUstateSize(struct instance *s, void *state, size_t *size) {
-    return s->fmu.state_size(s->inner, state, size);
+    if (plain(s)) return s->fmu.state_size(s->inner, state, size);
+    const int status = s->fmu.state_size(s->inner, ((struct saved *)state)->inner, size);
+    *size += beside(s);
+    return status;
 }
 
 EXPORT int fmi2SerializeFMUstate(struct instance *s, void *state, unsigned char *bytes, size_t size) {
-    return s->fmu.serialize(s->inner, state, bytes, size);
+    return plain(s) ? s->fmu.serialize(s->inner, state, bytes, size) : serialize(s, state, bytes, size);
 }
 
 EXPORT int fmi2DeSerializeFMUstate(struct instance *s, const unsigned char *bytes, size_t size, void **state) {
-    return s->fmu.deserialize(s->inner, bytes, size, state);
+    return plain(s) ? s->fmu.deserialize(s->inner, bytes, size, state) : deserialize(s, bytes, size, state);
 }
 
 EXPORT int fmi2GetDirectionalDerivative(struct instance *s, const unsigned *unknown, size_t n_unknown, const unsigned *known,
                                         size_t n_known, const double *seed, double *sensitivity) {
+    MUST(settle(s));
     return s->fmu.derivative(s->inner, unknown, n_unknown, known, n_known, seed, n_known, sensitivity, n_unknown);
 }
 
@@ -312,9 +243,7 @@ NOT_THERE(fmi2SetString, const unsigned *r, size_t n, const char *const *x)
 NOT_THERE(fmi2SetRealInputDerivatives, const unsigned *r, size_t n, const int *order, const double *x)
 NOT_THERE(fmi2GetRealOutputDerivatives, const unsigned *r, size_t n, const int *order, double *x)
 NOT_THERE(fmi2GetStatus, int kind, int *x)
-NOT_THERE(fmi2GetRealStatus, int kind, double *x)
 NOT_THERE(fmi2GetIntegerStatus, int kind, int *x)
-NOT_THERE(fmi2GetBooleanStatus, int kind, int *x)
 NOT_THERE(fmi2GetStringStatus, int kind, const char **x)
 
 EXPORT int fmi2CancelStep(struct instance *s) { return say(s, ERROR, "fmi2CancelStep has no counterpart in FMI 3.0"); }

@@ -108,6 +108,10 @@ class IsolatedComponent(Component):
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._box.read_log(), least)
 
+    def progress_of_step(self) -> tuple[bool, float | None]:
+        ended, reached = self._remote("fmi2GetBooleanStatus", "progress_of_step")
+        return ended, reached
+
     def _how_it_ended(self, status: int) -> str:
         """Crash, hang, exit or flood, in words; the process is ended if it is still there."""
         if self._end is not None:

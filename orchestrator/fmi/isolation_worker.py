@@ -95,6 +95,9 @@ class Worker:
     def do_exit_initialization_mode(self) -> None:
         self._instance().exit_initialization_mode()
 
+    def do_progress_of_step(self) -> list[Any]:
+        return list(self._instance().progress_of_step())
+
     def do_reset(self) -> None:
         self._instance().reset()
 

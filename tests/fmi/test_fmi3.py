@@ -16,6 +16,7 @@ from orchestrator.cases import two_area
 from orchestrator.cases.case import load_case
 from orchestrator.errors import ComponentError, FmuFileError
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.instance import open_component
 from orchestrator.study.modes import modes_of, running
 
@@ -64,7 +65,7 @@ def ours(tmp_path_factory):
 def small(tmp_path):
     """The FMU of small3.c, with another token or without its last function."""
 
-    def write(token="small3", *, whole=True):
+    def write(token="small3", *, whole=True, declares=""):
         source = (Path(__file__).parent / "small3.c").read_text(encoding="utf-8")
         source = source if whole else f"#define WITHOUT_DERIVATIVE\n{source}"
         integers = "".join(
@@ -74,6 +75,7 @@ def small(tmp_path):
         path = tmp_path / "small3.fmu"
         with zipfile.ZipFile(path, "w") as archive:
             text = SMALL.format(integers=integers).replace('Token="small3"', f'Token="{token}"')
+            text = text.replace("<CoSimulation", f"<CoSimulation {declares}")
             archive.writestr("modelDescription.xml", text)
             archive.writestr("binaries/x86_64-linux/small3.so", compile_library(source, "linux64").read_bytes())
         return read_description(path)
@@ -158,7 +160,7 @@ def test_no_fmu_waits_for_a_compiler_while_it_is_checked(ours, gfor, monkeypatch
     for variable in ("GFOR_COSIM_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(variable, raising=False)  # in the home folder, as a user has it
     fmu = ours("gfor", "3.0")
-    compile_here(Path(fmi.__file__).with_name("fmi3_as_fmi2.c"))
+    adapter_path.__wrapped__()
     monkeypatch.setenv("ZIG_LIB_DIR", str(fmu.parent))
     with pytest.raises(RuntimeError, match="the C compiler"):
         compile_library("int never_compiled_before;", host_platform())
@@ -212,7 +214,7 @@ def test_every_numeric_type_is_set_and_read(small):
 @pytest.mark.parametrize(
     ("trouble", "word"),
     [
-        (1, "at t = 0 s: fmi3DoStep returned fmi3Discard: the FMU asks to end the simulation at t = 0.0001 s"),
+        (1, "it ended its simulation at t = 0.0001 s by itself, which is no error; let the run stop by then"),
         (2, "returned early from its step, at t = 5e-05 s"),
         (3, "at t = 0 s: fmi3DoStep returned fmi3Error: 99 % of it is broken"),
     ],
@@ -240,8 +242,14 @@ def test_no_instance(small):
 
 
 def test_a_function_that_is_missing(small):
-    with pytest.raises(ComponentError, match="no function fmi3GetDirectionalDerivative, which every"):
-        open_component("c", small(whole=False), isolated=False)
+    """One that nothing declared needs may be; one that is declared may not."""
+    with open_component("c", small(whole=False), isolated=False) as c:
+        initialised(c).step(0.0, H)
+        with pytest.raises(ComponentError, match="fmi3GetDirectionalDerivative returned nothing: its binary has no such"):
+            c.jacobian(["total"], ["add"])
+    declared = small(whole=False, declares='providesDirectionalDerivatives="true"')
+    with pytest.raises(ComponentError, match="its binary has no function fmi3GetDirectionalDerivative, which an FMU that"):
+        open_component("c", declared, isolated=False)
 
 
 def test_a_binary_in_the_folder_of_fmi_2(small, tmp_path):

@@ -1,0 +1,153 @@
+"""An FMU's binary: loaded, with a reason where it cannot be, and its functions compared with what the FMU declares."""
+
+import ctypes
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave
+
+from orchestrator.errors import FmuFileError, UnsupportedFmuError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.fmi3 import FUNCTIONS as FUNCTIONS_OF_3
+from orchestrator.fmi.fmi3 import in_words_of_3, needed_functions
+
+_FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))
+"""Those of co-simulation."""
+
+_ALWAYS = ("fmi2Instantiate", "fmi2FreeInstance", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
+           "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset", "fmi2DoStep", "fmi2GetReal",
+           "fmi2SetReal")  # fmt: skip
+
+_MISSING = (re.compile(r"^([^/:\s]+): cannot open shared object file"), re.compile(r"Library not loaded: (?:\S*/)?(\S+)"))
+_NEWER = re.compile(r"version [`']([^']+)' not found")
+_UNDEFINED = re.compile(r"undefined symbol: (\w+)")
+
+
+def binary_path(description: FmuDescription, directory: Path) -> Path:
+    """Where an extracted FMU has its binary for this platform.
+
+    Raises
+    ------
+    FmuFileError
+        If it is not there.
+    """
+    newer = description.fmi_version == "3.0"
+    folder = (directory / "binaries" / (fmpy.platform_tuple if newer else fmpy.platform)).resolve()
+    library = folder / f"{description.model_identifier}{fmpy.sharedLibraryExtension}"
+    if not library.is_file():
+        raise FmuFileError(
+            f"{description.path}: it has no binaries/{folder.name}/{library.name}, where an FMU of FMI "
+            f"{description.fmi_version} has its binary for this platform; export it again"
+        )
+    return library
+
+
+def load(description: FmuDescription, directory: Path) -> ctypes.CDLL:
+    """The binary of an extracted FMU, loaded.
+
+    Raises
+    ------
+    UnsupportedFmuError
+        If this machine lacks what it needs.
+    FmuFileError
+        If it is not there, or cannot be loaded anywhere.
+    """
+    library, before = binary_path(description, directory), os.getcwd()
+    os.chdir(library.parent)  # where some binaries look for what they depend on
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        raise _not_loaded(description.path, library, str(error)) from error
+    finally:
+        os.chdir(before)
+
+
+def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
+    """The loader's words as an error: what is missing here, or what is wrong with the binary."""
+    for pattern in _MISSING:
+        if found := pattern.search(text):
+            name = found.group(1)
+            if (library.parent / name).is_file():
+                return FmuFileError(
+                    f"{fmu}: its binary needs {name}, which lies beside it and where it does not look; it must be linked "
+                    "with $ORIGIN in its path, ask its author"
+                )
+            return UnsupportedFmuError(
+                f"{fmu}: it needs {name}, which this machine has not; install it", "missing system library"
+            )
+    if found := _NEWER.search(text):
+        return UnsupportedFmuError(
+            f"{fmu}: it needs {found.group(1)}, and this system is older; run it on a newer one, or ask for a build that "
+            "needs less",
+            "newer system needed",
+        )
+    if found := _UNDEFINED.search(text):
+        return FmuFileError(
+            f"{fmu}: its binary calls {found.group(1)}, which is in none of the libraries that it names; ask its author"
+        )
+    return FmuFileError(f"{fmu}: its binary cannot be loaded: {text}; ask its author for one that can")
+
+
+def absent_functions(description: FmuDescription, library: ctypes.CDLL) -> tuple[list[str], list[str]]:
+    """Functions that a binary lacks: those that it needs by what it declares, and the others of its version of FMI."""
+    if description.fmi_version == "3.0":
+        every, needed = [f"fmi3{name}" for name in FUNCTIONS_OF_3], {f"fmi3{n}" for n in needed_functions(description)}
+        every += [name for name in sorted(needed) if name not in every]
+    else:
+        every, needed = list(_FUNCTIONS), _needed(description)
+    absent = [name for name in every if not hasattr(library, name)]
+    return [name for name in absent if name in needed], [name for name in absent if name not in needed]
+
+
+def _needed(description: FmuDescription) -> set[str]:
+    types = {v.type for v in description.variables.values()}
+    needed = set(_ALWAYS)
+    if types & {"Integer", "Enumeration"}:
+        needed |= {"fmi2GetInteger", "fmi2SetInteger"}
+    if "Boolean" in types:
+        needed |= {"fmi2GetBoolean", "fmi2SetBoolean"}
+    if description.can_save_state:
+        needed |= {"fmi2GetFMUstate", "fmi2SetFMUstate", "fmi2FreeFMUstate"}
+    if description.can_serialize_state:
+        needed |= {"fmi2SerializedFMUstateSize", "fmi2SerializeFMUstate", "fmi2DeSerializeFMUstate"}
+    return needed | ({"fmi2GetDirectionalDerivative"} if description.gives_directional_derivatives else set())
+
+
+class _Absent:
+    """In the place of a function that a binary does not have; fmpy describes it like any other."""
+
+    def __init__(self, refuse: Callable[[], Any]) -> None:
+        self._refuse = refuse
+
+    def __call__(self, *_: Any) -> Any:
+        return self._refuse()
+
+
+class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
+    """fmpy's instance, which does without functions that nobody needs; its name begins as fmpy wants it.
+
+    Parameters
+    ----------
+    absent
+        Names of functions that are not there.
+    refuse
+        Raises an error that names such a function.
+    """
+
+    def __init__(self, absent: set[str], refuse: Callable[[str], Any], **arguments: Any) -> None:
+        self._absent_functions, self._refuse_call = absent, refuse
+        super().__init__(**arguments)
+
+    def _loadFunctions(self) -> None:  # noqa: N802 - fmpy's name
+        for name in self._absent_functions:
+            setattr(self.dll, name, _Absent(lambda name=name: self._refuse_call(name)))  # type: ignore[misc]
+        super()._loadFunctions()
+
+
+def in_words_of_2(absent: set[str]) -> set[str]:
+    """Functions of FMI 2.0 that go to functions of FMI 3.0 which are absent."""
+    return {name for name in _FUNCTIONS if in_words_of_3(name) in absent}
