@@ -83,16 +83,23 @@ class NotFiniteError(ComponentError):
         super().__init__(component, "fmi2GetReal", "not a number", said, time)
 
 
-class EndedError(ComponentError):
-    """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s]."""
+class EndedError(CosimError):
+    """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s].
 
-    def __init__(self, component: str, call: str, status: str, log: str, time: float, ended_at: float) -> None:
-        super().__init__(component, call, status, log, time)
-        self.ended_at = ended_at
+    Attributes
+    ----------
+    status, log
+        What the call returned, and the FMU's own words.
+    time
+        Of the step that it did not make [s].
+    """
+
+    def __init__(self, component: str, status: str, log: str, time: float, ended_at: float) -> None:
+        self.component, self.status, self.log, self.time, self.ended_at = component, status, log, time, ended_at
         said = f" (it says: {log})" if log else ""
-        self.args = (
-            f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error{said}; "
-            "let the run stop by then",
+        super().__init__(
+            f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error"
+            f"{said}; let the run stop by then"
         )
 
 

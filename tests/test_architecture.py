@@ -178,7 +178,7 @@ def test_there_is_no_cycle():
         ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
         (
             "fmpy",
-            {f"orchestrator.fmi.{name}" for name in ("component", "description", "fmi3", "messages", "validation")},
+            {f"orchestrator.fmi.{name}" for name in ("binary", "component", "description", "messages", "validation")},
         ),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -11,12 +12,20 @@ from orchestrator.cases.use import use_in_case
 from orchestrator.cli.arguments import positive
 from orchestrator.errors import InputError
 from orchestrator.fmi.limits import Limits
-from orchestrator.vendor.checks.base import Verdict
+from orchestrator.vendor.checks.base import Result, Verdict
 from orchestrator.vendor.checks.subject import Use
 from orchestrator.vendor.junit import write_junit
 from orchestrator.vendor.runner import Report, check_fmu
 
-_COLOURS = {Verdict.PASS: "green", Verdict.REMARK: "yellow", Verdict.FAIL: "bold red", Verdict.NOT_APPLICABLE: "dim"}
+_COLOURS = {
+    Verdict.PASS: "green",
+    Verdict.REMARK: "yellow",
+    Verdict.FAIL: "bold red",
+    Verdict.NOT_APPLICABLE: "dim",
+    Verdict.NOT_SUPPORTED: "bold yellow",
+}
+NOT_SUPPORTED = 2
+"""Exit code where nothing failed, but the FMU could not be run here."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check, print, and write what is asked for; 1 if a check failed."""
+    """Check, print, and write what is asked for; 1 if a check failed, 2 if the FMU is not supported here."""
     limits = Limits(seconds=options.time_limit, memory=int(options.memory_limit * 1024**2))
     use, binding = Use(options.step), options.binding
     if options.case:
@@ -51,12 +60,23 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(report.as_dict(), indent=1, ensure_ascii=False))
     else:
         _print(report)
-    return 0 if report.trusted else 1
+    return 1 if report.failures else NOT_SUPPORTED if report.not_supported else 0
+
+
+def _each_once(results: list[Result]) -> list[Result]:
+    """What was not asked for one and the same reason goes into one line."""
+    lines: list[Result] = []
+    for result in results:
+        if result.verdict is Verdict.NOT_APPLICABLE and lines and lines[-1].evidence == result.evidence:
+            lines[-1] = replace(lines[-1], check=f"{lines[-1].check}, {result.check}")
+        else:
+            lines.append(result)
+    return lines
 
 
 def _print(report: Report) -> None:
     console = Console(soft_wrap=True, highlight=False, emoji=False)
-    for result in report.results:
+    for result in _each_once(report.results):
         mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
         fault = f"[bold]{result.fault}:[/] " if result.fault else ""
         console.print(f"{mark} {result.check:<22} {fault}{escape(_in_one_line(result.evidence))}")
@@ -67,6 +87,11 @@ def _print(report: Report) -> None:
         console.print(f"This system could not limit: {', '.join(report.unlimited)}.")
     if report.trusted:
         console.print(f"{report.fmu.name}: no check failed.")
+    elif not report.failures:
+        console.print(
+            f"[bold yellow]{report.fmu.name}: not supported here: {', '.join(report.not_supported)}; that says nothing "
+            "about the FMU[/]"
+        )
     else:
         console.print(f"[bold red]{report.fmu.name}: do not use it as it is: {', '.join(report.faults)}[/]")
 

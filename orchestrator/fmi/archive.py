@@ -13,6 +13,7 @@ import tempfile
 import unicodedata
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -106,6 +107,18 @@ def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
         return tuple(entry.filename for entry in archive.infolist())
 
 
+def listed_twice(path: Path) -> tuple[str, ...]:
+    """Names of files that an archive lists more than once, with the same bytes.
+
+    Raises
+    ------
+    FmuFileError
+        As `extract`.
+    """
+    names = [name for name in names_in(path) if not name.endswith("/")]
+    return tuple(name for name, count in Counter(names).items() if count > 1)
+
+
 def extract(path: Path, folder: Path | None = None) -> Path:
     """Unpack an FMU into a folder of its own.
 
@@ -130,7 +143,8 @@ def extract(path: Path, folder: Path | None = None) -> Path:
         target.mkdir(parents=True, exist_ok=True)
         try:
             left = MOST_BYTES
-            for entry in archive.infolist():
+            entries = {entry.filename: entry for entry in archive.infolist()}  # listed twice, with the same bytes: once
+            for entry in entries.values():
                 left = _write(archive, entry, target, left, path)
         except BaseException:
             shutil.rmtree(target, ignore_errors=True)
@@ -180,7 +194,7 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
                 f"{path}: it is not an {kind}: an {ending} is a zip archive and this file is not; export it again"
             )
         with zipfile.ZipFile(path) as archive:
-            _check_entries(path, archive.infolist())
+            _check_entries(path, archive)
             yield archive
     except _DAMAGE as error:
         raise FmuFileError(
@@ -190,30 +204,48 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
         raise FmuFileError(f"{path}: the file cannot be unpacked: {error.strerror or error}") from error
 
 
-def _check_entries(path: Path, entries: list[zipfile.ZipInfo]) -> None:
+def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
+    entries = archive.infolist()
     if len(entries) > MOST_FILES:
         raise HostileFmuError(f"{path}: the archive has {len(entries)} files; at most {MOST_FILES} are unpacked")
-    seen: dict[str, str] = {}
+    _check_sizes(path, sum(e.file_size for e in entries), sum(e.compress_size for e in entries))
+    seen: dict[str, zipfile.ZipInfo] = {}
     for entry in entries:
         fault = _fault_of(entry)
         key = unicodedata.normalize("NFC", entry.filename.rstrip("/")).casefold()
-        if fault is None and key in seen and not (entry.is_dir() and seen[key].endswith("/")):
-            fault = f"the same file as {seen[key]!r} on some systems"
+        if fault is None and key in seen and not _harmless_twin(archive, seen[key], entry):
+            fault = f"the same file as {seen[key].filename!r}{_on(seen[key], entry)}"
         if fault is not None:
             raise HostileFmuError(
                 f"{path}: the archive has an entry {_shown(entry.orig_filename)}, which is {fault}; do not trust this "
                 "file, or ask for it to be packed again",
                 "path traversal" if fault in _OUTSIDE else "hostile archive",
             )
-        seen[key] = entry.filename
+        seen[key] = entry
     for entry in entries:
         for parent in PurePosixPath(entry.filename).parents:
             above = seen.get(unicodedata.normalize("NFC", str(parent)).casefold())
-            if above is not None and not above.endswith("/"):
+            if above is not None and not above.is_dir():
                 raise HostileFmuError(
-                    f"{path}: the archive has {_shown(above)} as a file and as a folder; pack it again"
+                    f"{path}: the archive has {_shown(above.filename)} as a file and as a folder; pack it again"
                 )
-    _check_sizes(path, sum(e.file_size for e in entries), sum(e.compress_size for e in entries))
+
+
+def _harmless_twin(archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zipfile.ZipInfo) -> bool:
+    """Whether two entries of one place are the same folder, or one file with the same bytes, listed twice."""
+    if first.is_dir() or second.is_dir():
+        return first.is_dir() and second.is_dir()
+    if first.filename != second.filename or first.file_size != second.file_size:
+        return False
+    with archive.open(first) as one, archive.open(second) as other:
+        while chunk := one.read(_CHUNK):
+            if chunk != other.read(_CHUNK):
+                return False
+    return True
+
+
+def _on(first: zipfile.ZipInfo, second: zipfile.ZipInfo) -> str:
+    return ", with other bytes" if first.filename == second.filename else " on some systems"
 
 
 def _check_sizes(path: Path, unpacked: int, packed: int) -> None:

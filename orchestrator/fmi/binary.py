@@ -22,7 +22,10 @@ _ALWAYS = ("fmi2Instantiate", "fmi2FreeInstance", "fmi2SetupExperiment", "fmi2En
            "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset", "fmi2DoStep", "fmi2GetReal",
            "fmi2SetReal")  # fmt: skip
 
-_MISSING = (re.compile(r"^([^/:\s]+): cannot open shared object file"), re.compile(r"Library not loaded: (?:\S*/)?(\S+)"))
+_MISSING = (
+    re.compile(r"^([^/:\s]+): cannot open shared object file"),
+    re.compile(r"Library not loaded: (?:\S*/)?(\S+)"),
+)
 _NEWER = re.compile(r"version [`']([^']+)' not found")
 _UNDEFINED = re.compile(r"undefined symbol: (\w+)")
 
@@ -37,7 +40,7 @@ def binary_path(description: FmuDescription, directory: Path) -> Path:
     """
     newer = description.fmi_version == "3.0"
     folder = (directory / "binaries" / (fmpy.platform_tuple if newer else fmpy.platform)).resolve()
-    library = folder / f"{description.model_identifier}{fmpy.sharedLibraryExtension}"
+    library: Path = folder / f"{description.model_identifier}{fmpy.sharedLibraryExtension}"
     if not library.is_file():
         raise FmuFileError(
             f"{description.path}: it has no binaries/{folder.name}/{library.name}, where an FMU of FMI "
@@ -73,16 +76,16 @@ def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
             name = found.group(1)
             if (library.parent / name).is_file():
                 return FmuFileError(
-                    f"{fmu}: its binary needs {name}, which lies beside it and where it does not look; it must be linked "
-                    "with $ORIGIN in its path, ask its author"
+                    f"{fmu}: its binary needs {name}, which lies beside it and where it does not look; it must be "
+                    "linked with $ORIGIN in its path, ask its author"
                 )
             return UnsupportedFmuError(
                 f"{fmu}: it needs {name}, which this machine has not; install it", "missing system library"
             )
     if found := _NEWER.search(text):
         return UnsupportedFmuError(
-            f"{fmu}: it needs {found.group(1)}, and this system is older; run it on a newer one, or ask for a build that "
-            "needs less",
+            f"{fmu}: it needs {found.group(1)}, and this system is older; run it on a newer one, or ask for a build "
+            "that needs less",
             "newer system needed",
         )
     if found := _UNDEFINED.search(text):
@@ -142,7 +145,7 @@ class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
         self._absent_functions, self._refuse_call = absent, refuse
         super().__init__(**arguments)
 
-    def _loadFunctions(self) -> None:  # noqa: N802 - fmpy's name
+    def _loadFunctions(self) -> None:
         for name in self._absent_functions:
             setattr(self.dll, name, _Absent(lambda name=name: self._refuse_call(name)))  # type: ignore[misc]
         super()._loadFunctions()

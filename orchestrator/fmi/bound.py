@@ -139,6 +139,9 @@ class BoundComponent(Component):
     def check(self, status: int, call: str, time: float | None = None) -> None:
         self.inner.check(status, call, time)
 
+    def progress_of_step(self) -> tuple[bool, float | None]:
+        return self.inner.progress_of_step()
+
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
         return self.inner._call(call, function, *arguments)
 

@@ -1,4 +1,4 @@
-"""Clocks of an FMU of FMI 3.0, and the variables that come and go with them, as its file declares them."""
+"""Clocks of an FMU of FMI 3.0, and variables that come and go with them, as its file declares them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ class Clock:
     Attributes
     ----------
     variability
-        By FMI 3.0: constant, fixed and tunable ones are periodic; changing and countdown ones tell the next interval after
-        events; triggered ones depend on others' clocks.
+        By FMI 3.0: constant, fixed and tunable ones are periodic; changing and countdown ones tell the next interval
+        after events; triggered ones depend on others' clocks.
     interval
         Between two ticks [s]; None where the FMU is asked for it.
     shift
@@ -62,7 +62,9 @@ def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -
     said = {**({} if declared is None else declared.attrib), **element.attrib}
     name, variability = said["name"], said.get("intervalVariability", "")
     if variability not in _VARIABILITIES:
-        raise FmuFileError(f"clock {name!r} has intervalVariability {variability!r}; FMI knows {', '.join(_VARIABILITIES)}")
+        raise FmuFileError(
+            f"clock {name!r} has intervalVariability {variability!r}; FMI knows {', '.join(_VARIABILITIES)}"
+        )
     interval = _seconds(said, "interval")
     clock = Clock(
         name, int(said["valueReference"]), said.get("causality", "local"), variability,
@@ -85,7 +87,7 @@ def _seconds(said: Mapping[str, str], what: str) -> float | None:
 
 
 def special_variables(root: ElementTree.Element) -> dict[int, tuple[int, ...]]:
-    """References of variables that belong to clocks, with their clocks' references; of those whose change is an event."""
+    """References of variables that belong to clocks, with their clocks'; of those whose change is an event."""
     asks = any(c.variability == "tunable" and c.interval is None for c in clocks_of(root))
     found: dict[int, tuple[int, ...]] = {}
     for element in root.iterfind("ModelVariables/*"):

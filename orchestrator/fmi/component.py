@@ -153,7 +153,9 @@ class Component:
 
     def _refuse_absent(self, call: str) -> None:
         call = self._in_its_words(call)
-        raise ComponentError(self.name, call, "nothing", "its binary has no such function, and its file declares no need")
+        raise ComponentError(
+            self.name, call, "nothing", "its binary has no such function, and its file declares no need"
+        )
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
@@ -184,10 +186,11 @@ class Component:
             said = "; ".join(self._texts(1) or self._texts())
             words = self._in_its_words(call)
             if status == _DISCARD and call == "fmi2DoStep" and time is not None:
+                failed = bool(self._texts(_DISCARD))  # some say that they ended whenever a step failed
                 ended, reached = self.progress_of_step()
-                if ended:
+                if ended and not failed:
                     at = time if reached is None else reached
-                    raise EndedError(self.name, words, name, said, time, at)
+                    raise EndedError(self.name, name, said, time, at)
                 said = said or _partly(reached, time)
             said = said or f"it logs no text; {_SILENT.get(status, 'FMI knows no such status')}"
             raise ComponentError(self.name, words, name, said, time)

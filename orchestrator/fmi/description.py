@@ -93,8 +93,8 @@ class FmuDescription:
     clocks
         Of FMI 3.0, where it has an event mode.
     specials
-        Of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references; of
-        every other variable whose change is an event, and nothing.
+        Of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references;
+        of every other variable whose change is an event, and nothing.
     """
 
     path: Path
@@ -177,8 +177,8 @@ def read_description(path: Path | str) -> FmuDescription:
     if described is None:
         kinds = [words for name, words in _OTHER_KINDS.items() if ElementTree.fromstring(text).find(name) is not None]
         raise UnsupportedFmuError(
-            f"{path}: it is not an FMU for co-simulation ({' and '.join(kinds) or 'of no kind'} only), which this master "
-            "needs; ask for that export",
+            f"{path}: it is not an FMU for co-simulation ({' and '.join(kinds) or 'of no kind'} only), which this "
+            "master needs; ask for that export",
             "no co-simulation",
         )
     if fmpy.platform not in platforms:
@@ -251,7 +251,9 @@ def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
     interface = root.find("CoSimulation")
     if version != "3.0" or interface is None:
         return {}
-    says = {name: interface.get(name) in ("true", "1") for name in ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate")}
+    says = {
+        name: interface.get(name) in ("true", "1") for name in ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate")
+    }
     found: dict[str, Any] = {"has_event_mode": says["hasEventMode"], "returns_early": any(says.values())}
     if says["hasEventMode"]:
         found |= {"clocks": clocks_of(root), "specials": special_variables(root)}

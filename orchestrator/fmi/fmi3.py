@@ -136,14 +136,14 @@ def refuse_other_clocks(description: FmuDescription) -> None:
     others = [c.name for c in description.clocks if c.needs_another]
     if others:
         raise UnsupportedFmuError(
-            f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has clocks "
-            "that tick by the time only; ask for an export with periodic clocks",
+            f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has "
+            "clocks that tick by the time only; ask for an export with periodic clocks",
             "triggered clocks",
         )
     if len(description.clocks) > MOST_CLOCKS:
         raise UnsupportedFmuError(
-            f"{description.path}: it has {len(description.clocks)} clocks, and this master has room for {MOST_CLOCKS}; ask "
-            "for an export with fewer",
+            f"{description.path}: it has {len(description.clocks)} clocks, and this master has room for {MOST_CLOCKS}; "
+            "ask for an export with fewer",
             "too many clocks",
         )
 
@@ -189,7 +189,9 @@ def _described(clock: Clock) -> _Clock:
     kind = "periodic" if clock.periodic else "output" if clock.variability == "triggered" else clock.variability
     asked = kind != "output" and clock.interval is None
     interval = 0.0 if clock.interval is None else clock.interval
-    return _Clock(interval, clock.shift, clock.reference, _CLOCK_KINDS.index(kind), asked, clock.variability == "tunable")
+    return _Clock(
+        interval, clock.shift, clock.reference, _CLOCK_KINDS.index(kind), asked, clock.variability == "tunable"
+    )
 
 
 def _specials(description: FmuDescription) -> list[_Special]:

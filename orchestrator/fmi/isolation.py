@@ -21,7 +21,7 @@ from ctypes import c_double, c_int, c_size_t, c_void_p  # isort: skip
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ComponentError, InputError, NotFiniteError
+from orchestrator.errors import ComponentError, InputError, NotFiniteError, UnsupportedFmuError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
@@ -157,6 +157,8 @@ class IsolatedComponent(Component):
         with calls:
             self.check(self._box.library.mailbox_talk(self._box.address), call)
         answer = self._box.read_text()
+        if "unsupported" in answer:
+            raise UnsupportedFmuError(*answer["unsupported"])
         if "input_error" in answer:
             raise InputError(answer["input_error"])
         if "component_error" in answer:

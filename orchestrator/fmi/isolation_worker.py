@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import ComponentError, CosimError
+from orchestrator.errors import ComponentError, CosimError, UnsupportedFmuError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
@@ -61,6 +61,8 @@ class Worker:
             answer = {"result": function(*arguments)}
         except ComponentError as error:
             answer = {"component_error": [error.call, error.status, error.log]}
+        except UnsupportedFmuError as error:
+            answer = {"unsupported": [str(error), error.kind]}
         except CosimError as error:
             answer = {"input_error": str(error)}
         except MemoryError:

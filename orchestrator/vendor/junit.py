@@ -23,7 +23,7 @@ def write_junit(report: Report, path: Path) -> None:
         tests=str(len(results)),
         failures=str(len(report.failures)),
         skipped=str(sum(r.verdict is Verdict.NOT_APPLICABLE for r in results)),
-        errors="0",
+        errors=str(sum(r.verdict is Verdict.NOT_SUPPORTED for r in results)),
     )
     for result in results:
         case = SubElement(suite, "testcase", classname=report.fmu.stem, name=result.check)
@@ -31,6 +31,9 @@ def write_junit(report: Report, path: Path) -> None:
         if result.verdict is Verdict.FAIL:
             failure = SubElement(case, "failure", message=result.fault, type=result.fault)
             failure.text = f"{text}\nremedy: {result.remedy}"
+        elif result.verdict is Verdict.NOT_SUPPORTED:
+            error = SubElement(case, "error", message=f"not supported here: {result.fault}", type=result.fault)
+            error.text = f"{text}\nremedy: {result.remedy}"
         elif result.verdict is Verdict.NOT_APPLICABLE:
             SubElement(case, "skipped", message=text)
         else:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import TO_BEGIN, Limits
@@ -137,6 +137,8 @@ class FmuProcess:
             raise self._tampered(f"{error}") from error
         if kind == "component_error":
             raise ComponentError("fmu", at, how, log)
+        if kind == "unsupported" and isinstance(content, list) and len(content) == 2:
+            raise UnsupportedFmuError(str(content[0]), str(content[1]))
         if kind == "input_error":
             raise InputError(str(content))
         return content
@@ -197,6 +199,20 @@ class FmuProcess:
         if isinstance(answer, dict) and all(isinstance(value, int | float) for value in answer.values()):
             return answer
         raise self._tampered("a table that is none")
+
+    def progress(self, answer: Any) -> tuple[bool, float | None]:
+        """Whether it ended by itself, and when, as an answer must say it."""
+        if isinstance(answer, list) and len(answer) == 2:
+            ended, reached = answer
+            if isinstance(ended, bool) and (reached is None or isinstance(reached, int | float)):
+                return ended, reached
+        raise self._tampered("an answer that is none")
+
+    def names(self, answer: Any) -> list[str]:
+        """The list of texts that an answer must be."""
+        if isinstance(answer, list) and all(isinstance(text, str) for text in answer):
+            return answer
+        raise self._tampered("a list that is none")
 
     def hexadecimal(self, answer: Any) -> bytes:
         """The bytes that an answer must be."""
@@ -301,6 +317,9 @@ class HostedComponent(Component):
 
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._process.box.read_log(), least)
+
+    def progress_of_step(self) -> tuple[bool, float | None]:
+        return self._process.progress(self._remote("fmi2GetBooleanStatus", "progress_of_step"))
 
     def _remote(self, call: str, command: str, *arguments: Any, ask: Any = None) -> Any:
         try:

@@ -11,15 +11,33 @@ from shutil import rmtree
 from time import monotonic
 from typing import Any
 
-from orchestrator.errors import BindingError, ComponentError, CosimError, FmuFileError, HostileFmuError, InputError
-from orchestrator.fmi.archive import extract
+from orchestrator.errors import (
+    BindingError,
+    ComponentError,
+    CosimError,
+    EndedError,
+    FmuFileError,
+    HostileFmuError,
+    InputError,
+    UnsupportedFmuError,
+)
+from orchestrator.fmi.archive import extract, listed_twice
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.vendor.binding import bind, read_table
-from orchestrator.vendor.checks.all import CHECKS
-from orchestrator.vendor.checks.base import Check, Result, Verdict, failed, not_applicable, passed
+from orchestrator.vendor.checks.all import CHECKS, ORDER
+from orchestrator.vendor.checks.base import (
+    Check,
+    Result,
+    Verdict,
+    failed,
+    not_applicable,
+    not_supported,
+    passed,
+    remarked,
+)
 from orchestrator.vendor.checks.running import RUN_FOR
 from orchestrator.vendor.checks.subject import Subject, Use
 from orchestrator.vendor.process import FmuProcess, ProcessEndedError
@@ -53,9 +71,14 @@ class Report:
         return list(dict.fromkeys(r.fault for r in self.failures))
 
     @property
+    def not_supported(self) -> list[str]:
+        """Names of what this program or machine lacks for this FMU, each once."""
+        return list(dict.fromkeys(r.fault for r in self.results if r.verdict is Verdict.NOT_SUPPORTED))
+
+    @property
     def trusted(self) -> bool:
-        """Whether nothing failed."""
-        return not self.failures
+        """Whether it was checked, and nothing failed."""
+        return not self.failures and not self.not_supported
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -63,6 +86,7 @@ class Report:
             "binding": None if self.binding is None else str(self.binding),
             "trusted": self.trusted,
             "faults": self.faults,
+            "not_supported": self.not_supported,
             "not_limited": list(self.unlimited),
             "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
         }
@@ -114,12 +138,15 @@ def check_fmu(
     try:
         native = read_description(fmu)
         directory = extract(fmu)
+    except UnsupportedFmuError as error:
+        report.results.append(not_supported("archive", error))
+        return report
     except FmuFileError as error:
         fault = error.kind if isinstance(error, HostileFmuError) else "unreadable"
         report.results.append(failed("archive", fault, str(error)))
         return report
     try:
-        report.results.append(passed("archive", "unpacked within limits, and read"))
+        report.results.append(_unpacked(fmu))
         bound = None if binding is None else _bound(report, native, binding)
         compile_adapters(bound or native)  # here, where nobody waits for the FMU
         subject = Subject(bound or native, directory, use)
@@ -132,6 +159,18 @@ def check_fmu(
     finally:
         rmtree(directory, ignore_errors=True)
     return report
+
+
+def _unpacked(fmu: Path) -> Result:
+    twice = listed_twice(fmu)
+    if not twice:
+        return passed("archive", "unpacked within limits, and read")
+    more = f" and {len(twice) - 3} more" if len(twice) > 3 else ""
+    return remarked(
+        "archive",
+        f"it lists {', '.join(twice[:3])}{more} twice, with equal bytes",
+        "does no harm; other tools may refuse the file, tell whoever packed it",
+    )
 
 
 def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescription | None:
@@ -171,15 +210,23 @@ class _Runner:
             self._deadline = monotonic() + _PATIENCE * self._limits.seconds
             result = self._answer(CHECKS[name])
             results.append(result)
-            if name == "runs" and self._process is not None and not self._process.alive:
-                because = f"because it ended its process in 'runs' ({result.fault})"
+            if name == "runs" and (because := self._too_bad(result)):
                 results += [not_applicable(later, because) for later in names[place + 1 :]]
                 return
 
+    def _too_bad(self, result: Result) -> str:
+        """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""
+        if self._process is not None and not self._process.alive:
+            return f"because it ended its process in 'runs' ({result.fault})"
+        return "because it ends before it shows anything" if result.fault == "ends at once" else ""
+
     def _answer(self, check: Check) -> Result:
         """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
-        faulty = [r.check for r in self._report.failures]
-        missing = [name for name in check.needs if name in faulty]
+        faulty = [r.check for r in self._report.results if r.fault]
+        asked_of_the_file = ORDER.index(check.name) <= ORDER.index("loads")
+        missing = [name for name in ("loads", *check.needs) if name in faulty and not asked_of_the_file]
+        if missing == ["loads"] and self._report.not_supported:
+            return not_applicable(check.name, "because the FMU cannot run here")
         if missing:
             return not_applicable(check.name, f"because it failed in {missing[0]!r}, without which this has no meaning")
         self._subject.doing = ""
@@ -188,6 +235,10 @@ class _Runner:
         except ProcessEndedError as error:
             doing = self._subject.doing
             return failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
+        except EndedError as error:
+            return _ended(check.name, self._subject, error)
+        except UnsupportedFmuError as error:
+            return not_supported(check.name, error)
         except ComponentError as error:
             return failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
         except InputError:
@@ -202,6 +253,16 @@ class _Runner:
     def close(self) -> None:
         if self._process is not None:
             self._process.close()
+
+
+def _ended(name: str, subject: Subject, error: EndedError) -> Result:
+    """An orderly end is no fault; one that comes earlier than before is worth a word."""
+    if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
+        says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"
+        return remarked(
+            name, f"{says}, earlier than otherwise", "no error, but this could not be checked; ask why it ends"
+        )
+    return not_applicable(name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s")
 
 
 _REFUSED = {

@@ -8,8 +8,10 @@ import gc
 import json
 import os
 import sys
+from pathlib import Path
 from typing import Any
 
+from orchestrator.fmi.binary import absent_functions, load
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
@@ -53,6 +55,11 @@ class Host(Worker):
         functions = (component.set_real, component.get_real, component.do_step)
         self._table[number] = Served(component.pointer, *(ctypes.cast(f, ctypes.c_void_p).value for f in functions))
         return number
+
+    def do_absent_functions(self) -> list[list[str]]:
+        """Functions that the binary lacks: those that it needs by what it declares, and the others."""
+        described = self._description.native if isinstance(self._description, BoundDescription) else self._description
+        return list(absent_functions(described, load(described, Path(self._request["directory"]))))
 
     def do_close(self, lost: bool) -> None:
         component = self._instances.pop(self._asked)

@@ -49,7 +49,11 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
     <Output valueReference="11" dependencies=""/><Output valueReference="12" dependencies="13"/>
     <Output valueReference="22" dependencies=""/><Output valueReference="24" dependencies=""/>
     <Output valueReference="31" dependencies=""/><Output valueReference="51" dependencies=""/>
-    <Output valueReference="62" dependencies=""/>
+    <Output valueReference="50" dependencies="10"/><Output valueReference="62" dependencies=""/>
+    <InitialUnknown valueReference="1" dependencies=""/><InitialUnknown valueReference="2" dependencies=""/>
+    <InitialUnknown valueReference="22" dependencies=""/><InitialUnknown valueReference="24" dependencies=""/>
+    <InitialUnknown valueReference="31" dependencies=""/><InitialUnknown valueReference="50" dependencies=""/>
+    <InitialUnknown valueReference="62" dependencies=""/>
   </ModelStructure>
 </fmiModelDescription>
 """
@@ -201,7 +205,7 @@ def test_an_end_of_its_own_is_told_with_its_time(fmu, isolated):
     with begun(read_description(fmu()), isolated=isolated, end=0.555) as c:
         for k in range(55):
             c.step(0.01 * k, 0.01)
-        with pytest.raises(EndedError, match="it ended its simulation at t = 0.555 s by itself, which is no error") as e:
+        with pytest.raises(EndedError, match=r"it ended its simulation at t = 0\.555 s by itself") as e:
             c.step(0.55, 0.01)
         assert e.value.ended_at == pytest.approx(0.555)
         with pytest.raises(EndedError):
@@ -210,12 +214,17 @@ def test_an_end_of_its_own_is_told_with_its_time(fmu, isolated):
 
 @pytest.mark.parametrize(
     ("fault", "words"),
-    [("FAULT_ENDLESS", "the events at t = 0.25 s do not come to an end"), ("FAULT_STANDS_STILL", "again and again at t = 0.2")],
+    [
+        ("FAULT_ENDLESS", r"the events at t = 0\.25 s do not come to an end"),
+        ("FAULT_STANDS_STILL", r"again and again at t = 0\.2"),
+    ],
 )
 def test_what_never_gets_on_is_an_error_and_no_hang(fmu, fault, words):
-    with begun(read_description(fmu(fault))) as c, pytest.raises(ComponentError, match=words):
-        for k in range(100):
+    with begun(read_description(fmu(fault))) as c:
+        for k in range(21):
             c.step(0.01 * k, 0.01)
+        with pytest.raises(ComponentError, match=words):
+            c.step(0.21, 0.05)
 
 
 def test_a_clock_of_somebody_else_is_not_supported_here(fmu):
@@ -231,7 +240,11 @@ def test_a_clock_of_somebody_else_is_not_supported_here(fmu):
     [
         ('intervalDecimal="0.3"', "", "clock 'sample' is constant and declares no interval"),
         ('intervalDecimal="0.3"', 'intervalDecimal="-1"', "clock 'sample' has an interval of -1"),
-        ('intervalVariability="changing"', 'intervalVariability="often"', "clock 'growing' has intervalVariability 'often'"),
+        (
+            'intervalVariability="changing"',
+            'intervalVariability="often"',
+            "clock 'growing' has intervalVariability 'often'",
+        ),
     ],
 )
 def test_a_clock_that_fmi_does_not_know(fmu, old, new, words):
@@ -240,9 +253,23 @@ def test_a_clock_that_fmi_does_not_know(fmu, old, new, words):
 
 
 def test_a_fraction_is_exact(fmu):
-    path = fmu(old='intervalDecimal="0.3"', new='intervalDecimal="0.3" resolution="30" intervalCounter="10" shiftCounter="3"')
+    path = fmu(old='intervalDecimal="0.3"', new='resolution="30" intervalCounter="10" shiftCounter="3"')
     (sample, *_) = read_description(path).clocks
     assert (sample.interval, sample.shift) == (10 / 30, 3 / 30)
+
+
+def test_clocks_have_no_start_values(fmu):
+    assert check_fmu(fmu(), only=("declared_starts",)).results[-1].verdict == "pass"
+    bare = fmu(old='start="0" clocks="10"', new='clocks="10"')
+    assert check_fmu(bare, only=("declared_starts",)).faults == ["bad start values"]
+
+
+def test_gfor_check_says_once_that_a_clock_is_not_supported(fmu, gfor):
+    path = fmu(old='intervalVariability="countdown"', new='intervalVariability="triggered"')
+    code, text, _ = gfor("check", path)
+    assert code == 2
+    assert text.count("its clock 'late' is triggered by another FMU's clock") == 1
+    assert "not supported here: triggered clocks" in text
 
 
 @pytest.mark.slow

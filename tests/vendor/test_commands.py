@@ -17,7 +17,9 @@ from orchestrator.study.sweep import plan_sweep
 from orchestrator.study.sweep_axes import parse_vary
 from orchestrator.vendor.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.vendor.checks.base import CHECKS as ENTERED
+from tests.vendor.gallery.build import build
 from tests.vendor.gallery.hostile import entities
+from tests.vendor.gallery.members import converter
 
 FAST = ("--only", "power_balance", "--time-limit", "10")
 
@@ -172,6 +174,15 @@ def test_a_vendors_fmu_that_crashes_leaves_what_was_computed(gfor, gallery, case
     code, _, error = gfor("run", case(gallery("crash")[0]), "--stop", "0.2", "--out", tmp_path / "out")
     assert code == 1
     assert "component 'gfor' at t = 0.05 s: fmi2DoStep returned crash: its process died with" in error
+    run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
+    assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
+
+
+def test_a_vendors_fmu_that_ends_by_itself_says_so(gfor, case, tmp_path):
+    fmu = build(converter("ends_soon", ENDS_AT=0.05), tmp_path)
+    code, _, error = gfor("run", case(fmu), "--stop", "0.1", "--out", tmp_path / "out")
+    assert code == 1
+    assert "component 'gfor': it ended its simulation at t = 0.05 s by itself, which is no error; let the run" in error
     run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
     assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
 

@@ -5,6 +5,7 @@ from orchestrator.vendor.checks import (
     extremes,
     file,
     instances,
+    loading,
     port,
     resources,
     ride_through,
@@ -15,11 +16,14 @@ from orchestrator.vendor.checks import (
     timing,
 )
 
-MODULES = (file, running, instances, state, sampling, timing, port, signs, ride_through, extremes, resources)
+MODULES = (
+    *(file, loading, running, instances, state, sampling, timing),
+    *(port, signs, ride_through, extremes, resources),
+)
 """Importing them enters their checks."""
 
 ORDER = (
-    "fmi_validity", "units", "declared_starts", "declared_dependencies",
+    "fmi_validity", "units", "declared_starts", "declared_dependencies", "loads",
     "runs", "start_values", "call_order", "independence", "repeatability", "reading", "reset", "reinstantiation",
     "state", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
     "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",

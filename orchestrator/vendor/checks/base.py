@@ -6,6 +6,7 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.errors import UnsupportedFmuError
 from orchestrator.vendor.checks.faults import REMEDIES
 
 if TYPE_CHECKING:
@@ -19,6 +20,16 @@ class Verdict(StrEnum):
     REMARK = "remark"
     FAIL = "fail"
     NOT_APPLICABLE = "not applicable"
+    NOT_SUPPORTED = "not supported"
+
+
+class Whose(StrEnum):
+    """Whose matter a finding is."""
+
+    NOBODY = ""
+    FMU = "the FMU"
+    HERE = "not supported here"
+    CALL = "provoked by a forbidden call"
 
 
 @dataclass(frozen=True)
@@ -30,13 +41,16 @@ class Result:
     check
         The check's name.
     fault
-        Name of what is wrong; empty unless the check failed.
+        Name of what is wrong, or not supported; else empty.
     evidence
         What was seen, with figures; for `NOT_APPLICABLE` the reason.
     remedy
         What to do about it.
     figures
         The measured figures, for programs.
+    whose
+        Whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids
+        and only the check makes.
     """
 
     check: str
@@ -45,6 +59,7 @@ class Result:
     fault: str = ""
     remedy: str = ""
     figures: dict[str, Any] = field(default_factory=dict)
+    whose: Whose = Whose.NOBODY
 
     def as_dict(self) -> dict[str, Any]:
         """As JSON has it, which knows no numbers that are none."""
@@ -52,7 +67,7 @@ class Result:
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> "Result":
-        return cls(**{**values, "verdict": Verdict(values["verdict"])})
+        return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
 
 
 def _plain(value: Any) -> Any:
@@ -112,8 +127,22 @@ def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> Result:
 
 
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> Result:
-    return Result(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures)
+    return Result(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 
 
 def not_applicable(name: str, because: str) -> Result:
     return Result(name, Verdict.NOT_APPLICABLE, because)
+
+
+def not_supported(name: str, error: UnsupportedFmuError) -> Result:
+    """What this program or this machine cannot do, which says nothing about the FMU."""
+    evidence, _, remedy = str(error).rpartition("; ")
+    return Result(name, Verdict.NOT_SUPPORTED, evidence or remedy, error.kind, remedy, whose=Whose.HERE)
+
+
+def provoked(name: str, evidence: str) -> Result:
+    """What an FMU does after a call that FMI forbids."""
+    remedy = "only this check makes such a call, and our master never does; an FMU should refuse it, tell the author"
+    return Result(
+        name, Verdict.REMARK, f"a call that FMI forbids provoked it: {evidence}", "", remedy, whose=Whose.CALL
+    )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, EndedError
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.vendor.checks.running import EQUAL, affordable
 from orchestrator.vendor.checks.subject import Subject, Vector, difference
@@ -45,6 +45,8 @@ def _answer(subject: Subject, deviation: Vector) -> str:
             values = running.read()
     except ComponentError as error:
         return f"{error.call} says {error.status}"
+    except EndedError:
+        return "it ends its simulation"
     return "no error, and finite outputs" if np.isfinite(values).all() else "no error, and outputs that are no numbers"
 
 
@@ -102,6 +104,6 @@ def _held(subject: Subject, deviation: Vector) -> str | None:
         with subject.running() as running:
             if not np.isfinite(running.hold(deviation[None], _STEPS, subject.step_size)).all():
                 return None
-    except ComponentError as error:
+    except (ComponentError, EndedError) as error:
         return f"{error.status}: {error.log}"[:120]
     return ""

@@ -29,19 +29,21 @@ def native(subject: Subject) -> FmuDescription:
     return described.native if isinstance(described, BoundDescription) else described
 
 
-def _some(texts: list[str]) -> str:
-    return "; ".join(texts[:_SOME]) + (f"; and {len(texts) - _SOME} more" if len(texts) > _SOME else "")
+def some_of(texts: list[str], between: str = "; ") -> str:
+    """The first few, and how many more there are."""
+    more = f"{between}and {len(texts) - _SOME} more" if len(texts) > _SOME else ""
+    return between.join(texts[:_SOME]) + more
 
 
 @check("fmi_validity", "Does the file keep to FMI 2.0?")
 def fmi_validity(subject: Subject) -> Result:
     grave, harmless = validation_problems(subject.directory)
     if grave:
-        return failed("fmi_validity", "invalid FMI", _some(grave), problems=grave + harmless)
+        return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
     if harmless:
         return remarked(
             "fmi_validity",
-            _some(harmless),
+            some_of(harmless),
             "breaks the standard without changing an answer here; tell the author",
             problems=harmless,
         )
@@ -53,14 +55,14 @@ def units(subject: Subject) -> Result:
     described = native(subject)
     wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described)
     if wrong:
-        return failed("units", "wrong units", _some(wrong))
+        return failed("units", "wrong units", some_of(wrong))
     open_ends = [
         v.name
         for v in described.variables.values()
         if v.causality in ("input", "output") and v.type == "Real" and not v.unit
     ]
     if open_ends:
-        return remarked("units", f"no unit is declared for {_some(open_ends)}", "say the unit in the binding")
+        return remarked("units", f"no unit is declared for {some_of(open_ends)}", "say the unit in the binding")
     return passed("units", "every Real input and output has a unit that fits its definition")
 
 
@@ -112,15 +114,15 @@ def _wrong_port_units(described: FmuDescription) -> list[str]:
 def declared_starts(subject: Subject) -> Result:
     missing, wrong = [], []
     for info in native(subject).variables.values():
-        if info.causality not in ("input", "parameter"):
+        if info.causality not in ("input", "parameter") or info.type == "Clock":  # a clock ticks, and starts at nothing
             continue
         if info.start is None:
             missing.append(info.name)
         elif info.type == "Real" and (text := _out_of_bounds(info)):
             wrong.append(text)
     if missing or wrong:
-        texts = wrong + ([f"no start value: {_some(missing)}"] if missing else [])
-        return failed("declared_starts", "bad start values", _some(texts))
+        texts = wrong + ([f"no start value: {some_of(missing)}"] if missing else [])
+        return failed("declared_starts", "bad start values", some_of(texts))
     return passed("declared_starts", "all have a start value within their bounds")
 
 
@@ -145,7 +147,7 @@ def declared_dependencies(subject: Subject) -> Result:
     if silent and described.inputs:
         return remarked(
             "declared_dependencies",
-            f"nothing is said of {_some(silent)}, so all inputs are assumed to act at once",
+            f"nothing is said of {some_of(silent)}, so all inputs are assumed to act at once",
             "ask for the dependencies, so that a master can order its calls",
         )
     return passed("declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on")

@@ -63,7 +63,7 @@ def _growth(subject: Subject, block: Callable[[], None], count: int) -> float:
 
 
 def _of_steps(subject: Subject, steps: int) -> float | None:
-    ends = subject.description.stop_time
+    ends = subject.ends
     if ends is not None and _BLOCKS * steps * subject.step_size > ends:
         steps = int(ends / subject.step_size / _BLOCKS)
         if steps < 20:

@@ -5,10 +5,10 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
-from orchestrator.vendor.checks.subject import Running, Subject, Vector, difference, elsewhere
+from orchestrator.vendor.checks.subject import Subject, Vector, difference, elsewhere
 
 RUN_FOR = 2.0
 """Time [s] for which an FMU is made to run."""
@@ -21,6 +21,9 @@ _HELD, _ROUNDS = 50, 4
 
 _LONGEST = 60.0
 """Simulated time [s] after which enough was seen."""
+
+LEAST_STEPS = 20
+"""An FMU that ends by itself before that many steps has shown nothing."""
 
 EQUAL = 1e-10
 """Relative difference up to which two runs are equal."""
@@ -37,6 +40,8 @@ def runs(subject: Subject) -> Result:
             steps, running.time = _HELD * _ROUNDS, k * h
             try:
                 values = running.record(steps, h, stimulus)
+            except EndedError as error:
+                return _ended(subject, error)
             except ComponentError as error:
                 if error.time is None or error.time < ends - 0.5 * h or subject.description.stop_time is None:
                     return failed("runs", "error in a step", str(error), time=error.time)
@@ -56,6 +61,24 @@ def runs(subject: Subject) -> Result:
     )
 
 
+def _ended(subject: Subject, error: EndedError) -> Result:
+    """An orderly end; so early that nothing can be learned, it is a fault."""
+    h, declared, ended = subject.step_size, subject.description.stop_time, error.ended_at
+    steps, early = round(error.time / h), declared is not None and ended < declared - 0.5 * h
+    text = f"it ended its simulation at t = {ended:.6g} s by itself"
+    text += f", before the {declared:g} s that it declares" if early else ""
+    text += f" (it says: {error.log})" if error.log else ""
+    if steps < LEAST_STEPS:
+        return failed("runs", "ends at once", text, time=ended)
+    with subject.running() as running:  # what came with the refused step is lost
+        values = running.record(steps, h, subject.steps(hold=_HELD * h))
+    if not np.isfinite(values).all():
+        row = int(np.argmin(np.isfinite(values).all(axis=1)))
+        return _not_finite(subject, values[row], row * h)
+    subject.memory["ended_at"] = ended
+    return remarked("runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended)
+
+
 def _not_finite(subject: Subject, values: Vector, time: float) -> Result:
     bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
     return failed(
@@ -69,7 +92,7 @@ def _not_finite(subject: Subject, values: Vector, time: float) -> Result:
 def affordable(subject: Subject, steps: int, step_size: float | None = None) -> int:
     """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
     fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
-    ends = subject.description.stop_time
+    ends = subject.ends
     return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size))))
 
 
@@ -173,42 +196,3 @@ def _not_taken(subject: Subject) -> str | None:
     start = subject.description.variables
     lost = [n for n, v in found.items() if v == float(start[n].start or 0) != wanted[n]]
     return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None
-
-
-@check("call_order", "Does it refuse calls out of order, and survive them?")
-def call_order(subject: Subject) -> Result:
-    accepted = []
-    component = subject.open()
-    try:
-        try:
-            component.step(0.0, subject.step_size)
-            accepted.append("fmi2DoStep before initialisation")
-        except ComponentError:
-            pass
-    finally:
-        component.close()
-    with subject.running() as running:
-        running.step(subject.step_size)
-        try:
-            running.component.step(running.time, 0.0)
-            accepted.append("a step of size 0")
-        except ComponentError:
-            pass
-    with subject.running() as running:
-        backwards = _accepts(running, -subject.step_size)
-    accepted += ["a step backwards"] if backwards else []
-    if accepted:
-        return remarked(
-            "call_order",
-            f"it accepts {' and '.join(accepted)}",
-            "FMI 2.0 forbids these calls; a master that makes them by mistake will not be told",
-        )
-    return passed("call_order", "steps before initialisation, of size 0 and backwards are refused")
-
-
-def _accepts(running: Running, step_size: float) -> bool:
-    try:
-        running.component.step(0.0, step_size)
-    except ComponentError:
-        return False
-    return True

@@ -135,6 +135,12 @@ class Subject:
             raise
 
     @property
+    def ends(self) -> float | None:
+        """When its experiment ends [s]: as declared, or where it was seen to end by itself; None where not known."""
+        known = [t for t in (self.description.stop_time, self.memory.get("ended_at")) if t is not None]
+        return min(known, default=None)
+
+    @property
     def watched(self) -> tuple[str, ...]:
         """What tells runs apart: the outputs, or any Real variable that moves where there is none."""
         if self.outputs:

@@ -6,6 +6,7 @@ from orchestrator.errors import ComponentError
 from orchestrator.vendor.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.vendor.checks.running import affordable
 from orchestrator.vendor.checks.subject import Subject, Vector, scales
+from orchestrator.vendor.checks.switching import switches_elsewhere
 
 _SMALL = 1e-6
 """Relative difference below which step sizes do not matter."""
@@ -203,6 +204,9 @@ def step_invariance(subject: Subject) -> Result:
         f"steps of {h:g} and {2 * h:g} s differ by {first:.3g} of the range, {2 * h:g} and {4 * h:g} s by {second:.3g}"
     )
     converges = first < 0.75 * second
+    if first > _LARGE and (elsewhere := switches_elsewhere(subject.watched, [((fine, h), (double, 2 * h))])):
+        subject.memory["switching"] = True
+        return _switching("step_invariance", elsewhere, seen, **figures)
     if first > _LARGE or (first > 1e-3 and not converges):
         return failed("step_invariance", "step-dependent answer", seen, **figures)
     if first > 1e-3:
@@ -211,6 +215,17 @@ def step_invariance(subject: Subject) -> Result:
         seen += f"; with {4 * subject.step_size:g} s it leads nowhere"
         return remarked("step_invariance", seen, "keep to its own communication step, or a smaller one", **figures)
     return passed("step_invariance", seen, **figures)
+
+
+def _switching(name: str, signals: list[str], seen: str, **figures: float) -> Result:
+    """What is to be said where only moments of switching follow the step."""
+    return remarked(
+        name,
+        f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}",
+        "the moments of switching are as exact as the communication step: take a smaller one where they matter",
+        switching=signals,
+        **figures,
+    )
 
 
 def _typical(a: Vector, b: Vector) -> float:
@@ -254,6 +269,11 @@ def internal_step(subject: Subject) -> Result:
     figures = {"difference": worst, "of_one_step": one_step}
     seen = f"with {share} times the step of {h:g} s the answer differs by {worst:.3g} of the range"
     if worst > max(3 * one_step, 5e-3):
+        pairs = [((plain, h), (run, span / many * h)) for (span, many), run in odd.items()]
+        if elsewhere := switches_elsewhere(subject.watched, pairs):
+            if subject.memory.get("switching"):
+                return not_applicable("internal_step", "because only moments of switching differ, as was said above")
+            return _switching("internal_step", elsewhere, seen, **figures)
         return failed("internal_step", "internal step leaks", f"{seen}; one step moves it by {one_step:.3g}", **figures)
     if worst > 1e-3:
         return remarked("internal_step", seen, "prefer multiples of its internal step", **figures)

@@ -45,7 +45,7 @@ typedef struct {
     const callbacks_t *callbacks;
     char *name;
     void *owner; /* whose state this was */
-    int calls, was_reset, was_restored;
+    int calls, was_reset, was_restored, ended;
 } instance_t;
 
 #ifdef FAULT_SHARED
@@ -251,6 +251,23 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
         return ERROR;
     }
 #endif
+#ifdef ENDS_AT
+    if (time + step > ENDS_AT + 1e-9) {
+        instance->ended = 1;
+#ifdef FAULT_SAYS_WHY
+        log_text(instance, ERROR, "the solver does not converge");
+#endif
+        return DISCARD;
+    }
+#endif
+#ifdef FAULT_DISCARD_AT
+    if (time + step > FAULT_DISCARD_AT) {
+#ifdef FAULT_DISCARD_PART
+        S->time = time + FAULT_DISCARD_PART * step;
+#endif
+        return DISCARD;
+    }
+#endif
     ++instance->calls;
 #ifdef FAULT_HANG_AFTER_RESTORE
     for (static volatile int spin; instance->was_restored;) ++spin;
@@ -383,6 +400,7 @@ EXPORT int fmi2SerializeFMUstate(void *c, void *state, char *bytes, size_t size)
     memcpy(bytes, state, sizeof(instance_t));
     return OK;
 }
+#ifndef WITHOUT_DESERIALIZE
 EXPORT int fmi2DeSerializeFMUstate(void *c, const char *bytes, size_t size, void **state) {
     if (!*state) *state = malloc(sizeof(instance_t));
     memcpy(*state, bytes, sizeof(instance_t));
@@ -391,6 +409,7 @@ EXPORT int fmi2DeSerializeFMUstate(void *c, const char *bytes, size_t size, void
 #endif
     return OK;
 }
+#endif
 
 EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const *categories) { return OK; }
 #define NONE(name) \
@@ -406,8 +425,19 @@ EXPORT int fmi2GetDirectionalDerivative(void *c, const unsigned *u, size_t nu, c
 EXPORT int fmi2SetRealInputDerivatives(void *c, const unsigned *r, size_t n, const int *o, const double *v) { return ERROR; }
 EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *r, size_t n, const int *o, double *v) { return ERROR; }
 EXPORT int fmi2GetStatus(void *c, int kind, int *value) { return DISCARD; }
-EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) { return DISCARD; }
+EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) {
+    const instance_t *instance = c;
+    if (kind != 2) return DISCARD;
+    *value = S->time;
+#ifdef ENDS_AT
+    *value = ENDS_AT;
+#endif
+    return OK;
+}
 EXPORT int fmi2GetIntegerStatus(void *c, int kind, int *value) { return DISCARD; }
-EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) { return DISCARD; }
+EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) {
+    *value = ((const instance_t *)c)->ended;
+    return kind == 3 ? OK : DISCARD;
+}
 EXPORT int fmi2GetStringStatus(void *c, int kind, const char **value) { return DISCARD; }
 EXPORT const char *gallery_marker(void) { return "gallery"; }

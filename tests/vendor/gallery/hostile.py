@@ -54,6 +54,16 @@ def twice(folder, good):
     return _copy(good, folder, "same_file_twice", extra=[("resources/a.txt", b"1"), ("resources/A.TXT", b"2")])
 
 
+def other_bytes(folder, good):
+    """One name twice, with different bytes: what is unpacked depends on who unpacks it."""
+    return _copy(good, folder, "other_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"2")])
+
+
+def same_bytes(folder, good):
+    """One name twice with the same bytes, as CMake lists it; harmless."""
+    return _copy(good, folder, "same_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"1")])
+
+
 def entities(folder, good):
     laughs = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
     head = f'<!DOCTYPE x [<!ENTITY l0 "lol">{laughs}]>'.encode()
@@ -79,6 +89,7 @@ HOSTILE = {
     "symbolic_link": (link, "path traversal"),
     "zip_bomb": (bomb, "zip bomb"),
     "same_file_twice": (twice, "hostile archive"),
+    "other_bytes_twice": (other_bytes, "hostile archive"),
     "entity_expansion": (entities, "entity expansion"),
     "external_entity": (external, "entity expansion"),
     "deep_nesting": (deep, "hostile archive"),

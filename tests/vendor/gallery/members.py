@@ -110,6 +110,10 @@ LAG = (Variable("u", 0, "input", 0, "1"), Variable("y", 1, "output", unit="1", d
        Variable("d", 2, "parameter", 0.5, "1", variability="tunable"),
        Variable("T", 3, "parameter", 0.05, "s", variability="fixed"))  # fmt: skip
 
+TANK = (Variable("level", 0, "output", unit="1"), Variable("relay", 1, "output", unit="1", variability="discrete"),
+        Variable("q", 2, "parameter", 1, "1", variability="fixed"),
+        Variable("steps", 3, "output", unit="1"))  # fmt: skip
+
 SI = {"V_UNIT": "(230.0 * sqrt(2.0 / 3.0))", "I_UNIT": "(RATING / (230.0 * sqrt(3.0)) * sqrt(2.0))", "P_UNIT": "RATING"}
 V_PEAK = {**SI, "V_UNIT": repr(230.0 * sqrt(2 / 3)), "P_UNIT": repr(1500.0)}
 
@@ -170,6 +174,11 @@ def good():
                      step_size="1e-2", stop_time="3")),
         Member(small("gain", "GAIN", GAIN, step_size="0.1", stop_time="2")),
         Member(small("lag", "LAG", LAG, step_size=None, stop_time="2")),
+        # what was said to be the FMU's fault, and is not
+        Member(converter("converter_that_ends", ENDS_AT=0.8)),
+        Member(converter("converter_without_a_function", WITHOUT_DESERIALIZE=1, state=False)),
+        Member(converter("converter_that_forbidden_calls_crash", FAULT_NO_ORDER=1)),
+        Member(small("tank", "TANK", TANK, step_size="1e-2", stop_time="20")),
     ]  # fmt: skip
     for form in ("polar", "abc", "qd", "power"):
         value, current = _si(form)
@@ -200,6 +209,9 @@ def faulty():
     def wrong_lag(name, fault, variables=LAG, **defines):
         source = replace(lag.source, name=name, defines={**lag.source.defines, **defines}, variables=tuple(variables))
         return Member(source, fault)
+
+    def wrong_tank(name, fault, **defines):
+        return Member(small(name, "TANK", TANK, defines=defines, step_size="1e-2", stop_time="20"), fault)
 
     silent = (LAG[0], replace(LAG[1], depends=()), *LAG[2:])
     return [
@@ -250,7 +262,13 @@ def faulty():
         wrong("drift", "no steady state", FAULT_DRIFT=0.01),
         wrong("growing_state", "growing state", FAULT_GROWING_STATE=1),
         wrong("serialised_state", "serialised state", FAULT_SERIALISED=1),
-        wrong("order_of_calls", "crash", FAULT_NO_ORDER=1),
+        wrong("crash_at_once", "crash", FAULT_CRASH_AT=5e-5),
+        wrong("discards", "error in a step", FAULT_DISCARD_AT=0.3),
+        wrong("ends_of_an_error", "error in a step", ENDS_AT=0.3, FAULT_SAYS_WHY=1),
+        wrong("ends_at_once", "ends at once", ENDS_AT=5e-4),
+        wrong("missing_function", "missing function", WITHOUT_DESERIALIZE=1),
+        wrong_tank("tank_by_calls", "step-dependent answer", FAULT_RELAY_BY_CALLS=1),
+        wrong_tank("tank_beside_a_counter", "step-dependent answer", FAULT_COUNTS_CALLS=1),
         *_wrong_units(),
         *_invalid(),
         *missed(),

@@ -61,4 +61,27 @@ static void advance(double *z, double *m, double *hidden, double time, double st
     m[0] += (z[U] - m[0]) * -expm1(-step / z[T]);
 }
 static void outputs(double *z, double *m, const double *hidden) { z[Y] = m[0] + z[GAIN] * z[U]; }
+
+#elif defined MODEL_TANK /* ẋ = r·q − x; a relay r that is looked at once a communication step keeps x in its band */
+enum { X, R, GAIN, STEPS, SIZE };
+enum { MEMORY = 4 };
+#define IS_OUTPUT(r) ((r) == X || (r) == R || (r) == STEPS)
+static const double START[SIZE] = {0.5, 1, 1, 0};
+static void initialise(double *z, double *m) { m[0] = 0.5, m[1] = 1, m[2] = 0; }
+static void advance(double *z, double *m, double *hidden, double time, double step) {
+    m[0] += (m[1] * z[GAIN] - m[0]) * -expm1(-step);
+    ++m[2];
+#ifdef FAULT_RELAY_BY_CALLS
+    m[1] = (int)(m[2] / 16) % 2 == 0;
+#else
+    if (m[0] > 0.54) m[1] = 0;
+    if (m[0] < 0.46) m[1] = 1;
+#endif
+}
+static void outputs(double *z, double *m, const double *hidden) {
+    z[X] = m[0], z[R] = m[1];
+#ifdef FAULT_COUNTS_CALLS
+    z[STEPS] = m[2];
+#endif
+}
 #endif
