@@ -1,6 +1,8 @@
 """The criteria of the norm on modes: of the linear model, and of a recorded signal."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +56,11 @@ class ModeVerdict:
     def damping_percent(self) -> float:
         return 100 * damping_ratio(self.eigenvalue)
 
+    @property
+    def before_percent(self) -> float | None:
+        """Damping of the same mode without the converter [%]; None where there was none."""
+        return None if self.before is None else 100 * damping_ratio(self.before)
+
 
 @dataclass(frozen=True)
 class ModalTest:
@@ -88,21 +95,31 @@ def eigenvalue_test(having: ModeSet, lacking: ModeSet, components: list[str] | N
     components
         For each mode of ``having``: who takes part.
     """
+    found = [m for m in _matched(having, lacking, components) if is_judged(m.frequency_hz)]
+    return sorted(found, key=lambda v: v.damping_percent)
+
+
+def neighbouring_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
+    """Modes outside the judged range as far as they are known, by frequency; none of them is judged."""
+    found = [m for m in _matched(having, lacking, components) if not is_judged(m.frequency_hz)]
+    reason = "outside the judged range"
+    return [replace(m, accepted=True, reason=reason) for m in sorted(found, key=lambda m: m.frequency_hz)]
+
+
+def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) -> Iterator[ModeVerdict]:
+    """Every mode with the converter, beside what it was without."""
     alike = similarity(having, lacking) if len(having.eigenvalues) and len(lacking.eigenvalues) else None
-    verdicts = []
     for k, value in enumerate(having.eigenvalues.tolist()):
-        if not is_judged(value.imag / (2 * np.pi)):
-            continue
         best = int(np.argmax(alike[k])) if alike is not None else 0
         known = alike is not None and alike[k, best] >= THRESHOLD
         before = complex(lacking.eigenvalues[best]) if known else None
         likeness = float(alike[k, best]) if alike is not None else 0.0
-        accepted, reason = _judge(value, before)
-        verdicts.append(ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else ""))
-    return sorted(verdicts, key=lambda v: v.damping_percent)
+        accepted, reason = judge_mode(value, before)
+        yield ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else "")
 
 
-def _judge(value: complex, before: complex | None) -> tuple[bool, str]:
+def judge_mode(value: complex, before: complex | None) -> tuple[bool, str]:
+    """Whether a mode with the converter is accepted, given the same one without it, and why."""
     percent = 100 * damping_ratio(value)
     limit = 100 * LEAST_DAMPING
     if damping_ratio(value) >= LEAST_DAMPING:
@@ -115,15 +132,32 @@ def _judge(value: complex, before: complex | None) -> tuple[bool, str]:
     return False, f"the converter takes a mode from {was:.2f} % to {percent:.2f} % < {limit:g} %"
 
 
-def stability_fault(growth_with: float, growth_without: float) -> str | None:
-    """What no range of frequencies excuses: an eigenvalue that grows [1/s] where none grew without the converter."""
+def stability_fault(
+    growth_with: float,
+    growth_without: float,
+    with_converter: Mapping[str, Any] | None = None,
+    without: Mapping[str, Any] | None = None,
+) -> str | None:
+    """What no range of frequencies excuses: an eigenvalue that grows [1/s] where none grew without the converter.
+
+    Parameters
+    ----------
+    with_converter, without
+        The verdicts over the whole spectrum, as `Stability.as_json` has them.
+    """
+    if not np.isfinite(growth_with):
+        return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"
     if growth_with > _STABLE >= growth_without:
         return f"the converter makes the system unstable: an eigenvalue has a real part of {growth_with:+.3g} 1/s"
+    if with_converter and with_converter["stable"] is False and not (without and without["stable"] is False):
+        return f"the converter makes the system unstable: {with_converter['sentence']}"
     return None
 
 
 def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: float) -> ModalTest:
     """Judge the modes that the matrix pencil finds in a signal after ``start`` [s]."""
+    if not np.isfinite(signal).all():
+        return ModalTest((), False, "the signal is not finite")
     window = times >= start
     try:
         with one_thread():

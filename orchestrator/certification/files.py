@@ -1,103 +1,55 @@
-"""What a damping test leaves behind: the page, the figures as JSON, the responses as NetCDF."""
+"""What a damping test leaves behind: the page, the figures as JSON, the responses as NetCDF, and the hashes of all."""
 
+import hashlib
 import json
-from dataclasses import asdict
-from importlib.metadata import version
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from orchestrator.certification.criteria import ModeVerdict, damping_ratio
+from orchestrator.certification.acceptance import KEPT
+from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
+from orchestrator.certification.figures import certification_json
 from orchestrator.certification.report import page
-from orchestrator.certification.study import WITH, WITHOUT, Certification, PointVerdict, TimeVerdict
-from orchestrator.certification.swings import Swing, SwingTest
+from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
+from orchestrator.vendor.runner import file_hash
+
+HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
 
 
 def save(certification: Certification, folder: Path, *, pdf: bool = False) -> list[Path]:
     """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
-    html, figures, responses = (folder / name for name in ("certificate.html", "certificate.json", "responses.nc"))
-    html.write_text(page(certification), encoding="utf-8")
-    content = json.dumps(certification_json(certification), indent=1, ensure_ascii=False)
-    figures.write_text(content + "\n", encoding="utf-8")
-    responses_dataset(certification).to_netcdf(responses, engine="scipy")
-    return [html, figures, responses, *([print_pdf(html, folder / "certificate.pdf")] if pdf else [])]
+    html, target = folder / HTML, folder / JSON
+    made = datetime.now(UTC).replace(microsecond=0)
+    responses_dataset(certification).to_netcdf(folder / RESPONSES, engine="scipy")
+    hashes = _hashes(certification, folder)
+    html.write_text(page(certification, hashes, made), encoding="utf-8")
+    printed = [print_pdf(html, folder / PDF)] if pdf else []
+    content = {"made": made.isoformat(), **certification_json(certification)}
+    content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
+    write_sealed(content, target)
+    return [html, target, folder / RESPONSES, *printed]
 
 
-def certification_json(c: Certification) -> dict[str, Any]:
-    """All verdicts with their figures."""
-    return {
-        "norm": "Norma técnica de supervisión 631 v2.0 (2020), section 5.10",
-        "tool": f"gfor-cosim {version('gfor-cosim')}",
-        "fmu": {"file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid},
-        "binding": c.request.binding.name if c.request.binding else None,
-        "values": dict(c.request.values),
-        "pod": c.pod,
-        "signal": c.signal,
-        "linearised": c.linearised,
-        "fit_errors": c.fit_errors,
-        "passed": c.passed,
-        "sentence": c.sentence(),
-        "points": [_point_json(c, v) for v in c.verdicts],
-    }
+def _hashes(c: Certification, folder: Path) -> dict[str, str | None]:
+    names = [FMU, *([BINDING] if c.request.binding else []), CASE, RESPONSES, *([KEPT] if c.acceptance else [])]
+    return {name: file_hash(folder / name) for name in names}
 
 
-def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
-    without = c.points[WITHOUT, v.X_L].modes
-    return {
-        "X_L": v.X_L,
-        "accepted": v.accepted,
-        "faults": list(v.faults),
-        "modes": [_mode_json(m) for m in v.modes],
-        "modes_without": [] if without is None else [_eigenvalue_json(x) for x in without.eigenvalues.tolist()],
-        "growth": {name: c.points[name, v.X_L].growth for name in (WITHOUT, WITH)},
-        "time": None if v.time is None else _time_json(v.time),
-        "time_without": None if v.base_time is None else _time_json(v.base_time),
-    }
+def write_sealed(content: Mapping[str, Any], path: Path) -> None:
+    """Write JSON with a hash of everything else in it."""
+    text = json.dumps({**content, "seal": seal_of(content)}, indent=1, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")
 
 
-def _mode_json(m: ModeVerdict) -> dict[str, Any]:
-    without = None if m.before is None else _eigenvalue_json(m.before)
-    return _eigenvalue_json(m.eigenvalue) | {
-        "without": without,
-        "likeness": m.similarity,
-        "components": m.components,
-        "accepted": m.accepted,
-        "reason": m.reason,
-    }
-
-
-def _eigenvalue_json(value: complex) -> dict[str, float]:
-    return {"real": value.real, "imag": value.imag, "frequency_hz": value.imag / (2 * np.pi),
-            "damping_percent": 100 * damping_ratio(value)}  # fmt: skip
-
-
-def _time_json(time: TimeVerdict) -> dict[str, Any]:
-    modal = [_eigenvalue_json(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
-    return {
-        "signal": time.signal,
-        "accepted": time.accepted,
-        "swings": _swings_json(time.swings),
-        "swings_with_first_extremum": _swings_json(time.other_reading),
-        "modal": {"accepted": time.modal.accepted, "reason": time.modal.reason, "modes": modal},
-    }
-
-
-def _swings_json(test: SwingTest) -> dict[str, Any]:
-    return {
-        "accepted": test.accepted,
-        "reason": test.reason,
-        "ratio": test.ratio,
-        "dropped": asdict(test.dropped) if test.dropped else None,
-        "swings": [_swing_json(s) for s in test.swings],
-    }
-
-
-def _swing_json(s: Swing) -> dict[str, Any]:
-    points = {"P": s.before, "M": s.minimum, "P_next": s.after}
-    return {"k": s.number, "line": s.line, "depth": s.depth} | {n: [p.time, p.value] for n, p in points.items()}
+def seal_of(content: Mapping[str, Any]) -> str:
+    """SHA-256 of all that a certificate's JSON says; against accidents, since anybody can compute it."""
+    rest = {key: value for key, value in content.items() if key != "seal"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
 
 
 def responses_dataset(c: Certification) -> xr.Dataset:
@@ -120,4 +72,4 @@ def responses_dataset(c: Certification) -> xr.Dataset:
         )
     coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),
                    "time": ("time", whole.times, {"units": "s"})}  # fmt: skip
-    return xr.Dataset(data, coords=coordinates, attrs={"sentence": c.sentence(), "source": "gfor certify"})
+    return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})

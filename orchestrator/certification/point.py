@@ -9,20 +9,22 @@ from numpy.typing import NDArray
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.threads import alone
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
-from orchestrator.cases.schema import Value
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.distributed.executor import WorkerLostError
 from orchestrator.errors import CosimError
+from orchestrator.fmi.port import SYSTEM_BASE_MVA
 from orchestrator.study.modes import modes_of, running
 from orchestrator.study.point_key import same_case
 from orchestrator.study.point_store import Arrays
 
-COMPUTED = (0.05, 2.0)
-"""Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range."""
+COMPUTED = (0.05, 3.0)
+"""Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range, and
+that those just outside are listed."""
 
 CONVERTER = "converter"
 POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
@@ -41,8 +43,6 @@ class PointTask:
     ----------
     case, fingerprint
         Path of the case file, and as in a sweep's task.
-    values
-        Values by ``component.variable``.
     key
         Names the point's file: a hash of all that the result depends on.
     black_box
@@ -53,7 +53,6 @@ class PointTask:
     fingerprint: str
     scenario: str
     X_L: float
-    values: dict[str, Value]
     key: str
     black_box: bool = False
 
@@ -65,11 +64,13 @@ class PointResult:
     Attributes
     ----------
     modes
-        From 0.05 to 2 Hz, least damped first.
+        From 0.05 to 3 Hz, least damped first.
     components
         Who takes part in each of them, in words.
     growth
-        Largest real part of any eigenvalue [1/s].
+        Largest real part of any eigenvalue [1/s], zeros left out.
+    stability
+        The verdict over the whole spectrum, as `Stability.as_json` has it.
     residual
         Of the steady state.
     identified
@@ -78,6 +79,8 @@ class PointResult:
         How the linear model of every component was found: perturbed, directional, packed or identified.
     fit_errors
         Of the components that were identified: largest relative difference of model and measured response.
+    power
+        What the converter feeds into its bus at the start, by its current [MW]; None without the converter.
     signals
         By name, each of the shape of ``times``.
     failure
@@ -89,10 +92,12 @@ class PointResult:
     modes: ModeSet | None = None
     components: list[str] = field(default_factory=list)
     growth: float = float("nan")
+    stability: dict[str, Any] | None = None
     residual: float = float("nan")
     identified: int | None = None
     linearised: dict[str, str] = field(default_factory=dict)
     fit_errors: dict[str, float] = field(default_factory=dict)
+    power: float | None = None
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
@@ -151,7 +156,7 @@ def compute_point(task: PointTask) -> PointResult:
 
 
 def _compute(case: Case, task: PointTask, result: PointResult) -> None:
-    (prepared,) = case.prepare([task.scenario], {**task.values, "grid.X_L": task.X_L})
+    (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
     recorder = Recorder(prepared.record, prepared.record_every)
     with running(prepared) as master:
         converter = master.components.get(CONVERTER)
@@ -159,11 +164,11 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             boxed = linearize_with_box(master, CONVERTER)
             result.residual, result.identified = boxed.residual, len(boxed.identified.A)
             result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
-            _keep_modes(result, boxed.model)
+            _keep_modes(result, boxed.model, None)
         else:
             found = modes_of(case, prepared, master, COMPUTED)
             result.residual, result.warnings = found.operating_point.residual, found.warnings
-            _keep_modes(result, found.model)
+            _keep_modes(result, found.model, found.stability)
         f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
         try:
             master.run(prepared.stop_time, prepared.events, [recorder])
@@ -171,12 +176,15 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             _keep_signals(result, recorder, master, f_n)
 
 
-def _keep_modes(result: PointResult, model: LinearModel) -> None:
+def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:
     spectrum = find_spectrum(model, *COMPUTED)
     result.modes = ModeSet.of(spectrum.modes, model.names)
     result.linearised = dict(model.sources)
     result.components = [_in_words(mode) for mode in spectrum.modes]
-    result.growth = spectrum.growth_rate
+    verdict = stability or judge(model, spectrum)
+    result.stability = verdict.as_json()
+    growth = verdict.largest_growth_rate
+    result.growth = float("nan") if growth is None else growth
 
 
 def _in_words(mode: Mode) -> str:
@@ -186,9 +194,12 @@ def _in_words(mode: Mode) -> str:
 def _keep_signals(result: PointResult, recorder: Recorder, master: Master, f_n: float) -> None:
     recorded = dict(zip(recorder.names, recorder.values.T.copy(), strict=True))
     result.times = recorder.times.copy()
-    angles = (recorded.pop("grid.bus_2.v_re"), recorded.pop("grid.bus_2.v_im"))
+    v = recorded.pop("grid.bus_2.v_re"), recorded.pop("grid.bus_2.v_im")
+    i = recorded.pop(f"{CONVERTER}.i_re", None), recorded.pop(f"{CONVERTER}.i_im", None)
+    if i[0] is not None and i[1] is not None and len(result.times):
+        result.power = SYSTEM_BASE_MVA * float(v[0][0] * i[0][0] + v[1][0] * i[1][0])
     if len(result.times) > 1:
-        recorded[FREQUENCY] = bus_frequency(result.times, *angles, f_n)
+        recorded[FREQUENCY] = bus_frequency(result.times, *v, f_n)
     result.signals = recorded
     for name in recorded:
         component, _, variable = name.partition(".")

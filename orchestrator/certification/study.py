@@ -1,114 +1,26 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestrator.cases.case import BUILT_IN, Case, load_case
+from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.certification.criteria import (
-    ModalTest,
-    ModeVerdict,
-    eigenvalue_test,
-    modal_test,
-    stability_fault,
-)
-from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult, PointTask, compute_point
-from orchestrator.certification.swings import SwingTest, slow_part, swing_test
+from orchestrator.certification.acceptance import Acceptance
+from orchestrator.certification.case_file import BASE, WITH, WITHOUT, write_case
+from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
+from orchestrator.certification.details import Details
+from orchestrator.certification.judgement import PointVerdict, judge, watched
+from orchestrator.certification.point import CONVERTER, PointResult, PointTask, compute_point
+from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
+from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
 from orchestrator.distributed.executor import Executor
-from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.study.point_key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.study.point_store import PointStore
 from orchestrator.study.points import Report, kept_or_computed
-
-REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
-"""X_L of the norm [pu, 100 MVA]."""
-
-SETTLING = 0.5
-"""From this long after the event [s] the signal is taken for a free response and decomposed into modes."""
-
-BASE = BUILT_IN / "norm631" / "case.toml"
-"""The study, with our converter in it."""
-
-PODS = ("none", "p", "q", "pq")
-WITHOUT, WITH = "without", "with"
-
-
-@dataclass(frozen=True)
-class CertificationRequest:
-    """What is to be certified.
-
-    Attributes
-    ----------
-    fmu, binding
-        The converter, and how its variables are mapped to our port.
-    values
-        Values of the converter's own variables, by name.
-    pod
-        One of `PODS`: which damping controllers are active; None to see it from ``pod_p.enabled``, ``pod_q.enabled``.
-    study_values
-        Values of the study's other components, by ``component.variable``.
-    black_box
-        Identify the converter for the modes even if it shows its states; one that does not is always identified.
-    """
-
-    fmu: Path
-    binding: Path | None = None
-    values: Mapping[str, Value] = field(default_factory=dict)
-    pod: str | None = None
-    reactances: Sequence[float] = REACTANCES
-    study_values: Mapping[str, Value] = field(default_factory=dict)
-    black_box: bool = False
-
-
-@dataclass(frozen=True)
-class TimeVerdict:
-    """The time-domain criterion on one response: either of its two ways is enough.
-
-    Attributes
-    ----------
-    other_reading
-        The swings with the first extremum kept.
-    """
-
-    signal: str
-    swings: SwingTest
-    other_reading: SwingTest
-    modal: ModalTest
-
-    @property
-    def accepted(self) -> bool:
-        return self.swings.accepted or self.modal.accepted
-
-
-@dataclass(frozen=True)
-class PointVerdict:
-    """Everything the norm says of one reactance.
-
-    Attributes
-    ----------
-    base_time
-        The criterion on the system without the converter, for comparison; it is not judged.
-    faults
-        Why the point is not accepted; empty where it is.
-    """
-
-    X_L: float
-    modes: tuple[ModeVerdict, ...]
-    time: TimeVerdict | None
-    base_time: TimeVerdict | None
-    faults: tuple[str, ...]
-
-    @property
-    def accepted(self) -> bool:
-        return not self.faults
-
-    @property
-    def eigenvalues_accepted(self) -> bool:
-        return bool(self.modes) and all(m.accepted for m in self.modes)
+from orchestrator.vendor.binding import bound_fmu
 
 
 @dataclass
@@ -117,24 +29,36 @@ class Certification:
 
     Attributes
     ----------
+    case
+        The study's case file.
+    values
+        Every value of the system with the converter at the first reactance, by ``component.variable``.
     points
         By scenario and X_L.
     stored
         How many of them an earlier start had left.
+    details
+        For whom and by whom the test was made.
+    acceptance
+        The result of the FMU's acceptance tests; None where they were not run.
     """
 
     request: CertificationRequest
     description: FmuDescription
-    pod: str
+    controllers: DampingControllers
     event_time: float
     case: Path
+    values: Mapping[str, float | bool]
     points: dict[tuple[str, float], PointResult]
     verdicts: list[PointVerdict]
     stored: int = 0
+    details: Details = field(default_factory=Details)
+    acceptance: Acceptance | None = None
 
     @property
-    def passed(self) -> bool:
-        return bool(self.verdicts) and all(v.accepted for v in self.verdicts)
+    def pod(self) -> str:
+        """Active damping controllers, as one of `PODS`."""
+        return self.controllers.pod
 
     @property
     def linearised(self) -> dict[str, str]:
@@ -156,40 +80,53 @@ class Certification:
         """What the time-domain criterion watches."""
         return watched(self.pod)
 
+    @property
+    def missing(self) -> tuple[float, ...]:
+        """Reactances of the norm that were not judged [pu]."""
+        return missing_reactances(v.X_L for v in self.verdicts if v.judged)
+
+    @property
+    def verdict(self) -> str:
+        """In one word: ``passes``, ``fails`` or ``incomplete``."""
+        if any(v.judged and not v.accepted for v in self.verdicts):
+            return FAILS
+        return INCOMPLETE if self.missing or self.request.departures else PASSES
+
+    @property
+    def passed(self) -> bool:
+        return self.verdict == PASSES
+
+    @property
+    def refused(self) -> bool:
+        """Whether an acceptance test failed."""
+        return self.acceptance is not None and not self.acceptance.trusted
+
     def sentence(self) -> str:
         """The result, and where."""
         with_pod = {"none": "without POD", "p": "with POD-P", "q": "with POD-Q", "pq": "with POD-P and POD-Q"}[self.pod]
         subject = f"The converter {self.description.model_name!r} {with_pod}"
-        failed = [v for v in self.verdicts if not v.accepted]
-        if not failed:
-            return f"{subject} passes the damping test at all {len(self.verdicts)} line reactances."
-        places = ", ".join(f"{v.X_L:g}" for v in failed)
-        first = "; ".join(failed[0].faults)
-        return f"{subject} fails the damping test at X_L = {places} pu. At {failed[0].X_L:g} pu: {first}."
+        said = {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)
+        if self.acceptance is not None and self.refused:
+            said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
+        return said
 
+    def _passes(self, subject: str) -> str:
+        return f"{subject} passes the damping test at all {len(REACTANCES)} line reactances, by both criteria."
 
-def watched(pod: str) -> str:
-    """SG1's active power; the frequency at bus 2 where a POD-P is active."""
-    return FREQUENCY if "p" in pod.removeprefix("none") else POWER
+    def _fails(self, subject: str) -> str:
+        failed = [v for v in self.verdicts if v.judged and not v.accepted]
+        places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
+        text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: {'; '.join(first.faults)}."
+        reasons = incomplete_because(self.missing, self.request.departures)
+        return f"{text} The test is incomplete as well: {reasons}." if reasons else text
 
-
-def write_case(request: CertificationRequest, folder: Path) -> Path:
-    """The study's case file with this converter in it; FMU and binding are laid beside it, so that it stands alone."""
-    text = BASE.read_text(encoding="utf-8")
-    for file in (request.fmu, *([request.binding] if request.binding else [])):
-        if not file.is_file():
-            raise InputError(f"{file}: there is no such file; give the path of an .fmu, and with --binding of a .toml")
-    shutil.copyfile(request.fmu, folder / "converter.fmu")
-    source = 'fmu = "converter.fmu"'
-    if request.binding:
-        shutil.copyfile(request.binding, folder / "vendor.toml")
-        source += '\nbinding = "vendor.toml"'
-    built_in = 'model = "gfor"'
-    if text.count(built_in) != 1:
-        raise ValueError(f"the study's case file must have {built_in} once")
-    path = folder / "case.toml"
-    path.write_text(text.replace(built_in, source), encoding="utf-8")
-    return path
+    def _incomplete(self, subject: str) -> str:
+        reasons = incomplete_because(self.missing, self.request.departures)
+        text = f"The damping test is incomplete: {reasons}. {subject} is accepted where it was judged"
+        unknown = [v for v in self.verdicts if not v.judged]
+        if not any(v.judged for v in self.verdicts):
+            text = f"The damping test is incomplete: {reasons}. {subject} was judged nowhere"
+        return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
 
 
 def certify(
@@ -213,18 +150,13 @@ def certify(
     InputError
         If the FMU or a value cannot be used.
     """
-    case = load_case(write_case(request, folder))
-    own = {f"{CONVERTER}.{name}": value for name, value in request.values.items()}
-    settings = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
-    prepared = {
-        name: case.prepare([name], {**values, "grid.X_L": request.reactances[0]})[0]
-        for name, values in settings.items()
-    }
+    request.check()
+    controllers = damping_controllers(bound_fmu(request.fmu, request.binding), request)
+    case = write_case(request, controllers.settings, folder)
+    first = {"grid.X_L": request.reactances[0]}
+    prepared = {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
     description = prepared[WITH].system.components[CONVERTER].description
-    pod = request.pod or _pod_of(description, prepared[WITH].values)
-    without = _tasks(case, prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
-    having = _tasks(case, prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
-    tasks = [task for pair in zip(without, having, strict=True) for task in pair]
+    tasks = tasks_of(case, prepared, request, controllers)
     points: dict[tuple[str, float], PointResult] = {}
     stored = 0
     store = PointStore(folder / "points")
@@ -232,8 +164,26 @@ def certify(
         points[tasks[index].scenario, tasks[index].X_L] = point
         stored += was_stored
     event = prepared[WITH].events[0].time
-    verdicts = [judge(points[WITH, X], points[WITHOUT, X], watched(pod), event) for X in request.reactances]
-    return Certification(request, description, pod, event, case.path, points, verdicts, stored)
+    verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
+    values = prepared[WITH].values
+    return Certification(request, description, controllers, event, case.path, values, points, verdicts, stored)
+
+
+def tasks_of(
+    case: Case,
+    prepared: Mapping[str, PreparedScenario],
+    request: CertificationRequest,
+    controllers: DampingControllers,
+) -> list[PointTask]:
+    """Both scenarios at all reactances, the one without the converter first."""
+    own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
+    settings: dict[str, dict[str, Value]] = {
+        WITHOUT: dict(request.study_values),
+        WITH: {**request.study_values, **own},
+    }
+    without = _tasks(case, prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
+    having = _tasks(case, prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
+    return [task for pair in zip(without, having, strict=True) for task in pair]
 
 
 def _tasks(
@@ -249,45 +199,5 @@ def _tasks(
     }
     place, mark = reference_to(case), fingerprint(case)
     return [
-        PointTask(place, mark, prepared.name, X_L, values, key_of({**content, "X_L": X_L}), black_box)
-        for X_L in reactances
+        PointTask(place, mark, prepared.name, X_L, key_of({**content, "X_L": X_L}), black_box) for X_L in reactances
     ]
-
-
-def judge(having: PointResult, lacking: PointResult, signal: str, event_time: float) -> PointVerdict:
-    """All criteria at one reactance."""
-    faults = [f"the study failed {name} the converter: {point.failure}"
-              for name, point in ((WITH, having), (WITHOUT, lacking)) if point.failure]  # fmt: skip
-    modes: tuple[ModeVerdict, ...] = ()
-    if having.modes is not None and lacking.modes is not None:
-        modes = tuple(eigenvalue_test(having.modes, lacking.modes, having.components))
-        faults += [f"{m.frequency_hz:.3f} Hz: {m.reason}" for m in modes if not m.accepted]
-        fault = stability_fault(having.growth, lacking.growth)
-        faults += [fault] if fault else []
-    time, base = (_judge_response(point, signal, event_time) for point in (having, lacking))
-    if time is not None and not time.accepted:
-        faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
-    return PointVerdict(having.X_L, modes, time, base, tuple(faults))
-
-
-def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:
-    y = point.signals.get(signal)
-    if y is None or point.failure:
-        return None
-    y = slow_part(point.times, y)
-    return TimeVerdict(
-        signal,
-        swing_test(point.times, y, event_time),
-        swing_test(point.times, y, event_time, drop_first=False),
-        modal_test(point.times, y, event_time + SETTLING),
-    )
-
-
-def _pod_of(description: FmuDescription, values: Mapping[str, float | bool]) -> str:
-    """Active controllers of a converter that shows them as ours does; none where it does not."""
-
-    def active(name: str) -> bool:
-        info = description.variables.get(name)
-        return info is not None and bool(values.get(f"{CONVERTER}.{name}", info.start == "true"))
-
-    return "".join(letter for letter in "pq" if active(f"pod_{letter}.enabled")) or "none"

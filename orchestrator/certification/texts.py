@@ -1,4 +1,10 @@
-"""What the report says of the study and of how the norm was read."""
+"""What the report says of the study, of how the norm was read, and of what a certificate proves."""
+
+from collections.abc import Iterable, Sequence
+
+from orchestrator.analysis.linear_model import PACKED
+from orchestrator.certification.point import CONVERTER, PointResult
+from orchestrator.certification.request import REACTANCES
 
 PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
 
@@ -12,12 +18,15 @@ coupled system. After 1 s the voltage reference of SG2 rises by 0.02 pu.</p>"""
 _BY_FREQUENCY = "A POD-P is active, so the frequency at bus 2 is watched: the turn of its voltage's angle over 20 ms."
 _BY_POWER = "No POD-P is active, so SG1's active power at bus 2 is watched."
 
-_READING = """<ol>
+_READING = """<p><b>The norm's own text was not at hand when this program was written.</b> Its criteria were taken from
+a description of section 5.10; where that leaves something open, it was read as stated here. Who files this certificate
+compares these rules with the norm's text.</p><ol>
 <li>Eigenvalue criterion: every mode from 0.1 to 1.5 Hz of the system with the converter has at least 5 % of damping. A
 mode with less is accepted only where the same mode had less than 5 % without the converter already. Modes are matched
 by their left and right eigenvectors over the states that both systems have; a mode whose likeness to all others is
 below 0.5 counts as introduced.</li>
-<li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter.</li>
+<li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter; nor one
+that grows without a communication step and is hidden by it.</li>
 <li>{watched}</li>
 <li>What is faster than 5 Hz is taken out of the signal first (Butterworth of order 4, forth and back): the norm judges
 modes up to 1.5 Hz.</li>
@@ -29,7 +38,13 @@ slowest judged mode, the oscillation has died out, and ΔP5M5 is 0.</li>
 <li>Alternatively all modes from 0.1 to 1.5 Hz that the matrix pencil finds in the signal, from half a second after the
 event on and with an amplitude of at least 1 % of the largest, have more than 5 %. The time-domain criterion is met by
 either way.</li>
-<li>A converter passes that meets the eigenvalue criterion and the time-domain criterion at every X_L.</li>
+<li>A converter passes that meets the eigenvalue criterion and the time-domain criterion at all 13 values of X_L, with
+nothing else changed of the study. With fewer, or with a study that was changed, the test is incomplete. Other values of
+X_L are shown; they replace none of the 13, and failing there is failing.</li>
+<li>The converter has to feed in its 1350 MW from the start, and a damping controller that is said to be active has to
+move its output, where the FMU shows one.</li>
+<li>Modes just outside the judged range, and dampings that the converter lowers by more than two points, are listed and
+not judged.</li>
 <li>Active loads of constant current become so with a lag of 1 ms; within it they are conductances. Without a lag the
 voltage of a bus without capacitance would not be determined. With 5 ms no damping moves by more than 0.2 points.</li>
 </ol>"""
@@ -38,3 +53,31 @@ voltage of a bus without capacitance would not be determined. With 5 ms no dampi
 def reading(pod: str) -> str:
     """Rules as they were applied, with what had to be decided."""
     return _READING.format(watched=_BY_FREQUENCY if "p" in pod.removeprefix("none") else _BY_POWER)
+
+
+INTEGRITY = """<p><code>gfor verify .</code> in this folder compares all hashes, judges the figures again, and computes
+points anew. That guards against accidents: a file that was changed, mixed up or cut off. It is no protection against
+forgery: whoever changes a file can compute its hash again. What proves a certificate is the signature of who made it,
+and that its points come out again from the FMU.</p>"""
+
+
+def count(missing: Sequence[float]) -> str:
+    """How many of the norm's reactances were judged."""
+    return f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}"
+
+
+def converter_model(points: Iterable[PointResult]) -> str:
+    """What stands for the converter in the modes: its own states, a model inside its FMU, or one that was fitted."""
+    known = [p for p in points if p.modes is not None]
+    boxes = [p for p in known if p.identified is not None]
+    if boxes:
+        orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
+        error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
+        return (
+            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error {error:.1e}"
+        )
+    if any(p.linearised.get(CONVERTER) == PACKED for p in known):
+        return (
+            "The model packed in the FMU stands for the converter in the modes; it was compared with its own response"
+        )
+    return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"

@@ -23,6 +23,7 @@ COMMANDS = {
     "admittance": "measure a device's admittance, and fit a model to it",
     "black-box": "modes of a case with a component known by its port alone",
     "certify": "the grid code's damping test on a converter FMU",
+    "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
     "build": "build FMUs of the catalogue's models",
     "which-master": "which schedule another tool runs, told by a pair of probe FMUs",
     "bind": "draft a binding: what a foreign FMU's variables mean at our port",
@@ -48,6 +49,7 @@ examples:
   gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
   gfor black-box two_area --scenario gfor --component gfor
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
+  gfor verify results/certify_vendor             whether a certificate still holds
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor info fmus/gfor.fmu                        what an FMU declares
   gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port

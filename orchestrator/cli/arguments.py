@@ -70,3 +70,13 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def reactances(text: str) -> tuple[float, ...]:
+    """Different reactances of a line [pu], separated by commas."""
+    values = tuple(_number(part) for part in text.split(","))
+    if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3"
+        )
+    return values

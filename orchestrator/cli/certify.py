@@ -1,36 +1,41 @@
 """``gfor certify``: the grid code's damping test on any converter FMU."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.certification.files import certification_json, save
-from orchestrator.certification.study import PODS, REACTANCES, Certification, CertificationRequest, certify
-from orchestrator.cli.arguments import setting
+from orchestrator.certification.acceptance import read_checks, run_checks
+from orchestrator.certification.details import TEMPLATE, Details, read_details
+from orchestrator.certification.files import JSON, save
+from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest
+from orchestrator.certification.study import Certification, certify
+from orchestrator.certification.verdict import exit_code
+from orchestrator.cli.arguments import reactances, setting
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console
-from orchestrator.errors import INTERRUPTED
+from orchestrator.errors import INTERRUPTED, InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor certify``."""
-    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="the converter")
+    parser.add_argument("fmu", type=Path, nargs="?", metavar="FILE.fmu", help="the converter")
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument(
-        "--pod", choices=PODS, help="damping controllers that are active (default: as the FMU shows them)"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
-        help="a value of the converter, such as pod_p.enabled=true, or of the study, such as "
-        "sg1.governor.enabled=true (repeatable)",
+        "--pod", choices=PODS,
+        help="damping controllers that are to be active: set in the FMU where it has pod_p.enabled and pod_q.enabled, "
+        "else declared by the applicant (default: as the FMU shows them)",
     )  # fmt: skip
     parser.add_argument(
-        "--reactances", type=_reactances, default=REACTANCES, metavar="X,X,…",
-        help="line reactances X_L [pu] (default: the norm's, 0.01 and 0.05 to 0.60)",
+        "--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
+        help="a value of the converter, such as pod_p.K=150, or of the study, such as "
+        "sg1.governor.enabled=true, which makes it another test than the norm's (repeatable)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--reactances", type=reactances, default=REACTANCES, metavar="X,X,…",
+        help="line reactances X_L [pu] (default: the norm's 13, 0.01 and 0.05 to 0.60; less is incomplete)",
     )  # fmt: skip
     parser.add_argument("--black-box", action="store_true",
                         help="do not use the converter's states for the modes, even if it shows them")  # fmt: skip
@@ -41,35 +46,72 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder for results (default: results/certify_<file>); points that are there are not computed again",
     )
-    parser.add_argument(
-        "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
-    )
+    _add_document_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
 
 
+def _add_document_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--details", type=Path, metavar="FILE.toml",
+                        help="number, applicant, operator, tester, place, date")  # fmt: skip
+    parser.add_argument("--details-template", action="store_true", help="print such a file to be filled in, and end")
+    checks = parser.add_mutually_exclusive_group()
+    checks.add_argument("--check", type=Path, metavar="report.json",
+                        help="the FMU's acceptance tests by `gfor check --json` (default: they are run)")  # fmt: skip
+    checks.add_argument("--no-check", action="store_true", help="leave the acceptance tests away; the report says so")
+    parser.add_argument(
+        "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
+    )
+
+
 def run(options: argparse.Namespace) -> int:
-    """Run the test, write its report and print the verdict; returns 1 where the converter does not pass."""
+    """Run the test, write its report and print the verdict.
+
+    Returns
+    -------
+    0 where the converter passes, 1 where it fails, 3 where the test is incomplete, 4 where it passes and an acceptance
+    test of the FMU failed.
+    """
+    if options.details_template:
+        print(TEMPLATE, end="")
+        return 0
+    if options.fmu is None:
+        raise InputError("the converter is missing: gfor certify FILE.fmu")
+    request = _request(options)
+    details = read_details(options.details) if options.details else Details()
+    acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
     console = make_console(stderr=options.json)
-    study = {name: value for name, value in options.set if name.split(".")[0] in ("sg1", "sg2", "grid")}
-    own = {name: value for name, value in options.set if name not in study}
-    request = CertificationRequest(
-        options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
-    )
     executor = choose_executor(options.workers, options.scheduler, ["orchestrator.certification.point"])
     result = compute_points(lambda report: certify(request, executor, folder, report), executor, folder, console)
     if result is None:
         return INTERRUPTED
+    if acceptance is not None:
+        acceptance.keep(folder)
+    elif not options.no_check:
+        with console.status("Acceptance tests of the FMU"):
+            acceptance = run_checks(request.fmu, request.binding, folder)
+    result.details, result.acceptance = details, acceptance
     files = save(result, folder, pdf=options.pdf)
     if options.json:
-        print(json.dumps(certification_json(result), indent=1, ensure_ascii=False))
+        print((folder / JSON).read_text(encoding="utf-8"), end="")
     else:
         console.print(_table(result), "")
-        console.print(f"[bold {'green' if result.passed else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
+        good = result.passed and not result.refused
+        console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
         if result.stored:
             console.print(f"{result.stored} of {len(result.points)} points were there already")
         console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
-    return 0 if result.passed else 1
+    return exit_code(result.verdict, refused=result.refused)
+
+
+def _request(options: argparse.Namespace) -> CertificationRequest:
+    study = {name: value for name, value in options.set if name.split(".")[0] in STUDY}
+    own = {name: value for name, value in options.set if name not in study}
+    request = CertificationRequest(
+        options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
+    )
+    request.check()
+    return request
 
 
 def _table(result: Certification) -> Table:
@@ -88,26 +130,14 @@ def _table(result: Certification) -> Table:
         worst = v.modes[0] if v.modes else None
         ratio = v.time.swings.ratio if v.time else None
         seen = min((m.damping_percent for m in v.time.modal.modes), default=None) if v.time else None
-        before = worst.before if worst else None
+        before = worst.before_percent if worst else None
         table.add_row(
             f"{v.X_L:g}",
             f"{worst.frequency_hz:.3f}" if worst else "–",
             f"{worst.damping_percent:.2f}" if worst else "–",
-            f"{-100 * before.real / abs(before):.2f}" if before else "–",
+            "–" if before is None else f"{before:.2f}",
             "–" if ratio is None else f"{ratio:.3f}",
             "–" if seen is None else f"{seen:.2f}",
-            "accepted" if v.accepted else "[red]not accepted[/]",
+            "accepted" if v.accepted else "[red]not accepted[/]" if v.judged else "[red]not judged[/]",
         )
     return table
-
-
-def _reactances(text: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = (0.0,)
-    if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3"
-        )
-    return values

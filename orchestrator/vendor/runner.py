@@ -4,8 +4,10 @@ The checks run here; the FMU runs in a process of its own, which it may crash, h
 measurements come. So it reaches no verdict.
 """
 
+import hashlib
 import traceback
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from shutil import rmtree
 from time import monotonic
@@ -82,8 +84,10 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         return {
+            "tool": f"gfor-cosim {version('gfor-cosim')}",
             "fmu": str(self.fmu),
             "binding": None if self.binding is None else str(self.binding),
+            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
             "trusted": self.trusted,
             "faults": self.faults,
             "not_supported": self.not_supported,
@@ -97,6 +101,11 @@ FILE_CHECKS = {
     "binding": "Does the binding fit the file?",
 }
 """What is asked before there is anything to run."""
+
+
+def file_hash(path: Path | None) -> str | None:
+    """SHA-256 of a file; None for none."""
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def question_of(name: str) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import gfor_fmu.converter as converter_module
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
@@ -20,26 +19,21 @@ from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.cases.case import load_case
 from orchestrator.certification import point as point_module
 from orchestrator.certification import study as study_module
+from orchestrator.certification.case_file import write_case
 from orchestrator.certification.criteria import damping_ratio
-from orchestrator.certification.files import certification_json, save
+from orchestrator.certification.figures import certification_json
+from orchestrator.certification.files import save
+from orchestrator.certification.judgement import judge, watched
 from orchestrator.certification.point import FREQUENCY, POWER, PointResult
-from orchestrator.certification.study import REACTANCES, CertificationRequest, certify, judge, watched, write_case
+from orchestrator.certification.request import REACTANCES, CertificationRequest
+from orchestrator.certification.study import certify
 from orchestrator.cli import main
 from orchestrator.distributed.processes import Processes
 from orchestrator.errors import CaseError, InputError
+from tests.certification.fabricated import figures, rings
+from tests.certification.sign_turned import turned
 from tests.support.exact import exact_continuous
 from tests.support.interruption import interrupted_after
-
-
-def flipped(controller):
-    """The converter with the sign of one damping controller turned around."""
-    original = converter_module.pod
-
-    def turned(m, name, deviation, *, sign, **settings):
-        return original(m, name, deviation, sign=-sign if name == controller else sign, **settings)
-
-    with mock.patch.object(converter_module, "pod", turned):
-        return converter_module.grid_forming_converter()
 
 
 def exact_eigenvalues(model, path, values, X_L):
@@ -105,7 +99,9 @@ def point(scenario, ratio, growth=-0.1, rings=None):
     value = omega * complex(-ratio, np.sqrt(1 - ratio**2))
     signal = 0.9 + 0.01 * (1 - np.exp(-rings * omega * after) * np.cos(omega * after))
     modes = ModeSet(np.array([value]), shape, shape, ("sg1.machine.omega", "sg1.machine.delta"))
-    return PointResult(0.1, scenario, modes, ["sg1"], growth, 1e-13, times=TIMES, signals={POWER: signal})
+    return PointResult(
+        0.1, scenario, modes, ["sg1"], growth, residual=1e-13, power=1350.0, times=TIMES, signals={POWER: signal}
+    )
 
 
 @pytest.mark.parametrize(
@@ -118,14 +114,14 @@ def point(scenario, ratio, growth=-0.1, rings=None):
     ],
 )
 def test_each_criterion_can_fail_a_point(having, lacking, fault):
-    verdict = judge(having, lacking, POWER, 1.0)
+    verdict = judge(having, lacking, "none", 1.0)
     assert verdict.accepted == (fault is None)
     assert fault is None or any(fault in text for text in verdict.faults)
 
 
 def test_a_failure_of_the_study_is_no_pass():
     failed = PointResult(0.1, "with", failure="component 'converter' at t = 3 s: fmi2DoStep returned fmi2Error: boom")
-    verdict = judge(failed, point("without", 0.2), POWER, 1.0)
+    verdict = judge(failed, point("without", 0.2), "none", 1.0)
     assert not verdict.accepted
     assert "boom" in verdict.faults[0]
 
@@ -135,7 +131,7 @@ def test_a_failure_of_the_study_is_no_pass():
 
 def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
     with pytest.raises(InputError, match="there is no such file"):
-        write_case(CertificationRequest(tmp_path / "missing.fmu"), tmp_path)
+        write_case(CertificationRequest(tmp_path / "missing.fmu"), {}, tmp_path)
     with pytest.raises(CaseError, match="has no variable"):
         certify(CertificationRequest(fmu_path("gfor"), values={"pod_x.enabled": True}), Processes(1), tmp_path)
     with pytest.raises(SystemExit):
@@ -148,21 +144,10 @@ def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
 # -- keeping ---------------------------------------------------------------------------------------
 
 
-def rings(task):
-    """A point as it may come out, at once."""
-    t = np.arange(0, 20, 1e-3)
-    signal = 1 + 0.1 * np.exp(-0.5 * np.maximum(t - 1, 0)) * np.sin(2 * np.pi * 0.6 * np.maximum(t - 1, 0))
-    modes = ModeSet(np.array([-0.5 + 4j]), np.ones((1, 2), complex), np.ones((1, 2), complex), ("a", "b"))
-    names = {POWER: signal, FREQUENCY: 50 * signal}
-    return PointResult(
-        task.X_L, task.scenario, modes, ["a 100 %"], -0.5, 1e-9, None, t, names, dict.fromkeys(names, "pu")
-    )
-
-
 def test_an_interrupted_test_continues_and_gives_the_same(tmp_path, fmu_path, gfor, monkeypatch):
-    arguments = ("certify", fmu_path("gfor"), "--reactances", "0.1,0.3", "--workers", 1, "--out")
+    arguments = ("certify", fmu_path("gfor"), "--no-check", "--reactances", "0.1,0.3", "--workers", 1, "--out")
     monkeypatch.setattr(study_module, "compute_point", rings)
-    assert gfor(*arguments, tmp_path / "whole")[0] == 0
+    assert gfor(*arguments, tmp_path / "whole")[0] == 3
     out = tmp_path / "out"
     monkeypatch.setattr(study_module, "compute_point", interrupted_after(3, rings))
     code, text, error = gfor(*arguments, out)
@@ -170,10 +155,9 @@ def test_an_interrupted_test_continues_and_gives_the_same(tmp_path, fmu_path, gf
     assert error == f"interrupted: 3 of 4 points are in {out}; the same command continues from there\n"
     monkeypatch.setattr(study_module, "compute_point", rings)
     code, text, _ = gfor(*arguments, out)
-    assert code == 0
+    assert code == 3
     assert "3 of 4 points were there already" in text
-    for file in ("certificate.json", "certificate.html"):
-        assert (out / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+    assert figures(out) == figures(tmp_path / "whole")
     xr.testing.assert_identical(*(xr.load_dataset(folder / "responses.nc") for folder in (out, tmp_path / "whole")))
 
 
@@ -181,8 +165,8 @@ def test_what_was_changed_is_computed_anew(tmp_path, fmu_path, gfor, monkeypatch
     """The system without the converter is not touched by the converter's settings."""
     monkeypatch.setattr(study_module, "compute_point", rings)
     fmu = Path(shutil.copy(fmu_path("gfor"), tmp_path))
-    arguments = ("certify", fmu, "--reactances", "0.1", "--workers", 1, "--out", tmp_path / "out")
-    for changes, kept in (((), 0), ((), 2), (("--set", "pod_q.enabled=true"), 1), (("--set", "sg1.H=4"), 0)):
+    arguments = ("certify", fmu, "--no-check", "--reactances", "0.1", "--workers", 1, "--out", tmp_path / "out")
+    for changes, kept in (((), 0), ((), 2), (("--set", "pod_q.enabled=true"), 1), (("--set", "sg1.machine.H=4"), 0)):
         text = gfor(*arguments, *changes)[1]
         assert (f"{kept} of 2 points were there already" in text) == bool(kept)
     with zipfile.ZipFile(fmu, "a") as archive:  # and its guid stays
@@ -191,7 +175,9 @@ def test_what_was_changed_is_computed_anew(tmp_path, fmu_path, gfor, monkeypatch
 
 
 def test_a_point_that_failed_is_tried_again(tmp_path, fmu_path, gfor, monkeypatch):
-    arguments = ("certify", fmu_path("gfor"), "--reactances", "0.1", "--workers", 1, "--out", tmp_path)
+    arguments = (
+        "certify", fmu_path("gfor"), "--no-check", "--reactances", "0.1", "--workers", 1, "--out", tmp_path
+    )  # fmt: skip
 
     def fails(task):
         return rings(task) if task.scenario == "without" else PointResult(task.X_L, task.scenario, failure="no licence")
@@ -202,7 +188,7 @@ def test_a_point_that_failed_is_tried_again(tmp_path, fmu_path, gfor, monkeypatc
     assert "the study failed with the converter: no licence" in text
     monkeypatch.setattr(study_module, "compute_point", rings)
     code, text, _ = gfor(*arguments)
-    assert code == 0
+    assert code == 3
     assert "1 of 2 points were there already" in text
 
 
@@ -233,16 +219,16 @@ def test_threads_of_one_worker_compute_one_point_at_a_time(tmp_path, fmu_path, m
 
 @pytest.mark.slow
 def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fmu_path, capsys):
-    arguments = ["--set", "pod_p.enabled=true", "--reactances", "0.3", "--workers", "2"]
-    assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 0
-    assert "passes the damping test" in capsys.readouterr().out
-    kept = (tmp_path / "certificate.json").read_bytes()
-    assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 0
+    arguments = ["--no-check", "--set", "pod_p.enabled=true", "--reactances", "0.3", "--workers", "2"]
+    assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 3
+    assert "is accepted where it was judged" in capsys.readouterr().out
+    kept = figures(tmp_path)
+    assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 3
     assert "2 of 2 points were there already" in capsys.readouterr().out
-    assert (tmp_path / "certificate.json").read_bytes() == kept
+    assert figures(tmp_path) == kept
     content = json.loads((tmp_path / "certificate.json").read_text(encoding="utf-8"))
     (verdict,) = content["points"]
-    assert content["passed"]
+    assert verdict["accepted"]
     assert set(content["linearised"].values()) == {"perturbed"}
     assert content["pod"] == "p"
     assert content["signal"] == FREQUENCY
@@ -255,12 +241,12 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
     assert base["damping_percent"] > 5
     page = (tmp_path / "certificate.html").read_text(encoding="utf-8")
     for text in (
-        "all by perturbing the running FMUs",
         "Damping test of",
         "Eigenvalue criterion",
         "the frequency at bus 2",
         "Left out: the",
         "Guid",
+        "1 of 13",
     ):
         assert text in page
     for swing in verdict["time"]["swings"]["swings"]:
@@ -271,12 +257,12 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("controller", "turned", "gain", "reactances"),
+    ("controller", "sign_turned", "gain", "reactances"),
     [("pod_q", False, 2000.0, (0.1, 0.3)), ("pod_p", True, 2000.0, (0.01,)), ("pod_q", True, 200.0, (0.1,))],
 )
-def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, controller, turned, gain, reactances):
+def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, controller, sign_turned, gain, reactances):
     """A tenfold gain, a turned sign, or both; a turned POD-Q of the usual gain is weak enough to pass."""
-    model = flipped(controller) if turned else build_model("gfor")
+    model = turned(controller) if sign_turned else build_model("gfor")
     values = {f"{controller}.enabled": True, f"{controller}.K": gain}
     request = CertificationRequest(cached_native(model), values=values, reactances=reactances)
     result = certify(request, executor, tmp_path)
@@ -289,7 +275,8 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     for X_L, bad in wanted.items():
         assert not bad or f"{X_L:g}" in sentence
     save(result, tmp_path)
-    assert "not accepted" in (tmp_path / "certificate.html").read_text(encoding="utf-8") or result.passed
+    page = (tmp_path / "certificate.html").read_text(encoding="utf-8")
+    assert ('<span class="bad">not accepted</span>' in page) == (result.verdict == "fails")
 
 
 @pytest.mark.slow

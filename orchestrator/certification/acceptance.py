@@ -1,0 +1,97 @@
+"""The acceptance tests of the FMU that is certified: run, or read from a report of `gfor check --json`."""
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.vendor.checks.all import CHECKS
+from orchestrator.vendor.runner import Report, check_fmu, file_hash
+
+KEPT = "check.json"
+"""The report's name in a certificate's folder."""
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """What the tests found.
+
+    Attributes
+    ----------
+    faults
+        Names of what is wrong.
+    report
+        All of it, as `gfor check --json` prints it.
+    """
+
+    trusted: bool
+    faults: tuple[str, ...]
+    report: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def checks(self) -> list[dict[str, Any]]:
+        return list(self.report["checks"])
+
+    def keep(self, folder: Path) -> None:
+        """Write the report into a certificate's folder."""
+        text = json.dumps(self.report, indent=1, ensure_ascii=False)
+        (folder / KEPT).write_text(text + "\n", encoding="utf-8")
+
+
+def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
+    """Run the tests, or take the report that an earlier start left in the folder, and leave one there."""
+    kept = folder / KEPT
+    if kept.is_file():
+        try:
+            return read_checks(kept, fmu, binding)
+        except InputError:
+            pass  # of another FMU or version, or cut off: it is made anew
+    found = _of_report(check_fmu(fmu, binding))
+    found.keep(folder)
+    return found
+
+
+def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
+    """Read a report of ``gfor check --json``.
+
+    Raises
+    ------
+    InputError
+        If it is none, is not of this FMU, binding and version, or does not hold all checks.
+    """
+    remedy = "write it with `gfor check FILE.fmu --json`, or leave --check away to have the tests run"
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        hashes = report["sha256"]["fmu"], report["sha256"]["binding"]
+        said, found = bool(report["trusted"]), [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]]
+        tool = report["tool"]
+    except OSError as error:
+        raise InputError(f"--check {path}: it cannot be read: {error.strerror}; {remedy}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"--check {path}: it is no report of `gfor check --json`; {remedy}") from error
+    if hashes != (file_hash(fmu), file_hash(binding)):
+        raise InputError(f"--check {path}: it is of another FMU or binding than {fmu}; {remedy}")
+    if tool != _tool():
+        raise InputError(f"--check {path}: it was made by {tool}, this is {_tool()}; {remedy}")
+    faults = tuple(dict.fromkeys(fault for verdict, fault, _ in found if verdict == "fail"))
+    if said != (not faults):
+        raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
+    if not faults and (left := _left_out(name for *_, name in found)):
+        raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
+    return Acceptance(not faults, faults, report)
+
+
+def _left_out(names: Iterable[str]) -> list[str]:
+    there = set(names)
+    return [name for name in CHECKS if name not in there]
+
+
+def _of_report(report: Report) -> Acceptance:
+    return Acceptance(report.trusted, tuple(report.faults), report.as_dict())
+
+
+def _tool() -> str:
+    return f"gfor-cosim {version('gfor-cosim')}"

@@ -1,0 +1,79 @@
+"""The study's case file with a converter in it: everything that a point depends on but its reactance."""
+
+import shutil
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from orchestrator.cases.case import BUILT_IN, Case, load_case
+from orchestrator.cases.schema import Value
+from orchestrator.certification.point import CONVERTER
+from orchestrator.certification.request import CertificationRequest
+
+BASE = BUILT_IN / "norm631" / "case.toml"
+"""The study, with our converter in it."""
+
+WITHOUT, WITH = "without", "with"
+
+FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"
+"""Files of a certificate's folder."""
+
+_HEAD = """\
+# Damping test of {fmu}{binding}, written by `gfor certify`.
+# Every value that was set is in the scenarios; only the reactance of the line is given by --set grid.X_L=…
+
+"""
+
+
+def write_case(request: CertificationRequest, switches: Mapping[str, bool], folder: Path) -> Case:
+    """Write ``case.toml`` into a folder, and lay the FMU and its binding beside it, so that it stands alone.
+
+    Parameters
+    ----------
+    switches
+        Values of the converter's variables that follow from ``--pod``.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, or a value cannot be used.
+    """
+    request.check()
+    _lay(request.fmu, folder / FMU)
+    if request.binding:
+        _lay(request.binding, folder / BINDING)
+    tables = _tables(request)
+    path = folder / CASE
+    head = _HEAD.format(fmu=request.fmu.name, binding=f" behind {request.binding.name}" if request.binding else "")
+    path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
+    own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **switches}.items()}
+    _check(load_case(path), request, own)  # here, where a value's place is its option and not a line of this file
+    for name, values in ((WITHOUT, request.study_values), (WITH, {**request.study_values, **own})):
+        scenario = tables["scenarios"][name]
+        if values:
+            scenario["set"] = {**scenario.get("set", {}), **values}
+    path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
+    return load_case(path)
+
+
+def _lay(file: Path, target: Path) -> None:
+    if not (target.exists() and target.samefile(file)):
+        shutil.copyfile(file, target)
+
+
+def _check(case: Case, request: CertificationRequest, own: Mapping[str, Value]) -> None:
+    case.components_of(WITH, {**request.study_values, **own})
+    case.components_of(WITHOUT, request.study_values)
+
+
+def _tables(request: CertificationRequest) -> dict[str, Any]:
+    tables = tomllib.loads(BASE.read_text(encoding="utf-8"))
+    converter = tables["components"][CONVERTER]
+    del converter["model"]
+    converter["fmu"] = FMU
+    if request.binding:
+        converter["binding"] = BINDING
+    return tables

@@ -1,0 +1,105 @@
+"""Which damping controllers are active: set where the FMU has our variables, else declared by the applicant."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from orchestrator.cases.schema import Value
+from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.port import BoundDescription
+
+SET = "set in the FMU"
+READ = "as the FMU's variables say"
+DECLARED = "declared by the applicant; the FMU has no variable that shows it"
+UNKNOWN = "nothing was declared, and the FMU has no variable that shows it: taken for none"
+
+
+@dataclass(frozen=True)
+class DampingControllers:
+    """Active damping controllers of the converter.
+
+    Attributes
+    ----------
+    pod
+        One of `PODS`.
+    source
+        How that is known, in words.
+    settings
+        Values to be set for it, by the FMU's variable.
+    """
+
+    pod: str
+    source: str
+    settings: Mapping[str, bool] = field(default_factory=dict)
+
+
+def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
+    """What a request comes to for an FMU.
+
+    Raises
+    ------
+    InputError
+        If ``--pod`` says otherwise than ``--set`` or the binding.
+    """
+    known = {letter: _state(description, request, letter) for letter in "pq"}
+    if request.pod is None:
+        active = "".join(letter for letter, value in known.items() if value) or "none"
+        return DampingControllers(active, UNKNOWN if None in known.values() and active == "none" else READ)
+    wanted = {letter: letter in request.pod.removeprefix("none") for letter in "pq"}
+    settings = {}
+    for letter, on in wanted.items():
+        name = variable(letter)
+        _refuse_contradiction(description, request, name, on)
+        if _is_switch(description.variables.get(name)):
+            settings[name] = on
+    source = SET if all(known[letter] is not None for letter in "pq") else _partly(known, request.pod)
+    return DampingControllers(request.pod, source, settings)
+
+
+def variable(letter: str) -> str:
+    """Our name for the switch of a damping controller."""
+    return f"pod_{letter}.enabled"
+
+
+def _partly(known: Mapping[str, bool | None], pod: str) -> str:
+    """How it is known where the FMU does not show both controllers."""
+    hidden = [f"POD-{letter.upper()}" for letter, value in known.items() if value is None]
+    if len(hidden) == len(known):
+        return DECLARED
+    return f"{SET}, except {hidden[0]}: {DECLARED}" if pod != "none" else SET
+
+
+def _state(description: FmuDescription, request: CertificationRequest, letter: str) -> bool | None:
+    """Whether a controller is on; None where the FMU does not show it."""
+    name = variable(letter)
+    bound = _bound(description, name)
+    if bound is not None:
+        return bound
+    info = description.variables.get(name)
+    if not _is_switch(info):
+        return None
+    given = request.values.get(name)
+    return bool(given) if given is not None else info is not None and info.start in ("true", "1")
+
+
+def _is_switch(info: VariableInfo | None) -> bool:
+    return info is not None and info.type == "Boolean" and info.causality in ("parameter", "input")
+
+
+def _bound(description: FmuDescription, name: str) -> bool | None:
+    """What the binding sets a switch to; None where it does not."""
+    if isinstance(description, BoundDescription):
+        value: Value | None = description.port.settings.get(name)
+        return None if value is None else bool(value)
+    return None
+
+
+def _refuse_contradiction(description: FmuDescription, request: CertificationRequest, name: str, on: bool) -> None:
+    said = {"--set": request.values.get(name), f"the binding {request.binding}": _bound(description, name)}
+    for source, value in said.items():
+        if value is not None and value is not on:
+            raise InputError(
+                f"--pod {request.pod} needs {name} = {shown(on)}, but {source} has {name} = {shown(value)}; "
+                "leave one of them away, or make them agree"
+            )

@@ -1,0 +1,96 @@
+"""For whom, by whom, when and where a test was made, from a file of the user's."""
+
+import datetime
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from orchestrator.cases.locate import line_of
+from orchestrator.errors import CaseError, InputError, Problem
+
+TEMPLATE = """\
+# Details of a damping test, for `gfor certify FILE.fmu --details THIS.toml`.
+# What is left out or empty becomes a line to be filled in by hand.
+
+number = ""         # of the certificate, as your office counts
+applicant = ""      # who asks for it: name and address
+operator = ""       # the network operator that it is filed with
+tester = ""         # who made the test: name and body
+place = ""          # where it is signed
+# date = 2026-01-31 # when it is signed
+"""
+
+_LABELS = {
+    "number": "Certificate number",
+    "applicant": "Applicant",
+    "operator": "Network operator",
+    "tester": "Tester",
+    "place": "Place",
+    "date": "Date",
+}
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    number: str = ""
+    applicant: str = ""
+    operator: str = ""
+    tester: str = ""
+    place: str = ""
+    date: datetime.date | None = None
+
+
+@dataclass(frozen=True)
+class Details:
+    """What a file said; an empty text is a line to be filled in by hand."""
+
+    number: str = ""
+    applicant: str = ""
+    operator: str = ""
+    tester: str = ""
+    place: str = ""
+    date: str = ""
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Label and text of each."""
+        return [(label, getattr(self, name)) for name, label in _LABELS.items()]
+
+
+def read_details(path: Path) -> Details:
+    """Read a file of details.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not TOML.
+    CaseError
+        With every entry that is wrong, and its line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        raw = tomllib.loads(text)
+    except OSError as error:
+        raise InputError(
+            f"--details {path}: it cannot be read: {error.strerror}; `gfor certify --details-template` prints one"
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"--details {path}: it is not a TOML file: {error}") from error
+    try:
+        table = _Table.model_validate(raw)
+    except ValidationError as error:
+        problems = [_problem(text, detail["loc"][0], detail["type"], detail.get("input")) for detail in error.errors()]
+        raise CaseError(f"--details {path}", problems) from error
+    given = {name: value.strip() for name in _LABELS if isinstance(value := getattr(table, name), str)}
+    return Details(**given, date="" if table.date is None else table.date.isoformat())
+
+
+def _problem(text: str, key: int | str, kind: str, seen: object) -> Problem:
+    line = line_of(text, (key,))
+    place = f"line {line}, {key}" if line else str(key)
+    if kind == "extra_forbidden":
+        return Problem(place, f"this key is unknown; there are: {', '.join(_LABELS)}")
+    wanted = "a date as TOML has it, such as 2026-01-31 without quotes" if key == "date" else "a text in quotes"
+    return Problem(place, f"{seen!r} is given; write {wanted}")

@@ -1,0 +1,32 @@
+"""On what a test was computed: operating system, Python, libraries, and the state of this program."""
+
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+_LIBRARIES = ("numpy", "scipy", "fmpy", "casadi", "xarray", "scikit-rf")
+_ROOT = Path(__file__).parents[2]
+
+
+def environment() -> dict[str, str]:
+    """Name and version of each."""
+    known = {"gfor-cosim": version("gfor-cosim"), "Commit": commit(), "Operating system": platform.platform(),
+             "Processor": platform.machine(), "Python": platform.python_version()}  # fmt: skip
+    return known | {name: version(name) for name in _LIBRARIES}
+
+
+def commit() -> str:
+    """Of the checkout that this runs from, with a word on changes that are not in it; else that there is none."""
+    if not (_ROOT / ".git").exists():
+        return "none: installed from a package"
+    try:
+        said = [
+            subprocess.run(
+                ["git", "-C", str(_ROOT), *words], capture_output=True, text=True, timeout=20, check=True
+            ).stdout.strip()
+            for words in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
+        ]
+    except (OSError, subprocess.SubprocessError):
+        return "unknown: git does not say"
+    return f"{said[0]} with changes that are not committed" if said[1] else said[0]

@@ -1,0 +1,179 @@
+"""All criteria at one reactance, from the two systems' modes and responses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.certification.criteria import (
+    ModalTest,
+    ModeVerdict,
+    eigenvalue_test,
+    modal_test,
+    neighbouring_modes,
+    stability_fault,
+)
+from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
+from orchestrator.certification.swings import Numbers, SwingTest, slow_part, swing_test
+
+SETTLING = 0.5
+"""From this long after the event [s] the signal is taken for a free response and decomposed into modes."""
+
+RATED_POWER = 1350.0
+"""What the norm's study has the converter feed in [MW]."""
+
+_SAME_POWER = 0.01
+"""Part of it by which the start may differ."""
+
+LOWERED = 2.0
+"""A damping that the converter lowers by more than this [percentage points] is remarked."""
+
+
+@dataclass(frozen=True)
+class TimeVerdict:
+    """The time-domain criterion on one response: either of its two ways is enough.
+
+    Attributes
+    ----------
+    other_reading
+        The swings with the first extremum kept.
+    """
+
+    signal: str
+    swings: SwingTest
+    other_reading: SwingTest
+    modal: ModalTest
+
+    @property
+    def accepted(self) -> bool:
+        return self.swings.accepted or self.modal.accepted
+
+
+@dataclass(frozen=True)
+class PointVerdict:
+    """Everything the norm says of one reactance.
+
+    Attributes
+    ----------
+    neighbours
+        Modes just outside the judged range; they are listed and not judged.
+    base_time
+        The criterion on the system without the converter, for comparison; it is not judged.
+    faults
+        Why the point is not accepted; empty where it is.
+    unknown
+        Why the point could not be judged at all; empty where it was.
+    """
+
+    X_L: float
+    modes: tuple[ModeVerdict, ...]
+    time: TimeVerdict | None
+    base_time: TimeVerdict | None
+    faults: tuple[str, ...]
+    neighbours: tuple[ModeVerdict, ...] = ()
+    unknown: str = ""
+
+    @property
+    def judged(self) -> bool:
+        return not self.unknown
+
+    @property
+    def accepted(self) -> bool:
+        return self.judged and not self.faults
+
+    @property
+    def eigenvalues_accepted(self) -> bool:
+        return bool(self.modes) and all(m.accepted for m in self.modes)
+
+    @property
+    def lowered(self) -> tuple[ModeVerdict, ...]:
+        """Modes, judged or beside, whose damping is lower by more than two points than without the converter."""
+        every = (*self.modes, *self.neighbours)
+        return tuple(
+            m for m in every if m.before_percent is not None and m.before_percent - m.damping_percent > LOWERED
+        )
+
+
+def watched(pod: str) -> str:
+    """SG1's active power; the frequency at bus 2 where a POD-P is active."""
+    return FREQUENCY if "p" in pod.removeprefix("none") else POWER
+
+
+def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float) -> PointVerdict:
+    """All criteria at one reactance.
+
+    Parameters
+    ----------
+    having, lacking
+        The system with and without the converter.
+    pod
+        Which damping controllers are active, as one of `PODS`.
+    event_time
+        [s]
+    """
+    if lacking.failure:
+        unknown = f"the study failed without the converter: {lacking.failure}"
+        return PointVerdict(having.X_L, (), None, None, (), unknown=unknown)
+    faults = [f"the study failed with the converter: {having.failure}"] if having.failure else _wrong(having, pod)
+    modes: tuple[ModeVerdict, ...] = ()
+    beside: tuple[ModeVerdict, ...] = ()
+    if having.modes is not None and lacking.modes is not None:
+        modes = tuple(eigenvalue_test(having.modes, lacking.modes, having.components))
+        beside = tuple(neighbouring_modes(having.modes, lacking.modes, having.components))
+        faults += [f"{m.frequency_hz:.3f} Hz: {m.reason}" for m in modes if not m.accepted]
+        fault = stability_fault(having.growth, lacking.growth, having.stability, lacking.stability)
+        faults += [fault] if fault else []
+    if not having.failure and not modes:
+        faults.append("no mode from 0.1 to 1.5 Hz was found, so that the eigenvalue criterion judged nothing")
+    signal = watched(pod)
+    time, base = (_judge_response(point, signal, event_time) for point in (having, lacking))
+    if time is not None and not time.accepted:
+        faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
+    if time is None and not having.failure:
+        faults.append(f"there is no response of {signal}")
+    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside)
+
+
+def _wrong(having: PointResult, pod: str) -> list[str]:
+    """Why a converter that ran was not in the norm's study."""
+    wrong = []
+    power = float("nan") if having.power is None else having.power
+    if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
+        wrong.append(
+            f"the converter feeds in {power:.4g} MW at the start and not {RATED_POWER:g} MW, so that it is not the "
+            "norm's study; check whether it is connected, its rating, and what the binding makes of its current"
+        )
+    for name, values in having.signals.items():
+        if not np.isfinite(values).all():
+            at = having.times[int(np.argmax(~np.isfinite(values)))]
+            wrong.append(f"{name} is not finite from t = {at:g} s on")
+    return wrong + [text for letter in "pq" if (text := _idle(having, pod, letter))]
+
+
+def _idle(having: PointResult, pod: str, letter: str) -> str | None:
+    """Why a damping controller is not what it was said to be, by an output as ours; None where that does not show."""
+    name = f"{CONVERTER}.delta_{letter}_pod"
+    values = having.signals.get(name)
+    if values is None:
+        return None
+    moves, named = bool(np.ptp(values) > 0), letter in pod.removeprefix("none")
+    if named and not moves:
+        return f"POD-{letter.upper()} is said to be active, and {name} stays at {values[0]:g}: it does nothing"
+    if moves and not named:
+        return f"POD-{letter.upper()} is said to be off, and {name} moves: it is active"
+    return None
+
+
+def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:
+    y = point.signals.get(signal)
+    return None if y is None or point.failure else judge_response(point.times, y, signal, event_time)
+
+
+def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -> TimeVerdict:
+    """Both ways of the time-domain criterion on a recorded signal."""
+    y = slow_part(times, y)
+    return TimeVerdict(
+        signal,
+        swing_test(times, y, event_time),
+        swing_test(times, y, event_time, drop_first=False),
+        modal_test(times, y, event_time + SETTLING),
+    )

@@ -1,0 +1,155 @@
+"""The two criteria on a certificate's page: every mode, and every response with the norm's construction."""
+
+from collections.abc import Iterator
+from html import escape
+
+import numpy as np
+
+from orchestrator.certification.case_file import WITH, WITHOUT
+from orchestrator.certification.criteria import damping_ratio, is_judged
+from orchestrator.certification.judgement import PointVerdict, TimeVerdict
+from orchestrator.certification.point import COMPUTED, FREQUENCY
+from orchestrator.certification.study import Certification
+from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
+from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
+
+_SHOWN = 30.0
+"""Part of the response that is drawn, from the event on [s]; all of it is judged."""
+
+
+def before(value: complex | None) -> str:
+    """The same mode without the converter."""
+    if value is None:
+        return "no such mode"
+    return f"{value.imag / (2 * np.pi):.3f} Hz, {damping(100 * damping_ratio(value))} %"
+
+
+def verdict(accepted: bool) -> str:
+    """In colour."""
+    return '<span class="good">accepted</span>' if accepted else '<span class="bad">not accepted</span>'
+
+
+def eigenvalues(c: Certification, figures: Figures) -> str:
+    """Every mode, in one picture and in tables."""
+    marks = []
+    for k, scenario in enumerate((WITHOUT, WITH)):
+        for (name, X_L), point in c.points.items():
+            if name != scenario or point.modes is None:
+                continue
+            for value, words in zip(point.modes.eigenvalues.tolist(), point.components, strict=True):
+                hz = value.imag / (2 * np.pi)
+                if is_judged(hz) and value.real > -4:
+                    text = f"{scenario} the converter, X_L = {X_L:g} pu\n"
+                    text += f"{hz:.3f} Hz, {100 * damping_ratio(value):.2f} %\n{words}"
+                    marks.append(Mark(value.real, hz, colour(k), text, large=scenario == WITH))
+    names = legend([("without the converter", colour(0)), ("with the converter", colour(1))])
+    picture, link = figures.add(
+        names + complex_plane("Eigenvalue map", marks, highest_hz=1.5),
+        "Modes from 0.1 to 1.5 Hz at all line reactances, with rays of equal damping. Left of the 5 % ray all is well.",
+    )  # fmt: skip
+    parts = [f"<p>{link} shows the modes; the tables below hold them all.</p>{picture}"]
+    for v in c.verdicts:
+        rows = [
+            [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
+             before(m.before), f"{m.similarity:.2f}", escape(m.components), verdict(m.accepted)] for m in v.modes
+        ]  # fmt: skip
+        columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Same mode without the converter", "Likeness"]
+        columns += ["Who takes part", "Verdict"]
+        summary = f"X_L = {v.X_L:g} pu: {len(rows)} modes from 0.1 to 1.5 Hz"
+        modes = table(f"Modes at X_L = {v.X_L:g} pu", columns, rows)
+        content = f"{modes}{_modes_beside(v)}{_base_modes(c, v)}"
+        parts.append(f"<details open><summary>{summary}</summary>{content}</details>")
+    return "".join(parts)
+
+
+def _modes_beside(v: PointVerdict) -> str:
+    rows = [
+        [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
+         before(m.before), escape(m.components)] for m in v.neighbours
+    ]  # fmt: skip
+    columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Same mode without the converter", "Who takes part"]
+    caption = f"Just outside, from {COMPUTED[0]:g} to 0.1 Hz and from 1.5 to {COMPUTED[1]:g} Hz: not judged"
+    return table(caption, columns, rows) if rows else f'<p class="soft">{caption}: none.</p>'
+
+
+def _base_modes(c: Certification, v: PointVerdict) -> str:
+    point = c.points[WITHOUT, v.X_L]
+    if point.modes is None:
+        return ""
+    entries = zip(point.modes.eigenvalues.tolist(), point.components, strict=True)
+    rows = [
+        [eigenvalue(x.real, x.imag), f"{x.imag / (2 * np.pi):.4f}", damping(100 * damping_ratio(x)), escape(words)]
+        for x, words in entries
+        if is_judged(x.imag / (2 * np.pi))
+    ]
+    return table("Without the converter", ["λ [rad/s]", "f [Hz]", "Damping [%]", "Who takes part"], rows)
+
+
+def responses(c: Certification, figures: Figures) -> str:
+    """Every response with the norm's construction."""
+    return "".join(part for v in c.verdicts for part in _response(c, v, figures))
+
+
+def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[str]:
+    yield f"<h3>X_L = {v.X_L:g} pu</h3>"
+    if v.time is None:
+        yield f'<p class="bad">{escape("; ".join(v.faults))}</p>'
+        return
+    unit = c.points[WITH, v.X_L].units[v.time.signal]
+    curves = []
+    for k, scenario in enumerate((WITHOUT, WITH)):
+        point = c.points[scenario, v.X_L]
+        if v.time.signal in point.signals:
+            shown = point.times <= c.event_time + _SHOWN
+            curves.append(Curve(f"{scenario} the converter", colour(k), point.times[shown],
+                                point.signals[v.time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
+    curves += _construction(v.time, c.event_time + _SHOWN)
+    label = f"{'Frequency at bus 2' if v.time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]"
+    picture, link = figures.add(
+        line_chart(f"Response at X_L = {v.X_L:g} pu", "Time [s]", label, curves),
+        f"Response to +2 % of SG2's voltage reference at X_L = {v.X_L:g} pu. Dashed: without the converter. "
+        "Red: lines from maximum to maximum, and ΔPkMk.",
+    )
+    reasons = f"{escape(v.time.swings.reason)}. By its modes: {escape(v.time.modal.reason)}."
+    yield f"<p>{link}: {reasons} {verdict(v.time.accepted)}</p>"
+    yield picture
+    yield _swing_table(v.time, unit)
+    yield _modal_table(v.time)
+
+
+def _construction(time: TimeVerdict, last: float) -> Iterator[Curve]:
+    """The norm's lines, as far as they are in the picture."""
+    red = "#a11d1d"
+    for s in time.swings.swings:
+        if s.after.time <= last and s.number <= 6:
+            ends = np.array([s.before.time, s.after.time]), np.array([s.before.value, s.after.value])
+            yield Curve(f"P{s.number}–P{s.number + 1}", red, *ends, dashed=True)
+            moment = np.array([s.minimum.time, s.minimum.time + 1e-6])
+            yield Curve(f"ΔP{s.number}M{s.number}", red, moment, np.array([s.minimum.value, s.line]))
+
+
+def _swing_table(time: TimeVerdict, unit: str) -> str:
+    test = time.swings
+    rows = []
+    for s in test.swings[:8]:
+        row = [text for p in (s.before, s.minimum, s.after) for text in (f"{p.time:.3f}", f"{p.value:.6f}")]
+        rows.append([str(s.number), *row, f"{s.line:.6f}", f"{s.depth:.6f}"])
+    columns = ["k", "Pk at [s]", f"Pk [{unit}]", "Mk at [s]", f"Mk [{unit}]", "Pk+1 at [s]", f"Pk+1 [{unit}]",
+               "Line at Mk", "ΔPkMk"]  # fmt: skip
+    note = ""
+    if test.dropped:
+        kind = "maximum" if test.dropped.is_maximum else "minimum"
+        note = (
+            f'<p class="soft">Left out: the {kind} {test.dropped.value:.6f} at {test.dropped.time:.3f} s, '
+            f"towards which the oscillation starts. With it: {escape(time.other_reading.reason)}.</p>"
+        )
+    return (table("Maxima, minima and distances", columns, rows) if rows else "") + note
+
+
+def _modal_table(time: TimeVerdict) -> str:
+    rows = [
+        [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
+         f"{m.amplitude:.3g}"] for m in time.modal.modes
+    ]  # fmt: skip
+    columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"]
+    return table("Modes in the signal from 0.1 to 1.5 Hz (matrix pencil)", columns, rows) if rows else ""

@@ -1,0 +1,86 @@
+"""What is to be certified, and how far that is the norm's own test."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+
+REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
+"""X_L of the norm [pu, 100 MVA]."""
+
+PODS = ("none", "p", "q", "pq")
+
+STUDY = ("sg1", "sg2", "grid")
+"""Components of the study that are not the converter."""
+
+_FIXED = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
+"""Values of the converter that the norm's study gives it."""
+
+
+@dataclass(frozen=True)
+class CertificationRequest:
+    """What is to be certified.
+
+    Attributes
+    ----------
+    fmu, binding
+        The converter, and how its variables are mapped to our port.
+    values
+        Values of the converter's own variables, by name.
+    pod
+        One of `PODS`: which damping controllers are to be active; None to see it from ``pod_p.enabled``,
+        ``pod_q.enabled``.
+    study_values
+        Values of the study's other components, by ``component.variable``.
+    black_box
+        Identify the converter for the modes even if it shows its states; one that does not is always identified.
+    """
+
+    fmu: Path
+    binding: Path | None = None
+    values: Mapping[str, Value] = field(default_factory=dict)
+    pod: str | None = None
+    reactances: Sequence[float] = REACTANCES
+    study_values: Mapping[str, Value] = field(default_factory=dict)
+    black_box: bool = False
+
+    def check(self) -> None:
+        """Whether there are files, and no value that the norm varies by itself.
+
+        Raises
+        ------
+        InputError
+            Naming what cannot be used.
+        """
+        for file in (self.fmu, *([self.binding] if self.binding else [])):
+            if not file.is_file():
+                raise InputError(
+                    f"{file}: there is no such file; give the path of an .fmu, and with --binding of a .toml"
+                )
+        if "grid.X_L" in self.study_values:
+            raise InputError("--set grid.X_L: the test varies it; choose its values with --reactances")
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """What was changed of the study itself, so that it is not the norm's."""
+        changed = {f"converter.{name}": self.values[name] for name in _FIXED if name in self.values}
+        return tuple(f"{name} = {shown(value)}" for name, value in {**self.study_values, **changed}.items())
+
+
+def same_reactance(one: float, other: float) -> bool:
+    """Whether two values [pu] are one."""
+    return math.isclose(one, other, rel_tol=1e-9)
+
+
+def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
+    """Those of the norm that are not among some."""
+    values = list(done)
+    return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))
+
+
+def shown(value: Value) -> str:
+    """A value as the command line takes it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,29 @@
+"""The words of a verdict, and the exit codes that go with them."""
+
+from collections.abc import Sequence
+
+from orchestrator.certification.request import REACTANCES
+
+PASSES, FAILS, INCOMPLETE = "passes", "fails", "incomplete"
+
+EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
+
+NOT_TRUSTED = 4
+"""Exit code where the damping test is passed, and an acceptance test of the FMU failed."""
+
+
+def exit_code(verdict: str, *, refused: bool) -> int:
+    """Of a verdict; ``refused`` where an acceptance test failed."""
+    return NOT_TRUSTED if verdict == PASSES and refused else EXIT_CODES[verdict]
+
+
+def incomplete_because(missing: Sequence[float], departures: Sequence[str]) -> str:
+    """What the norm asks for and was not done; empty where all of it was."""
+    reasons = []
+    if missing:
+        done = len(REACTANCES) - len(missing)
+        places = ", ".join(f"{X:g}" for X in missing)
+        reasons.append(f"{done} of {len(REACTANCES)} line reactances of the norm were judged (missing: {places} pu)")
+    if departures:
+        reasons.append(f"the study is not the norm's, it was changed by {', '.join(departures)}")
+    return "; ".join(reasons)
