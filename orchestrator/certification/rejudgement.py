@@ -57,8 +57,9 @@ def _of_point(point: dict[str, Any], content: dict[str, Any], responses: xr.Data
         bad |= not accepted
     for mode in (*point["modes_beside"], *point["modes_without"]):
         yield from _of_mode(mode)
-    growth = [math.nan if x is None else x for x in (point["growth"][WITH], point["growth"][WITHOUT])]
-    bad |= stability_fault(*growth, *(point["stability"][name] for name in (WITH, WITHOUT))) is not None
+    growth, stability = point["growth"], point["stability"]
+    having, lacking = (math.nan if growth[name] is None else float(growth[name]) for name in (WITH, WITHOUT))
+    bad |= stability_fault(having, lacking, stability[WITH], stability[WITHOUT]) is not None
     power = point["power"]
     bad |= power is None or not abs(power - RATED_POWER) <= 0.01 * RATED_POWER
     time = point["time"]
