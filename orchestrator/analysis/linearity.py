@@ -52,7 +52,7 @@ class Doubt:
         return (
             f"component {self.component!r} is not linear at the operating point: {self.why}. That moves the mode at "
             f"{m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by {100 * self.shift:.2g} % of its "
-            f"eigenvalue, so its damping by up to as many points; {100 * LARGEST_SHIFT:g} is trusted"
+            f"eigenvalue, and its damping by up to {100 * self.shift:.2g} points; {100 * LARGEST_SHIFT:g} % is normal"
         )
 
 

@@ -31,6 +31,10 @@ WHOLE = 4000
 _GROWING = 1e-6
 """A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding."""
 
+SLOW = 0.05
+"""Eigenvalues of a step map up to this size [rad/s] are judged by the continuous model, where there is one: no step in
+use moves them, but an error of the perturbation is divided by the step, and a double zero splits by its root."""
+
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
 """A step map that grows faster than this many times the continuous system's rate and this much [1/s] owes that to the
 coupling."""
@@ -131,6 +135,10 @@ class Stability:
         value = self.mode.eigenvalue
         where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
         tail = f"; {self.reason}" if self.reason else ""
+        if self.zeros > 1:
+            tail += (
+                f"; {self.zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
+            )
         if self.stable:
             return f"stable: the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
         more = f"; {self.growing} modes grow" if self.growing > 1 else ""
@@ -216,19 +224,30 @@ def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearMo
     system
         The continuous model of the same system; None where a component gives no derivatives.
     """
+    spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)
     if model.step_size is None:
         return own
     if system is None:
         return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
-    continuous = _look_at(system, None)
+    continuous = _look_at(system, whole_spectrum(system))
     rate = continuous.largest_growth_rate
+    if own.stable is False and continuous.stable and _only_slow(spectrum, own):
+        slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
+        return replace(continuous, step_size=own.step_size, continuous_growth_rate=rate, reason=slow)
     if own.stable is False:
         return replace(own, cause=_cause(own, rate), continuous_growth_rate=rate)
     if continuous.stable is False:
         text = f"the communication step of {model.step_size:g} s hides it: the step map has no growing mode"
         return replace(continuous, continuous_growth_rate=rate, reason="; ".join(t for t in (own.reason, text) if t))
     return replace(own, continuous_growth_rate=rate)
+
+
+def _only_slow(spectrum: Spectrum | None, own: Stability) -> bool:
+    """Whether nothing grows but eigenvalues that the perturbation cannot tell from zero."""
+    if spectrum is None:
+        return own.mode is not None and own.growing == 1 and abs(own.mode.eigenvalue) <= SLOW
+    return bool(np.all(np.abs(spectrum.eigenvalues[grows(spectrum.eigenvalues)]) <= SLOW))
 
 
 def _cause(own: Stability, rate: float | None) -> Cause:
@@ -241,7 +260,6 @@ def _cause(own: Stability, rate: float | None) -> Cause:
 
 def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
     """The verdict on one model alone."""
-    spectrum = spectrum or whole_spectrum(model)
     if spectrum is None:
         search = find_growing_modes(model)
         mode = search.modes[0] if search.modes else None

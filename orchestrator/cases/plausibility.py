@@ -24,6 +24,9 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
+_FAR = 3
+"""A value that is beyond its range by less than this factor may be a slip, but not one of a thousand."""
+
 _SHOWN = 3
 """Components that a question names; the others are counted."""
 
@@ -34,7 +37,19 @@ def check_plausibility(draft: Draft) -> None:
         for rule in RULES:
             _check_rule(draft, name, plan, rule)
     _check_frequencies(draft)
+    _check_meant(draft)
     draft.questions = _merged([d for d in _doubts(draft) if not _is_meant(draft, d.name)])
+
+
+def _check_meant(draft: Draft) -> None:
+    """What is said to be meant names something that some scenario has; here only the variable can be judged."""
+    for pattern in draft.case.meant:
+        component, _, variable = pattern.partition(".")
+        plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
+        if plans and not any(fnmatch.fnmatchcase(v, variable) for p in plans for v in p.description.variables):
+            draft.note(
+                draft.place("meant"), f"{pattern!r}: {component} has no variable {variable!r}; `gfor info` lists them"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +87,11 @@ def _outside(
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
     usual = f"{wanted.low:g} to {wanted.high:g}{unit}" if wanted.low < wanted.high else f"{wanted.low:g}{unit}"
     slip = ""
-    for factor, text in ((1e-3, "too large"), (1e3, "too small")):
-        if wanted.low <= value * factor <= wanted.high:
+    for factor, text, far in (
+        (1e-3, "too large", value > _FAR * wanted.high),
+        (1e3, "too small", value < wanted.low / _FAR),
+    ):
+        if wanted.low <= value * factor <= wanted.high and (far or wanted.low == wanted.high):
             slip = f"; it looks {'1000' if wanted.low < wanted.high else ''} times {text}: check its unit and base"
     text = f"{variable} = {value:g}{unit} is outside of {usual} ({wanted.why}){slip}"
     yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
@@ -224,7 +242,10 @@ def _merged(doubts: list[_Doubt]) -> list[Problem]:
 def _question(text: str, names: list[str]) -> str:
     components = [name.partition(".")[0] for name in names]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    variable = names[0].partition(".")[2]
+    answers = names if len(names) <= _SHOWN else [f"*.{variable}"]
+    quoted = ", ".join(f'"{name}"' for name in answers)
     return (
         f"{', '.join(components[:_SHOWN])}{more}: {text}; if it is meant, say so at the top of the case: "
-        f'meant = ["{names[0]}"]'
+        f"meant = [{quoted}]"
     )

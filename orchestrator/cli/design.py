@@ -116,7 +116,8 @@ def run(options: argparse.Namespace) -> int:
     )
     for part in sheet(design):
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)
-    console.print(f"Parameter file {path}; use it with: gfor modes {options.case} --scenario "
+    warned = "" if design.met else " (the requirement is not met)"
+    console.print(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}", soft_wrap=True, highlight=False)  # fmt: skip
     return exit_code(options, [design.stability])
 

@@ -66,13 +66,13 @@ def run(options: argparse.Namespace) -> int:
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_verdicts(console, results)
+    print_warnings(results)
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, case, results)
     print_sources(console, results)
     if folder:
         console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
-    print_warnings(results)
     return exit_code(options, [r.stability for r in results])
 
 

@@ -41,6 +41,8 @@ def sheet(d: "PodDesign") -> Iterable[Table | str]:
     yield _result(d)
     if d.margins:
         yield _margins(d.margins, d)
+    elif d.stability.stable is False:
+        yield "[yellow]no margins: the system is unstable with this setting[/yellow]"
     yield from _notes(d)
 
 

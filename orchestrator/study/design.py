@@ -263,7 +263,7 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
         final = refinement.chosen or designed
     after, stability = around(final), loop.stability(final.setting)
     margins = None
-    if request.margins and final.setting.gain:
+    if request.margins and final.setting.gain and stability.stable is not False:
         report("margins")
         margins = compute_margins(loop, off, final, request.least_damping)
     return PodDesign(

@@ -162,8 +162,9 @@ def modes_from(
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
         everything = find_spectrum(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
         spectrum: Spectrum | None = everything
-        shown = [mode for mode in everything.modes if low <= mode.frequency_hz <= high]
-        candidates = named_modes(case, model, everything.modes)
+        swinging = [mode for mode in everything.modes if oscillations(np.array([mode.eigenvalue]))[0]]
+        shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
+        candidates = named_modes(case, model, swinging)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         spectrum = whole_spectrum(model)
@@ -176,7 +177,7 @@ def modes_from(
         prepared=prepared,
         operating_point=point,
         model=model,
-        modes=[mode for mode in shown if oscillations(np.array([mode.eigenvalue]))[0]],
+        modes=shown,
         named=named,
         references=_references(case, prepared),
         warnings=(

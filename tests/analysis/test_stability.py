@@ -136,3 +136,14 @@ def test_the_range_does_not_touch_the_verdict():
     A = crowd([pair(37.0, 104.0)])
     assert all(mode.damping_ratio > 0 for mode in find_modes(model(A, STEP), 0.1, 2.0))
     assert judge(model(A, STEP)).stable is False
+
+
+def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
+    """Without governors nothing restores the frequency; the step map's own pair is an error divided by the step."""
+    split, exact = np.diag([2.6e-3, -2.6e-3, -1.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    verdict = judge(model(split, STEP), system=model(exact))
+    assert verdict.stable is True
+    assert verdict.zeros == 2
+    assert "2 eigenvalues are zero" in verdict.sentence()
+    assert judge(model(split, STEP)).stable is False  # nothing says that it is an error
+    assert judge(model(np.diag([0.06, -1.0, -1.0]), STEP), system=model(exact)).stable is False

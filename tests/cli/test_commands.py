@@ -251,7 +251,9 @@ def test_info_on_another_fmi_version(refused, damaged):
 def test_info_on_model_exchange_only(refused, damaged):
     exchange = '<ModelExchange modelIdentifier="small_gain" />'
     path = damaged(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
-    assert "it is not an FMU for co-simulation (for Model Exchange only, mostly)" in refused("info", path)
+    assert "it is not an FMU for co-simulation (for Model Exchange only), which this master needs" in refused(
+        "info", path
+    )
 
 
 def test_info_on_an_fmu_for_other_platforms(refused, damaged):

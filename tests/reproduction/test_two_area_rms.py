@@ -9,6 +9,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.told_step import as_if_told
+from orchestrator.errors import InputError
 from orchestrator.study.component_model import component_model
 from orchestrator.study.linear import linear_model
 from orchestrator.study.modes import compute_modes, running
@@ -80,9 +81,14 @@ def test_a_jacobi_master_needs_the_emf_a_step_further_ahead(scenario):
     for late in (1, 0):
         case, ready = prepare("two_area_rms", scenario, {f"{d}.steps_late": late for d in devices})
         side_by_side = replace(ready, schedule=jacobi(tuple(ready.system.components)))
+        if scenario == "base" and not late:  # the held voltage damps what grows
+            with pytest.raises(InputError, match=r"does not resolve a mode: .* damping"):
+                compute_modes(case, side_by_side)
+            return
         found.append(compute_modes(case, side_by_side).electromechanical)
-    assert found[0].frequency_hz == pytest.approx(wanted.frequency_hz, abs=HERTZ)
-    assert found[0].damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
+        if late:
+            assert found[0].frequency_hz == pytest.approx(wanted.frequency_hz, abs=HERTZ)
+            assert found[0].damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
     assert abs(found[1].damping_percent - wanted.damping_percent) > 5 * POINTS
 
 

@@ -60,6 +60,11 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
     for other in others:
         if not other.exists():
             raise InputError(f"{other}: there is no such file or folder")
+        if other.is_dir() and other != folder and (other / "summary.json").is_file():
+            raise InputError(
+                f"{other}: this is the folder of another run; a report is of one run, {folder}, with its sweeps "
+                "and designs; write one report for each run, or compare two with `gfor compare`"
+            )
     try:
         content = json.loads(summary.read_text(encoding="utf-8"))
         case = load_case(folder / "case.toml")
