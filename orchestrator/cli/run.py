@@ -81,7 +81,10 @@ def run(options: argparse.Namespace) -> int:
         console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
-    return _end(*stopped, folder) if stopped else exit_code(options, [r.modes.stability for r in results])
+    if stopped:
+        return _end(*stopped, folder)
+    gone_bad = options.fail_unstable and any(r.went_unstable for r in results)
+    return int(gone_bad) or exit_code(options, [r.modes.stability for r in results])
 
 
 def _end(scenario: str, error: BaseException, folder: Path) -> int:
@@ -95,6 +98,10 @@ def _end(scenario: str, error: BaseException, folder: Path) -> int:
 
 def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
     modes = [r.modes for r in results]
+    for r in results:
+        for finding in r.went_unstable:
+            words = escape(f"{r.modes.prepared.title}: {finding.message}")
+            console.print(f"[bold red]UNSTABLE in the simulation[/]: {words}", soft_wrap=True, highlight=False)
     print_verdicts(console, modes)
     console.print(tables.steady_states(modes), "")
     print_named_modes(console, case, modes)

@@ -168,6 +168,7 @@ def summary_of(result: "RunResult") -> dict[str, Any]:
         "linearised": modes.linearised,
         "fit_errors": modes.fit_errors,
         "warnings": list(modes.warnings),
+        "stable_in_simulation": not result.went_unstable,
         "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
     }

@@ -21,7 +21,7 @@ from orchestrator.report.signals import signal
 from orchestrator.report.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
-from orchestrator.watch.finding import Finding
+from orchestrator.watch.finding import UNSTABLE, Finding
 from orchestrator.watch.watch import Watch
 
 STEPS = (0.5, 1.0, 2.0, 5.0)
@@ -68,6 +68,11 @@ class RunResult:
     linear: xr.Dataset | None = None
     failure: CosimError | None = None
     findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def went_unstable(self) -> list[Finding]:
+        """The findings that no stable system gives, whatever its linear model says."""
+        return [finding for finding in self.findings if finding.kind in UNSTABLE]
 
 
 def run_scenario(

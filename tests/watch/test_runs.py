@@ -100,9 +100,11 @@ def test_an_undisturbed_state_that_grows():
 def test_limits_and_lost_synchronism_are_said_once_in_terminal_summary_and_report(gfor, tmp_path):
     file = tmp_path / "case.toml"
     file.write_text(DEEP, encoding="utf-8")
-    code, _, said = gfor("run", file, "--out", tmp_path)
-    assert code == 0
+    code, printed, said = gfor("run", file, "--out", tmp_path, "--fail-unstable")
+    assert code == 1
+    assert printed.startswith("UNSTABLE in the simulation: ")  # before the linear model's verdict, which is another
     (summary,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]
+    assert (summary["stable"], summary["stable_in_simulation"]) == (True, False)
     kinds = [(f["kind"], f["component"], f["variable"]) for f in summary["findings"]]
     assert sorted(kinds) == [
         ("active_limit", "gfor", "filter.i_s_d"),
