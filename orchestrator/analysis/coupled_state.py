@@ -1,5 +1,7 @@
 """The state of the whole coupled system as one vector, and its step map as a function of it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -49,11 +51,17 @@ class CoupledState:
 
     def step_from(self, x: Matrix) -> Matrix:
         """States one communication step after ``x``; the system is put back where it was."""
-        saved, y, index = self._save()
-        try:
+        with self.put_back():
             self.write(x)
             self._master.advance(1)
             return self.read()
+
+    @contextmanager
+    def put_back(self) -> Iterator[None]:
+        """Whatever is done meanwhile, put all FMUs, the coupled outputs and the clock back to where they were."""
+        saved, y, index = self._save()
+        try:
+            yield
         finally:
             self._restore(saved, y, index)
 

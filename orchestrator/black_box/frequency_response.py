@@ -18,6 +18,10 @@ _MOST_SECONDS = 400.0
 _APART = 10.0
 """Periods are compared over at least so long [s]: neighbours that are short always look alike."""
 
+_AWAY = 0.1
+"""A periodic response has a mean of zero, and one to a pulse ends at zero, as every excitation does; a device that
+keeps more than this part of the response's size has left its operating point."""
+
 Numbers = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -168,6 +172,8 @@ def _by_multisine(
         if len(found) > apart:
             change = np.abs(found[-1] - found[-1 - apart])
             if change.max() <= e.settled * np.abs(found[-1]).max():
+                mean = y.mean(axis=0)
+                _check_returned(bench, column, np.abs(mean).max(), np.abs(y - mean).max())
                 return found[-1], change, len(found) * seconds
     raise AnalysisError(
         f"{bench.description.path.name}: after {len(found) * seconds:g} s of a periodic {bench.inputs[column]} its "
@@ -189,8 +195,10 @@ def _by_pulses(
         pulse[0, column] = sign * amplitude
         parts = chain([pulse], repeat(silence, ceil(_MOST_SECONDS / _APART) - 1))
         total = np.zeros((len(lines), len(bench.outputs)), dtype=complex)
+        largest = 0.0
         turn = np.exp(-2j * np.pi * frequencies * part * bench.step_size)[:, None]
         for number, y in enumerate(runs.respond(parts)):
+            largest = max(largest, float(np.abs(y).max()))
             added = pulse_response(y, frequencies, bench.step_size) * turn**number / (sign * amplitude)
             total += added
             if np.abs(added).max() <= e.settled * np.abs(total).max():
@@ -200,7 +208,25 @@ def _by_pulses(
                 f"{bench.description.path.name}: its response to a pulse of {bench.inputs[column]} has not died out "
                 f"after {_MOST_SECONDS:g} s; it is unstable at an ideal bus, or its slowest time constant is longer"
             )
+        _check_returned(bench, column, np.abs(y[-1]).max(), largest)
         seconds += (number + 1) * part * bench.step_size
         sums.append(total)
         changes.append(np.abs(added))
     return np.asarray((sums[0] + sums[1]) / 2), np.maximum(changes[0], changes[1]), seconds
+
+
+def _check_returned(bench: Bench, column: int, away: float, size: float) -> None:
+    """A device that ran away to another operating point, a limit for instance, answers there as calmly as a stable one.
+
+    Raises
+    ------
+    AnalysisError
+        If what remains of the response [pu] is too large a part of it.
+    """
+    if not away <= _AWAY * size:
+        raise AnalysisError(
+            f"{bench.description.path.name}: excited by a small {bench.inputs[column]} at an ideal bus, its outputs "
+            f"left the operating point by {away:.3g} pu and stayed away, with a response of {size:.3g} pu; it is "
+            "unstable at an ideal bus, or at the edge of a limit: check the signs of its controls and its operating "
+            "point; a black box is identified only where it is stable at an ideal bus"
+        )

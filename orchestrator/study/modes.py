@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis.coupled_response import confirmed
 from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
@@ -169,7 +170,7 @@ def modes_from(
     else:
         spectrum = whole_spectrum(model)
         shown, named = find_critical_modes(model, low, high, critical), {}
-    stability = judge(model, spectrum, system)
+    stability = confirmed(master, blocks, model, judge(model, spectrum, system))
     unstable = stability.cause is Cause.COUPLING
     step = check_resolution(master, model, system, shown, frequency_range, coupling_unstable=unstable)
     analysis = case.table.analysis
@@ -251,7 +252,9 @@ def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, 
 
 
 def _warnings(stability: Stability) -> tuple[str, ...]:
-    """Say before a run that the coupling itself is unstable."""
+    """Say before a run that the coupling itself is unstable, or that the FMUs do not confirm the verdict."""
+    if stability.stable is None and stability.reason:
+        return (f"whether the system is stable is not known: {stability.reason}",)
     rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
     if stability.cause is not Cause.COUPLING or growth is None:
         return ()

@@ -1,0 +1,34 @@
+/* y = x + v + 0.1·h: x of a controller, v of a filter, both following u, and with HIDDEN an h that nothing declares.
+   With SAMPLED the controller acts every 20 ms and stands still in between.
+   With RUNAWAY x grows at 40 1/s up to a limit of 200. */
+enum { U, Y, X, V, RATE_X, RATE_V, SIZE };
+enum { H, SINCE, MEMORY };
+#define IS_OUTPUT(r) ((r) == Y)
+#define DIVERGED 1e12
+#define T_X 0.2
+#define T_V 0.05
+static const double START[SIZE] = {0};
+static void initialise(double *z, double *m) {}
+static void advance(double *z, double *m, double *hidden, double time, double step) {
+#ifdef HIDDEN
+    m[H] += step * (0.5 * m[H] + z[X]);
+#endif
+#ifdef SAMPLED
+    m[SINCE] += step;
+    if (m[SINCE] > 0.02 * (1 - 1e-6)) m[SINCE] = 0, z[X] += 0.5 * (z[U] - z[X]);
+#elif defined RUNAWAY
+    z[X] = fmax(-200, fmin(200, z[X] + step * (40 * z[X] + z[U])));
+#else
+    z[X] += -expm1(-step / T_X) * (z[U] - z[X]);
+#endif
+    z[V] += -expm1(-step / T_V) * (z[U] - z[V]);
+}
+static void outputs(double *z, double *m, const double *hidden) {
+    z[Y] = z[X] + z[V] + 0.1 * m[H];
+#ifdef RATE_OF_NOTHING
+    z[RATE_X] = 0;
+#else
+    z[RATE_X] = (z[U] - z[X]) / T_X;
+#endif
+    z[RATE_V] = (z[U] - z[V]) / T_V;
+}
