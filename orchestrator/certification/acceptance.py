@@ -81,6 +81,8 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
         raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
     if not faults and (left := _left_out(name for *_, name in found)):
         raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
+    if not faults and not any(verdict == "pass" for verdict, *_ in found):
+        raise InputError(f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}")
     return Acceptance(not faults, faults, report)
 
 

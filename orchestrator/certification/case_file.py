@@ -47,7 +47,8 @@ def write_case(request: CertificationRequest, switches: Mapping[str, bool], fold
         _lay(request.binding, folder / BINDING)
     tables = _tables(request)
     path = folder / CASE
-    head = _HEAD.format(fmu=request.fmu.name, binding=f" behind {request.binding.name}" if request.binding else "")
+    behind = f" behind {_in_comment(request.binding)}" if request.binding else ""
+    head = _HEAD.format(fmu=_in_comment(request.fmu), binding=behind)
     path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **switches}.items()}
     _check(load_case(path), request, own)  # here, where a value's place is its option and not a line of this file
@@ -57,6 +58,11 @@ def write_case(request: CertificationRequest, switches: Mapping[str, bool], fold
             scenario["set"] = {**scenario.get("set", {}), **values}
     path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
     return load_case(path)
+
+
+def _in_comment(file: Path) -> str:
+    """A file's name for a comment of TOML: in quotes and escaped where it has signs that no comment may have."""
+    return file.name if file.name.isprintable() else ascii(file.name)
 
 
 def _lay(file: Path, target: Path) -> None:

@@ -27,9 +27,10 @@ def save(certification: Certification, folder: Path, *, pdf: bool = False) -> li
     made = datetime.now(UTC).replace(microsecond=0)
     responses_dataset(certification).to_netcdf(folder / RESPONSES, engine="scipy")
     hashes = _hashes(certification, folder)
-    html.write_text(page(certification, hashes, made), encoding="utf-8")
-    printed = [print_pdf(html, folder / PDF)] if pdf else []
     content = {"made": made.isoformat(), **certification_json(certification)}
+    stated = hashes | {f"{JSON}, its figures": figures_hash(content)}
+    html.write_text(page(certification, stated, made), encoding="utf-8")
+    printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
     write_sealed(content, target)
     return [html, target, folder / RESPONSES, *printed]
@@ -48,7 +49,16 @@ def write_sealed(content: Mapping[str, Any], path: Path) -> None:
 
 def seal_of(content: Mapping[str, Any]) -> str:
     """SHA-256 of all that a certificate's JSON says; against accidents, since anybody can compute it."""
-    rest = {key: value for key, value in content.items() if key != "seal"}
+    return _hash_without(content, "seal")
+
+
+def figures_hash(content: Mapping[str, Any]) -> str:
+    """SHA-256 of the same without the hashes of files: the page states it, and so belongs to these figures alone."""
+    return _hash_without(content, "seal", "files")
+
+
+def _hash_without(content: Mapping[str, Any], *names: str) -> str:
+    rest = {key: value for key, value in content.items() if key not in names}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
 
 

@@ -60,6 +60,8 @@ class CertificationRequest:
                 raise InputError(
                     f"{file}: there is no such file; give the path of an .fmu, and with --binding of a .toml"
                 )
+            if not file.name.isascii() and file.name != file.name.encode(errors="replace").decode():
+                raise InputError(f"{str(file)!a}: its name is not UTF-8, so that no report can state it; rename it")
         if "grid.X_L" in self.study_values:
             raise InputError("--set grid.X_L: the test varies it; choose its values with --reactances")
 

@@ -1,14 +1,16 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.certification.acceptance import Acceptance
-from orchestrator.certification.case_file import BASE, WITH, WITHOUT, write_case
+from orchestrator.certification.case_file import BASE, BINDING, FMU, WITH, WITHOUT, write_case
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.details import Details
 from orchestrator.certification.judgement import PointVerdict, judge, watched
@@ -16,6 +18,7 @@ from orchestrator.certification.point import CONVERTER, PointResult, PointTask, 
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
 from orchestrator.distributed.executor import Executor
+from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.study.point_key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.study.point_store import PointStore
@@ -152,9 +155,7 @@ def certify(
     """
     request.check()
     controllers = damping_controllers(bound_fmu(request.fmu, request.binding), request)
-    case = write_case(request, controllers.settings, folder)
-    first = {"grid.X_L": request.reactances[0]}
-    prepared = {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
+    case, prepared = _laid_case(request, controllers, folder)
     description = prepared[WITH].system.components[CONVERTER].description
     tasks = tasks_of(case, prepared, request, controllers)
     points: dict[tuple[str, float], PointResult] = {}
@@ -167,6 +168,42 @@ def certify(
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
     values = prepared[WITH].values
     return Certification(request, description, controllers, event, case.path, values, points, verdicts, stored)
+
+
+def _laid_case(
+    request: CertificationRequest, controllers: DampingControllers, folder: Path
+) -> tuple[Case, dict[str, PreparedScenario]]:
+    """The study's case in the folder; what is there already stays as it is where the request is refused."""
+    first = {"grid.X_L": request.reactances[0]}
+
+    def prepared(case: Case) -> dict[str, PreparedScenario]:
+        return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
+        try:
+            prepared(write_case(request, controllers.settings, Path(trial)))
+        except CaseError as error:
+            raise _refused(request, error, trial) from error
+    case = write_case(request, controllers.settings, folder)
+    return case, prepared(case)
+
+
+def _refused(request: CertificationRequest, error: CaseError, trial: str) -> CaseError:
+    """The same problems, of the user's own files: the case file was made from the request, and is gone."""
+    own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
+
+    def said(text: str) -> str:
+        for laid, given in own.items():
+            text = text.replace(laid, given)
+        return text
+
+    problems = [Problem(re.sub(r"^line \d+, ", "", p.place), said(p.text)) for p in error.problems]
+    if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
+        problems.append(
+            Problem("", f"if its port has other names, give --binding; `gfor bind {request.fmu}` drafts one")
+        )
+    return CaseError(f"{request.fmu}, in the study's case that `gfor certify` makes from the request", problems)
 
 
 def tasks_of(

@@ -12,8 +12,11 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
+from orchestrator.certification.criteria import damping_ratio
+from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
-from orchestrator.certification.files import HTML, JSON, RESPONSES, seal_of
+from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
+from orchestrator.certification.form import check_form
 from orchestrator.certification.point import Numbers, PointResult, PointTask, compute_point
 from orchestrator.certification.rejudgement import rejudge
 from orchestrator.certification.request import same_reactance
@@ -66,7 +69,7 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
         raise InputError(
             f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor certify` wrote"
         ) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: it is not JSON: {error}; give the certificate.json of `gfor certify`") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         found = content.get("format") if isinstance(content, dict) else None
@@ -74,6 +77,7 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
             f"{file}: it is no certificate of format {FORMAT} (found: {found}); older ones hold too little to be "
             "verified, make it anew with `gfor certify`"
         )
+    check_form(file, content)
     return file.parent, content
 
 
@@ -88,17 +92,38 @@ def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
     names = [*_NEEDED, *([BINDING] if content.get("binding") else [])]
     for name in dict.fromkeys([*names, *hashes]):
         _compare_file(folder, name, hashes.get(name), found)
-    page = folder / HTML
-    if page.is_file() and escape(str(content.get("sentence"))) not in page.read_text(encoding="utf-8"):
-        found.faults.append(f"{HTML}: it does not hold the verdict's sentence of {JSON}")
-    try:
-        with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
-            faults = rejudge(content, data)
-    except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
-        faults = [f"the figures cannot be judged again: {type(error).__name__}: {error}"]
+    _compare_page(folder / HTML, content, found)
+    faults = _judged_again(folder, content) + derived_faults(folder, content)
     found.faults += faults
     found.agreed += [] if faults else ["the verdict, judged again from the figures and the responses"]
     return found
+
+
+def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> None:
+    """The page states the hash of the figures that it shows, and the verdict's sentence as it is."""
+    if not page.is_file():
+        return
+    text = page.read_text(encoding="utf-8", errors="replace")
+    if f">{escape(content['sentence'])}</b>" not in text:
+        found.faults.append(f"{HTML}: it does not hold the verdict's sentence of {JSON}")
+    if figures_hash(content) not in text:
+        found.faults.append(f"{HTML}: it was made of other figures than those of {JSON}: their hash is not on the page")
+    else:
+        found.agreed.append(f"{HTML}: the hash of the figures that it shows")
+
+
+def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
+    file = folder / RESPONSES
+    if not file.is_file():
+        return [f"the verdict cannot be judged again without {RESPONSES}"]
+    try:
+        with xr.open_dataset(file, engine="scipy") as data:
+            return rejudge(content, data)
+    except (OSError, KeyError, ValueError, TypeError, IndexError):
+        return [
+            f"the verdict cannot be judged again: {RESPONSES} does not hold the signal {content['signal']!r} at all "
+            f"points of {JSON}, with the event at t = {content['event_time']:g} s"
+        ]
 
 
 def _compare_file(folder: Path, name: str, wanted: str | None, found: Verification) -> None:
@@ -187,7 +212,8 @@ def _differ_modes(stated: list[complex], again: list[complex], tolerance: float)
     if len(stated) != len(again):
         return f"{len(again)} come out and {len(stated)} were certified", ""
     pairs = zip(_sorted(stated), _sorted(again), strict=True)
-    worst = max(((abs(a - b) / max(abs(a), 1e-9), a, b) for a, b in pairs), default=(0.0, 0j, 0j))
+    differences = [(abs(a - b) / max(abs(a), 1e-9), a, b) for a, b in pairs]
+    worst = max(differences, key=lambda d: np.inf if np.isnan(d[0]) else d[0], default=(0.0, 0j, 0j))
     if not worst[0] <= tolerance:
         return f"{_shown(worst[2])} comes out and {_shown(worst[1])} was certified", ""
     return "", _said(worst[0], tolerance)
@@ -198,7 +224,7 @@ def _sorted(values: list[complex]) -> list[complex]:
 
 
 def _shown(value: complex) -> str:
-    hz, ratio = value.imag / (2 * np.pi), -value.real / abs(value)
+    hz, ratio = value.imag / (2 * np.pi), damping_ratio(value)
     return f"{hz:.4f} Hz with {100 * ratio:.4f} %"
 
 

@@ -70,5 +70,6 @@ def run(options: argparse.Namespace) -> int:
     if found.holds:
         console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
     else:
-        console.print(f"[bold red]The certificate does not hold: {len(found.faults)} disagreements.[/]")
+        count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
+        console.print(f"[bold red]The certificate does not hold: {count}.[/]")
     return 0 if found.holds else 1

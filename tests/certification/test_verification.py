@@ -11,9 +11,10 @@ import xarray as xr
 
 from orchestrator.certification import study as study_module
 from orchestrator.certification import verification
-from orchestrator.certification.files import write_sealed
+from orchestrator.certification.files import figures_hash, write_sealed
 from orchestrator.certification.point import POWER
 from orchestrator.cli import main
+from orchestrator.vendor.runner import file_hash
 from tests.certification.fabricated import rings
 from tests.certification.test_recomputing import BOUND
 
@@ -180,3 +181,114 @@ def test_what_cannot_be_verified_is_said(certificate, gfor, tmp_path):
     edited(certificate, lambda content: content.pop("format"))
     code, _, error = gfor("verify", certificate)
     assert (code, "no certificate of format 2" in error) == (2, True)
+
+
+def test_equal_modes_agree_and_one_that_is_no_number_does_not():
+    """Equal differences leave complex numbers to be compared, which have no order."""
+    modes = [-1 + 2j, -1 + 3j]
+    assert verification._differ_modes(modes, list(modes), 1e-5)[0] == ""
+    assert verification._differ_modes(modes, [-1 + 2j, complex("nan")], 1e-5)[0]
+    assert verification._differ_modes(modes, [complex("nan"), -1 + 3j], 1e-5)[0]
+
+
+def at(*place, value):
+    """Sets one entry."""
+
+    def change(content):
+        for key in place[:-1]:
+            content = content[key]
+        content[place[-1]] = value
+
+    return change
+
+
+FORGED = {
+    "pod": at("pod", value="none"),
+    "pod_values": at("pod_values", value={}),
+    "pod_source": at("pod_source", value="as declared"),
+    "values": at("values", value={"droop.R_f": 0.05}),
+    "departures": at("departures", value=["grid.x = 1"]),
+    "judged": at("judged", value="13 of 13"),
+    "missing": at("missing", value=[]),
+    "author": at("fmu", "author", value="Somebody Else"),
+    "sentence": lambda c: c.update(sentence=c["sentence"][:30]),
+    "growth": at("points", 0, "growth", "with", value=-9.9),
+    "stability": at("points", 0, "stability", "with", "sentence", value="xx"),
+    "power": at("points", 0, "power", value=1351.0),
+    "lowered": at("points", 0, "lowered", value=[{"frequency_hz": 1.0, "from_percent": 9.0, "to_percent": 1.0}]),
+    "modes_without": at("points", 0, "modes_without", value=[]),
+    "without": at("points", 0, "modes", 0, "without", value=None),
+    "swings": at("points", 0, "time", "swings", "swings", value=[]),
+    "modal": at("points", 0, "time", "modal", "modes", value=[]),
+    "used": at("parameters", 0, "used", value=123456.0),
+    "fit_errors": at("fit_errors", value={"converter": 0.5}),
+    "converter_model": at("points", 0, "converter_model", "source", value="identified"),
+    "applicant": at("details", "applicant", value="Other GmbH"),
+    "commit": at("environment", "Commit", value="deadbeef"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_no_entry_can_be_changed_and_sealed_again(certificate, gfor, name):
+    edited(certificate, FORGED[name], sealed=True)
+    code, found = verified(gfor, certificate, "--files-only")
+    assert code == 1
+    assert any("it was made of other figures" in text for text in found["faults"])
+
+
+@pytest.mark.parametrize(
+    "name", ["pod", "pod_values", "pod_source", "values", "departures", "judged", "missing", "author", "sentence",
+             "lowered"]
+)  # fmt: skip
+def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
+    """Also where the page was given the hash of the other figures."""
+    path = certificate / "certificate.json"
+    before = figures_hash(json.loads(path.read_text(encoding="utf-8")))
+    edited(certificate, FORGED[name], sealed=True)
+    after = figures_hash(json.loads(path.read_text(encoding="utf-8")))
+    replaced(certificate, "certificate.html", before, after)
+    edited(certificate, lambda c: c["files"].update({"certificate.html": file_hash(certificate / "certificate.html")}),
+           sealed=True)  # fmt: skip
+    code, found = verified(gfor, certificate, "--files-only")
+    assert code == 1
+    assert not any("hash" in text or "SHA" in text for text in found["faults"])
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (at("points", value=[]), "points"),
+        (at("points", value={}), "points"),
+        (at("points", value=[1]), "points.0"),
+        (lambda c: c.pop("points"), "points is missing"),
+        (at("files", value=[1]), "files"),
+        (at("files", value="abc"), "files"),
+        (at("points", 0, "modes", value=None), "points.0.modes"),
+        (at("points", 0, "modes", 0, "damping_percent", value="abc"), "points.0.modes.0.damping_percent"),
+        (at("points", 0, "X_L", value=None), "points.0.X_L"),
+        (at("acceptance", value=3), "acceptance"),
+        (at("sentence", value="\ud800"), "half a character"),
+    ],
+)
+def test_a_damaged_certificate_is_one_error(certificate, gfor, change, place):
+    edited(certificate, change)
+    code, _, error = gfor("verify", certificate)
+    assert (code, place in error, "damaged" in error) == (2, True, True), error
+
+
+def test_deep_json_and_a_page_of_other_bytes_are_no_traceback(certificate, gfor):
+    (certificate / "certificate.html").write_bytes(b"\xff\xff")
+    code, found = verified(gfor, certificate)
+    assert (code, any(text.startswith("certificate.html") for text in found["faults"])) == (1, True)
+    (certificate / "certificate.json").write_text("[" * 200_000, encoding="utf-8")
+    code, _, error = gfor("verify", certificate)
+    assert (code, "it is not JSON" in error) == (2, True)
+
+
+def test_a_refused_request_leaves_a_finished_certificate_as_it_was(certificate, gfor):
+    files = {p.name: p.read_bytes() for p in certificate.iterdir() if p.is_file()}
+    words = ["certify", certificate / "converter.fmu", "--set", "nosuch=1", "--no-check", "--out", certificate]
+    code, _, error = gfor(*words)
+    assert (code, "has no variable 'nosuch'" in error, "makes from the request" in error) == (2, True, True)
+    assert {p.name: p.read_bytes() for p in certificate.iterdir() if p.is_file()} == files
+    assert not list(certificate.glob(".request_*"))
