@@ -1,7 +1,7 @@
 """Whether a certificate still holds: its hashes, its verdict from its own figures, and its points computed anew."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -17,7 +17,7 @@ from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.form import check_form
-from orchestrator.certification.point import Numbers, PointResult, PointTask, compute_point
+from orchestrator.certification.point import CONVERTER, Numbers, PointResult, PointTask, compute_point
 from orchestrator.certification.rejudgement import rejudge
 from orchestrator.certification.request import same_reactance
 from orchestrator.distributed.executor import Executor, WorkerLostError
@@ -196,11 +196,32 @@ def _compare_point(
         return
     stated = [complex(m["real"], m["imag"]) for m in _stated_modes(point, scenario)]
     identified = scenario == WITH and point["converter_model"]["source"] == "identified"
-    modes = _differ_modes(stated, again.modes.eigenvalues.tolist(), TOLERANCE_IDENTIFIED if identified else TOLERANCE)
+    tolerance = TOLERANCE_IDENTIFIED if identified else TOLERANCE
+    modes = _differ_modes(stated, again.modes.eigenvalues.tolist(), tolerance)
     kept = data[signal].sel(scenario=scenario, X_L=point["X_L"]).values
     response = _differ_signal(kept, again.signals.get(signal, np.empty(0)))
+    found.faults += [f"{where}: {text}" for text in _differ_figures(point, scenario, again, tolerance)]
     for what, (fault, said) in (("modes", modes), (signal, response)):
         (found.faults if fault else found.agreed).append(f"{where}: {what}: {fault or said}")
+
+
+def _differ_figures(point: dict[str, Any], scenario: str, again: PointResult, tolerance: float) -> Iterator[str]:
+    """Stability at all frequencies, the power fed in, and the model that stood for the converter."""
+    stated, growth = point["growth"][scenario], again.growth
+    known = np.nan if stated is None else float(stated)
+    if not (np.isnan(known) and np.isnan(growth)) and not abs(known - growth) <= tolerance * max(1.0, abs(growth)):
+        yield f"a largest growth rate of {growth:.6g} 1/s comes out and {known:.6g} 1/s was certified"
+    verdicts = [s and s["stable"] for s in (point["stability"][scenario], again.stability)]
+    if verdicts[0] != verdicts[1]:
+        yield f"stable = {verdicts[1]} comes out and {verdicts[0]} was certified"
+    if scenario == WITHOUT:
+        return
+    power = [np.nan if p is None else float(p) for p in (point["power"], again.power)]
+    if not np.isnan(power).all() and not abs(power[0] - power[1]) <= TOLERANCE * max(1.0, abs(power[1])):
+        yield f"it feeds in {power[1]:.6g} MW at the start and {power[0]:.6g} MW was certified"
+    model = point["converter_model"]
+    if (model["source"], model["order"]) != (again.linearised.get(CONVERTER), again.identified):
+        yield f"its linear model is {again.linearised.get(CONVERTER)!r} and {model['source']!r} was certified"
 
 
 def _stated_modes(point: dict[str, Any], scenario: str) -> list[dict[str, Any]]:

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from orchestrator.certification import acceptance, verification
 from orchestrator.certification import study as study_module
-from orchestrator.certification import verification
+from orchestrator.certification.case_file import write_case
 from orchestrator.certification.files import figures_hash, write_sealed
 from orchestrator.certification.point import POWER
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.cli import main
+from orchestrator.errors import InputError
 from orchestrator.vendor.runner import file_hash
 from tests.certification.fabricated import rings
 from tests.certification.test_recomputing import BOUND
@@ -292,3 +295,41 @@ def test_a_refused_request_leaves_a_finished_certificate_as_it_was(certificate, 
     assert (code, "has no variable 'nosuch'" in error, "makes from the request" in error) == (2, True, True)
     assert {p.name: p.read_bytes() for p in certificate.iterdir() if p.is_file()} == files
     assert not list(certificate.glob(".request_*"))
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"growth": -0.6}, "largest growth rate"),
+        ({"growth": float("nan")}, "largest growth rate"),
+        ({"stability": {"stable": False, "sentence": ""}}, "stable = False"),
+        ({"power": 1349.0}, "it feeds in"),
+        ({"identified": 3}, "its linear model"),
+    ],
+)
+def test_figures_of_a_point_that_come_out_otherwise(certificate, gfor, monkeypatch, other, said):
+    monkeypatch.setattr(verification, "compute_point", lambda task: replace(rings(task), **other))
+    code, found = verified(gfor, certificate)
+    assert (code, any(said in text for text in found["faults"])) == (1, True)
+
+
+def test_a_name_with_a_new_line_is_escaped_in_the_case_file(tmp_path, fmu_path):
+    named = tmp_path / "a\nb = 1.fmu"
+    shutil.copyfile(fmu_path("gfor"), named)
+    (tmp_path / "out").mkdir()
+    case = write_case(CertificationRequest(named), {}, tmp_path / "out")
+    assert r"'a\nb = 1.fmu'" in case.text.splitlines()[0]
+
+
+def test_a_report_in_which_nothing_was_passed_is_refused(tmp_path, fmu_path):
+    fmu = fmu_path("gfor")
+    checks = [{"check": name, "verdict": "not applicable", "fault": ""} for name in acceptance.CHECKS]
+    report = {"tool": acceptance._tool(), "trusted": True, "checks": checks,
+              "sha256": {"fmu": file_hash(fmu), "binding": None}}  # fmt: skip
+    path = tmp_path / "check.json"
+    path.write_text(json.dumps(report), encoding="utf-8")
+    with pytest.raises(InputError, match="none of its checks was passed"):
+        acceptance.read_checks(path, fmu, None)
+    checks[0]["verdict"] = "pass"
+    path.write_text(json.dumps(report), encoding="utf-8")
+    assert acceptance.read_checks(path, fmu, None).trusted
