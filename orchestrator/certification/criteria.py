@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
@@ -36,7 +37,8 @@ class ModeVerdict:
     before
         Eigenvalue of the same mode without the converter; None where the converter introduces the mode.
     similarity
-        How surely it is the same, from 0 to 1, by the shape over the states that both systems have.
+        How surely it is the same, from 0 to 1, by the shape over the states that both systems have; where there is
+        none, that of the likeliest which is no other mode's.
     components
         Who takes part most, in words.
     """
@@ -108,14 +110,27 @@ def neighbouring_modes(having: ModeSet, lacking: ModeSet, components: list[str] 
 
 def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) -> Iterator[ModeVerdict]:
     """Every mode with the converter, beside what it was without."""
-    alike = similarity(having, lacking) if len(having.eigenvalues) and len(lacking.eigenvalues) else None
+    alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
+    if alike.size:
+        alike = similarity(having, lacking)
+    partners = _partners(alike)
+    left = [column for column in range(alike.shape[1]) if column not in partners.values()]
     for k, value in enumerate(having.eigenvalues.tolist()):
-        best = int(np.argmax(alike[k])) if alike is not None else 0
-        known = alike is not None and alike[k, best] >= THRESHOLD
-        before = complex(lacking.eigenvalues[best]) if known else None
-        likeness = float(alike[k, best]) if alike is not None else 0.0
+        partner = partners.get(k)
+        before = None if partner is None else complex(lacking.eigenvalues[partner])
+        likeness = float(alike[k, left].max(initial=0.0) if partner is None else alike[k, partner])
         accepted, reason = judge_mode(value, before)
         yield ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else "")
+
+
+def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
+    """Row → column, each used once, so that the sum of the similarities is largest; none below the threshold.
+
+    With the row's largest alone, one mode without the converter could stand for several with it, and excuse them all.
+    """
+    enough = np.where(alike >= THRESHOLD, alike, 0.0)
+    rows, columns = scipy.optimize.linear_sum_assignment(enough, maximize=True)
+    return {int(k): int(j) for k, j in zip(rows, columns, strict=True) if enough[k, j] > 0}
 
 
 def judge_mode(value: complex, before: complex | None) -> tuple[bool, str]:

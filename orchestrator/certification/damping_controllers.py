@@ -12,7 +12,11 @@ from orchestrator.fmi.port import BoundDescription
 SET = "set in the FMU"
 READ = "as the FMU's variables say"
 DECLARED = "declared by the applicant; the FMU has no variable that shows it"
+UNSEEN = "no output shows its effect"
 UNKNOWN = "nothing was declared, and the FMU has no variable that shows it: taken for none"
+
+
+_AS_DECLARED = " as declared by the applicant"
 
 
 @dataclass(frozen=True)
@@ -27,11 +31,28 @@ class DampingControllers:
         How that is known, in words.
     settings
         Values to be set for it, by the FMU's variable.
+    declared
+        Letters of those, active or not, that only the applicant speaks of.
+    unseen
+        Letters of active ones with a switch and without an output that shows what they do.
     """
 
     pod: str
     source: str
     settings: Mapping[str, bool] = field(default_factory=dict)
+    declared: str = ""
+    unseen: str = ""
+
+    def in_words(self) -> str:
+        """For a headline, with what is not known of each."""
+        active = self.pod.removeprefix("none")
+        if not active:
+            return f"without POD{_AS_DECLARED if self.declared else ''}"
+        groups: dict[str, list[str]] = {}
+        for letter in active:
+            said = _AS_DECLARED if letter in self.declared else f" ({UNSEEN})" if letter in self.unseen else ""
+            groups.setdefault(said, []).append(f"POD-{letter.upper()}")
+        return "with " + " and ".join(f"{' and '.join(names)}{said}" for said, names in groups.items())
 
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
@@ -45,7 +66,9 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
     known = {letter: _state(description, request, letter) for letter in "pq"}
     if request.pod is None:
         active = "".join(letter for letter, value in known.items() if value) or "none"
-        return DampingControllers(active, UNKNOWN if None in known.values() and active == "none" else READ)
+        unseen = _unseen(description, known, active)
+        source = UNKNOWN if None in known.values() and active == "none" else _with_unseen(READ, unseen)
+        return DampingControllers(active, source, unseen=unseen)
     wanted = {letter: letter in request.pod.removeprefix("none") for letter in "pq"}
     settings = {}
     for letter, on in wanted.items():
@@ -54,12 +77,25 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
         if _is_switch(description.variables.get(name)):
             settings[name] = on
     source = SET if all(known[letter] is not None for letter in "pq") else _partly(known, request.pod)
-    return DampingControllers(request.pod, source, settings)
+    unseen = _unseen(description, known, request.pod)
+    declared = "".join(letter for letter, value in known.items() if value is None)
+    return DampingControllers(request.pod, _with_unseen(source, unseen), settings, declared, unseen)
 
 
 def variable(letter: str) -> str:
     """Our name for the switch of a damping controller."""
     return f"pod_{letter}.enabled"
+
+
+def _unseen(description: FmuDescription, known: Mapping[str, bool | None], pod: str) -> str:
+    """Letters of active controllers with a switch whose effect cannot be seen."""
+    switched = [letter for letter in pod.removeprefix("none") if known[letter] is not None]
+    return "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
+
+
+def _with_unseen(source: str, unseen: str) -> str:
+    names = " and ".join(f"POD-{letter.upper()}" for letter in unseen)
+    return f"{source}; {UNSEEN} ({names})" if unseen else source
 
 
 def _partly(known: Mapping[str, bool | None], pod: str) -> str:

@@ -70,6 +70,7 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "stability": {name: p.stability for name, p in points.items()},
         "residual": {name: number(p.residual) for name, p in points.items()},
         "power": having.power,
+        "findings": {name: p.findings for name, p in points.items()},
         "converter_model": _model_json(having),
         "warnings": {name: list(p.warnings) for name, p in points.items()},
         "time": None if v.time is None else time_json(v.time),

@@ -12,6 +12,7 @@ from orchestrator.certification.criteria import (
     neighbouring_modes,
     stability_fault,
 )
+from orchestrator.certification.motion import motion_faults
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import Numbers, SwingTest, slow_part, swing_test
 
@@ -23,6 +24,9 @@ RATED_POWER = 1350.0
 
 _SAME_POWER = 0.01
 """Part of it by which the start may differ."""
+
+_LEAST_MOVEMENT = 1e-6
+"""Of a damping controller's output [pu]: one that moves less does nothing."""
 
 LOWERED = 2.0
 """A damping that the converter lowers by more than this [percentage points] is remarked."""
@@ -113,7 +117,9 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
     if lacking.failure:
         unknown = f"the study failed without the converter: {lacking.failure}"
         return PointVerdict(having.X_L, (), None, None, (), unknown=unknown)
-    faults = [f"the study failed with the converter: {having.failure}"] if having.failure else _wrong(having, pod)
+    faults = _wrong(having, pod, event_time)
+    if having.failure:
+        faults = [f"the study failed with the converter: {having.failure}"]
     modes: tuple[ModeVerdict, ...] = ()
     beside: tuple[ModeVerdict, ...] = ()
     if having.modes is not None and lacking.modes is not None:
@@ -133,8 +139,8 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
     return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside)
 
 
-def _wrong(having: PointResult, pod: str) -> list[str]:
-    """Why a converter that ran was not in the norm's study."""
+def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
+    """Why a converter that ran was not in the norm's study, or did not stay in synchronism and come to rest."""
     wrong = []
     power = float("nan") if having.power is None else having.power
     if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
@@ -146,6 +152,7 @@ def _wrong(having: PointResult, pod: str) -> list[str]:
         if not np.isfinite(values).all():
             at = having.times[int(np.argmax(~np.isfinite(values)))]
             wrong.append(f"{name} is not finite from t = {at:g} s on")
+    wrong += motion_faults(having.times, having.signals, event_time, having.findings)
     return wrong + [text for letter in "pq" if (text := _idle(having, pod, letter))]
 
 
@@ -155,12 +162,19 @@ def _idle(having: PointResult, pod: str, letter: str) -> str | None:
     values = having.signals.get(name)
     if values is None:
         return None
-    moves, named = bool(np.ptp(values) > 0), letter in pod.removeprefix("none")
+    moved = float(np.ptp(values))
+    moves, named = moved > _LEAST_MOVEMENT, letter in pod.removeprefix("none")
     if named and not moves:
-        return f"POD-{letter.upper()} is said to be active, and {name} stays at {values[0]:g}: it does nothing"
+        return f"POD-{letter.upper()} is said to be active, and {name} {_small(moved, values)}: it does nothing"
     if moves and not named:
         return f"POD-{letter.upper()} is said to be off, and {name} moves: it is active"
     return None
+
+
+def _small(moved: float, values: Numbers) -> str:
+    if moved == 0:
+        return f"stays at {values[0]:g}"
+    return f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu"
 
 
 def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:

@@ -21,6 +21,7 @@ from orchestrator.fmi.port import SYSTEM_BASE_MVA
 from orchestrator.study.modes import modes_of, running
 from orchestrator.study.point_key import same_case
 from orchestrator.study.point_store import Arrays
+from orchestrator.watch.watch import Watch
 
 COMPUTED = (0.05, 3.0)
 """Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range, and
@@ -83,6 +84,8 @@ class PointResult:
         What the converter feeds into its bus at the start, by its current [MW]; None without the converter.
     signals
         By name, each of the shape of ``times``.
+    findings
+        What the watch saw of the run, as `Finding.as_json` has it.
     failure
         Why there are no modes, or the response is not whole.
     """
@@ -102,6 +105,7 @@ class PointResult:
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    findings: list[dict[str, Any]] = field(default_factory=list)
     failure: str | None = None
 
     @property
@@ -130,6 +134,7 @@ class PointResult:
             signals = {name.removeprefix(_SIGNAL): arrays.pop(name) for name in recorded}
             modes = None if names is None else ModeSet(**arrays, names=tuple(names))
             header["warnings"] = tuple(header["warnings"])
+            header["findings"]  # a point without them was not watched: it is computed anew
             return cls(**header, modes=modes, times=times, signals=signals)
         except (KeyError, TypeError, ValueError):
             return None
@@ -157,7 +162,7 @@ def compute_point(task: PointTask) -> PointResult:
 
 def _compute(case: Case, task: PointTask, result: PointResult) -> None:
     (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
-    recorder = Recorder(prepared.record, prepared.record_every)
+    watch = Watch(prepared)
     with running(prepared) as master:
         converter = master.components.get(CONVERTER)
         if converter is not None and (task.black_box or is_black_box(converter)):
@@ -171,9 +176,10 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             _keep_modes(result, found.model, found.stability)
         f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
         try:
-            master.run(prepared.stop_time, prepared.events, [recorder])
+            master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:
-            _keep_signals(result, recorder, master, f_n)
+            _keep_signals(result, watch.recorder, master, f_n)
+    result.findings = [finding.as_json() for finding in watch.findings()]
 
 
 def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:

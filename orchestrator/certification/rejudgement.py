@@ -9,6 +9,7 @@ import xarray as xr
 from orchestrator.certification.case_file import WITH, WITHOUT
 from orchestrator.certification.criteria import damping_ratio, is_judged, judge_mode, stability_fault
 from orchestrator.certification.judgement import RATED_POWER, judge_response, watched
+from orchestrator.certification.motion import motion_faults
 from orchestrator.certification.request import missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 
@@ -62,11 +63,15 @@ def _of_point(point: dict[str, Any], content: dict[str, Any], responses: xr.Data
     bad |= stability_fault(having, lacking, stability[WITH], stability[WITHOUT]) is not None
     power = point["power"]
     bad |= power is None or not abs(power - RATED_POWER) <= 0.01 * RATED_POWER
+    recorded = responses.sel(scenario=WITH, X_L=point["X_L"])
+    signals = {str(name): values.values for name, values in recorded.items()}
+    findings = point.get("findings", {}).get(WITH, ())
+    bad |= any(motion_faults(responses["time"].values, signals, content["event_time"], findings))
     time = point["time"]
     if time is None:
         bad = True
     else:
-        y = responses[content["signal"]].sel(scenario=WITH, X_L=point["X_L"]).values
+        y = signals[content["signal"]]
         again = judge_response(responses["time"].values, y, content["signal"], content["event_time"])
         ratio = again.swings.ratio
         if again.accepted is not time["accepted"] or not _same(ratio, time["swings"]["ratio"]):

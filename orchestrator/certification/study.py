@@ -106,8 +106,7 @@ class Certification:
 
     def sentence(self) -> str:
         """The result, and where."""
-        with_pod = {"none": "without POD", "p": "with POD-P", "q": "with POD-Q", "pq": "with POD-P and POD-Q"}[self.pod]
-        subject = f"The converter {self.description.model_name!r} {with_pod}"
+        subject = f"The converter {self.description.model_name!r} {self.controllers.in_words()}"
         said = {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)
         if self.acceptance is not None and self.refused:
             said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."

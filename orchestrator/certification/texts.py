@@ -23,8 +23,8 @@ a description of section 5.10; where that leaves something open, it was read as 
 compares these rules with the norm's text.</p><ol>
 <li>Eigenvalue criterion: every mode from 0.1 to 1.5 Hz of the system with the converter has at least 5 % of damping. A
 mode with less is accepted only where the same mode had less than 5 % without the converter already. Modes are matched
-by their left and right eigenvectors over the states that both systems have; a mode whose likeness to all others is
-below 0.5 counts as introduced.</li>
+by their left and right eigenvectors over the states that both systems have, each with one at most, so that the sum of
+the likenesses is largest; a mode without a partner of at least 0.5 counts as introduced.</li>
 <li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter; nor one
 that grows without a communication step and is hidden by it.</li>
 <li>{watched}</li>
@@ -42,7 +42,12 @@ either way.</li>
 nothing else changed of the study. With fewer, or with a study that was changed, the test is incomplete. Other values of
 X_L are shown; they replace none of the 13, and failing there is failing.</li>
 <li>The converter has to feed in its 1350 MW from the start, and a damping controller that is said to be active has to
-move its output, where the FMU shows one.</li>
+move its output by more than 1e-6 pu, where the FMU shows one.</li>
+<li>A response that loses synchronism, grows, or swings for ever is not accepted. The run is watched as by
+<code>gfor run</code>. Besides, the frequency at bus 2 stays within 2.5 Hz of its start; and in the last third of the
+record neither it nor SG1's active power swings, from peak to peak and without a straight drift, by more than half of
+what it does in the first 10 s after the event. The slowest and least damped mode that the norm accepts, 0.1 Hz with
+5 %, keeps less.</li>
 <li>Modes just outside the judged range, and dampings that the converter lowers by more than two points, are listed and
 not judged.</li>
 <li>Active loads of constant current become so with a lag of 1 ms; within it they are conductances. Without a lag the

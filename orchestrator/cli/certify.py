@@ -3,10 +3,12 @@
 import argparse
 from pathlib import Path
 
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.certification.acceptance import read_checks, run_checks
+from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.details import TEMPLATE, Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest
@@ -21,6 +23,10 @@ from orchestrator.errors import INTERRUPTED, InputError
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor certify``."""
+    parser.epilog = (
+        "Exit codes: 0 the converter passes; 1 it fails; 2 an input cannot be used; 3 the test is incomplete, as with "
+        f"fewer than 13 reactances; 4 it passes, and an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
+    )
     parser.add_argument("fmu", type=Path, nargs="?", metavar="FILE.fmu", help="the converter")
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument(
@@ -120,7 +126,7 @@ def _table(result: Certification) -> Table:
         "X_L [pu]",
         "least damped [Hz]",
         "ξ [%]",
-        "without: ξ [%]",
+        "the same without",
         "ΔP5M5/ΔP1M1",
         "in the signal: ξ [%]",
         "",
@@ -130,12 +136,12 @@ def _table(result: Certification) -> Table:
         worst = v.modes[0] if v.modes else None
         ratio = v.time.swings.ratio if v.time else None
         seen = min((m.damping_percent for m in v.time.modal.modes), default=None) if v.time else None
-        before = worst.before_percent if worst else None
+        before = worst.before if worst else None
         table.add_row(
             f"{v.X_L:g}",
             f"{worst.frequency_hz:.3f}" if worst else "–",
             f"{worst.damping_percent:.2f}" if worst else "–",
-            "–" if before is None else f"{before:.2f}",
+            "–" if before is None else f"{before.imag / (2 * np.pi):.3f} Hz, {100 * damping_ratio(before):.2f} %",
             "–" if ratio is None else f"{ratio:.3f}",
             "–" if seen is None else f"{seen:.2f}",
             "accepted" if v.accepted else "[red]not accepted[/]" if v.judged else "[red]not judged[/]",

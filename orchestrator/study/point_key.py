@@ -15,7 +15,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 
 _ROOT = Path(__file__).parents[1]
-_PACKAGES = ("analysis", "black_box", "cases", "coupling", "fmi")
+_PACKAGES = ("analysis", "black_box", "cases", "coupling", "fmi", "watch")
 _MODULES = ("study/modes.py", "study/sweep_point.py", "certification/point.py")
 
 

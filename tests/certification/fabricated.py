@@ -15,7 +15,7 @@ def rings(task):
     t = np.arange(0, 20, 1e-2)
     signal = 1 + 0.1 * np.exp(-0.5 * np.maximum(t - 1, 0)) * np.sin(2 * np.pi * 0.6 * np.maximum(t - 1, 0))
     modes = ModeSet(np.array([-0.5 + 4j]), np.ones((1, 2), complex), np.ones((1, 2), complex), ("a", "b"))
-    names = {POWER: signal, FREQUENCY: 50 * signal}
+    names = {POWER: signal, FREQUENCY: 50 + signal - 1}
     return PointResult(
         task.X_L, task.scenario, modes, ["a 100 %"], -0.5, residual=1e-9, power=1350.0, times=t, signals=names,
         units=dict.fromkeys(names, "pu"), stability={"stable": True, "sentence": "stable: -0.5 1/s"},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.certification.criteria import eigenvalue_test, modal_test, stability_fault
+from orchestrator.certification.criteria import _partners, eigenvalue_test, modal_test, stability_fault
 from orchestrator.certification.point import bus_frequency
 
 
@@ -46,6 +46,26 @@ def test_an_existing_mode_must_not_be_taken_below_five_percent():
 
 def test_a_mode_that_was_below_already_is_not_the_converters_doing():
     assert verdict((0.5, 0.02, "a"), [(0.55, 0.03, "a")]).accepted
+
+
+def test_one_mode_that_was_below_already_excuses_one_only():
+    """Two copies of a state's mode are both like the one that was; the likelier has it, the other is introduced."""
+    r = np.sqrt([0.9, 0.1])
+    shapes = np.array([[1, 0], r], complex)
+    left = np.array([[1, 0], [1 / r[0] * 0.8, 0.2 / r[1]]], complex)
+    having = ModeSet(np.array([mode(0.5, 0.02), mode(0.7, 0.01)]), shapes, left, ("a", "b"))
+    lacking = modes((0.55, 0.03, "a"))
+    found = {round(v.frequency_hz, 3): v for v in eigenvalue_test(having, lacking)}
+    assert found[0.5].accepted
+    assert found[0.5].before == pytest.approx(mode(0.55, 0.03))
+    assert found[0.7].before is None
+    assert not found[0.7].accepted
+    assert "introduces" in found[0.7].reason
+
+
+def test_partners_are_chosen_together():
+    alike = np.array([[0.9, 0.8], [0.85, 0.1], [0.45, 0.4]])
+    assert _partners(alike) == {0: 1, 1: 0}
 
 
 @pytest.mark.parametrize(("frequency", "judged"), [(0.099, False), (0.1, True), (1.5, True), (1.501, False)])

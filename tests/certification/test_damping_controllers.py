@@ -1,12 +1,13 @@
 """What --pod names is set where the FMU has it, contradicted nowhere, and else declared."""
 
 import tomllib
+from dataclasses import replace
 
 import pytest
 
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
-from orchestrator.certification.damping_controllers import DECLARED, READ, SET, UNKNOWN, damping_controllers
+from orchestrator.certification.damping_controllers import DECLARED, READ, SET, UNKNOWN, UNSEEN, damping_controllers
 from orchestrator.certification.request import PODS, CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.vendor.binding import bound_fmu
@@ -77,3 +78,42 @@ def test_a_switch_that_the_binding_sets_must_agree(tmp_path, fmu_path):
     found = controllers(CertificationRequest(fmu_path("gfor"), binding, pod="q"))
     assert (found.source, found.settings) == (SET, {"pod_p.enabled": False})
     assert controllers(CertificationRequest(fmu_path("gfor"), binding)).pod == "q"
+
+
+def without_outputs(description, *names):
+    """The FMU's description, less some variables."""
+    kept = {name: info for name, info in description.variables.items() if name not in names}
+    return replace(description, variables=kept)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "pod", "source", "headline"),
+    [
+        ((), "pq", SET, "with POD-P and POD-Q"),
+        (("delta_p_pod",), "none", SET, "without POD"),
+        (("delta_p_pod",), "q", SET, "with POD-Q"),
+        (("delta_p_pod",), "p", f"{SET}; {UNSEEN} (POD-P)", f"with POD-P ({UNSEEN})"),
+        (("delta_p_pod", "delta_q_pod"), "pq", f"{SET}; {UNSEEN} (POD-P and POD-Q)",
+         f"with POD-P and POD-Q ({UNSEEN})"),
+        (("pod_p.enabled", "pod_q.enabled"), "p", DECLARED, "with POD-P as declared by the applicant"),
+        (("pod_p.enabled",), "pq", f"{SET}, except POD-P: {DECLARED}",
+         "with POD-P as declared by the applicant and POD-Q"),
+    ],
+)  # fmt: skip
+def test_what_no_output_shows_and_what_is_only_declared_is_said_in_the_headline(
+    fmu_path, hidden, pod, source, headline
+):
+    request = CertificationRequest(fmu_path("gfor"), pod=pod)
+    found = damping_controllers(without_outputs(bound_fmu(request.fmu, None), *hidden), request)
+    assert (found.source, found.in_words()) == (source, headline)
+
+
+def test_the_certificate_says_in_its_first_line_that_a_controller_is_only_declared(
+    tmp_path, gallery, gfor, monkeypatch
+):
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    fmu, binding = gallery("converter_power_si")
+    _, text, _ = gfor("certify", fmu, "--binding", binding, "--no-check", "--pod", "p", "--reactances", "0.1",
+                      "--workers", 1, "--out", tmp_path)  # fmt: skip
+    assert "with POD-P as declared by the applicant is accepted" in " ".join(text.split())
+    assert "with POD-P as declared by the applicant is accepted" in figures(tmp_path)["sentence"]

@@ -8,10 +8,11 @@ import pytest
 
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
-from orchestrator.certification.point import POWER, PointResult
+from orchestrator.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import REACTANCES
 from orchestrator.vendor.checks.base import failed, passed
 from orchestrator.vendor.runner import Report
+from orchestrator.watch.finding import Finding
 from tests.certification.fabricated import figures, rings
 
 
@@ -149,6 +150,94 @@ def test_a_damping_controller_is_what_it_is_said_to_be(certified, arguments, mov
     code, _, content, _ = certified("--reactances", "0.1", *arguments, points=compute)
     assert code == (3 if fault is None else 1)
     assert fault is None or fault in content["sentence"]
+
+
+def moved(signal):
+    """The output of POD-P with the converter."""
+
+    def compute(task):
+        found = rings(task)
+        if task.scenario == "with":
+            found.signals["converter.delta_p_pod"] = signal(found.times)
+            found.units["converter.delta_p_pod"] = "pu"
+        return found
+
+    return compute
+
+
+@pytest.mark.parametrize(("size", "fault"), [(3.7e-11, True), (0.9e-6, True), (1.1e-6, False)])
+def test_a_damping_controller_that_hardly_moves_does_nothing(certified, size, fault):
+    points = moved(lambda t: size * np.sin(t) ** 2)
+    code, _, content, _ = certified("--reactances", "0.1", "--pod", "p", points=points)
+    assert code == (1 if fault else 3)
+    assert fault == ("less than 1e-06 pu: it does nothing" in content["sentence"])
+    assert fault or certified("--reactances", "0.1", "--pod", "none", points=points)[0] == 1
+
+
+T = np.arange(0, 20, 1e-2)
+AFTER = np.maximum(T - 1, 0)
+EARLY = 0.1 * np.exp(-0.5 * AFTER) * np.sin(2 * np.pi * 0.6 * AFTER)
+SLIPS = 50 + EARLY + 13 * np.sin(2 * np.pi * 0.5 * AFTER) * (AFTER > 9)
+LIMIT_CYCLE = 1 + EARLY + 0.125 * np.sin(2 * np.pi * 0.4 * AFTER) * (AFTER > 11)
+
+
+@pytest.mark.parametrize(
+    ("name", "signal", "fault"),
+    [
+        (FREQUENCY, SLIPS, "Hz, first more than 2.5 Hz from its start at t = 10.0"),
+        (FREQUENCY, 50 + EARLY * 25, None),
+        (FREQUENCY, 50 + EARLY * 50, "Hz from its start"),
+        (POWER, LIMIT_CYCLE, "sg1.p still swings by 0.2"),
+        (POWER, 1 + EARLY + 0.2 * np.maximum(T - 12, 0), None),
+    ],
+)
+def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swings_are(certified, name, signal, fault):
+    """The same as judged again by `gfor verify`; a straight drift is no swing."""
+
+    def compute(task):
+        found = rings(task)
+        if task.scenario == "with":
+            found.signals[name] = signal
+        return found
+
+    watched_too = ("--pod", "p") if name == POWER else ()  # the norm's own criteria watch the other signal
+    code, _, content, page = certified("--reactances", "0.1", *watched_too, points=compute)
+    assert code == (3 if fault is None else 1), content["sentence"]
+    assert fault is None or fault in content["sentence"]
+    assert "in the last third of the" in page
+
+
+@pytest.mark.parametrize(
+    ("kind", "fails"),
+    [("loss_of_synchronism", True), ("sustained_oscillation", True), ("growing_oscillation", True),
+     ("active_limit", False), ("undisturbed_motion", False)],
+)  # fmt: skip
+def test_what_the_watch_saw_of_an_unstable_run_fails_the_point(certified, kind, fails):
+    finding = Finding(kind, 3.0, "converter", "omega", "the converter does it").as_json()
+    code, _, content, _ = certified("--reactances", "0.1,0.3", points=only(0.3, findings=[finding]))
+    assert code == (1 if fails else 3)
+    assert ("At 0.3 pu: the converter does it." in content["sentence"]) == fails
+    assert content["points"][1]["findings"] == {"without": [], "with": [finding]}
+
+
+def test_findings_are_stored_and_a_point_that_was_not_watched_is_computed_anew():
+    finding = Finding("sustained_oscillation", 3.0, "converter", "omega", "it swings", None, {"f": 1.0}).as_json()
+    header, arrays = PointResult(0.1, "with", findings=[finding]).stored()
+    assert PointResult.restored(dict(header), dict(arrays)).findings == [finding]
+    del header["findings"]
+    assert PointResult.restored(header, arrays) is None
+
+
+def test_the_terminal_shows_which_mode_it_was_without_the_converter(certified):
+    _, text, _, _ = certified("--reactances", "0.1")
+    assert "0.637 Hz, 12.40 %" in text
+
+
+def test_the_help_names_the_exit_codes(gfor):
+    _, text, _ = gfor("certify", "--help")
+    text = " ".join(text.split())
+    for code in ("0 the converter passes", "1 it fails", "3 the test is incomplete", "4 it passes, and", "130 interr"):
+        assert code in text
 
 
 def test_where_the_base_system_fails_nothing_is_judged(certified):
