@@ -192,7 +192,7 @@ LIMIT_CYCLE = 1 + EARLY + 0.125 * np.sin(2 * np.pi * 0.4 * AFTER) * (AFTER > 11)
     ],
 )
 def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swings_are(certified, name, signal, fault):
-    """The same as judged again by `gfor verify`; a straight drift is no swing."""
+    """A straight drift is no swing."""
 
     def compute(task):
         found = rings(task)
