@@ -164,6 +164,8 @@ def stability_fault(
         return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"
     if growth_with > _STABLE >= growth_without:
         return f"the converter makes the system unstable: an eigenvalue has a real part of {growth_with:+.3g} 1/s"
+    if with_converter and with_converter["stable"] is None:
+        return f"nothing shows that the system with the converter is stable: {with_converter['sentence']}"
     if with_converter and with_converter["stable"] is False and not (without and without["stable"] is False):
         return f"the converter makes the system unstable: {with_converter['sentence']}"
     return None

@@ -154,3 +154,9 @@ def test_the_bus_frequency_is_the_turn_of_the_angle_without_the_network_transien
     decay_in_a_period = 1e-3 * (1 - np.exp(-3 * 0.02)) / (2 * np.pi * 0.02)  # 0.5 mHz; unfiltered it would be 50 mHz
     assert np.abs(found - wanted)[10:-10].max() < decay_in_a_period
     assert np.abs(found - wanted)[1000:-10].max() < 1e-5
+
+
+def test_a_verdict_that_is_not_known_fails_the_point():
+    known, unknown = ({"stable": stable, "sentence": "not known: x_q is off"} for stable in (True, None))
+    assert "nothing shows" in stability_fault(-0.1, -0.1, unknown, known)
+    assert stability_fault(-0.1, -0.1, known, known) is None
