@@ -69,6 +69,11 @@ def load(description: FmuDescription, directory: Path) -> ctypes.CDLL:
         os.chdir(before)
 
 
+def unload(library: ctypes.CDLL) -> None:
+    """Give a loaded binary back: while one handle is open, its static data outlive every instance."""
+    fmpy.freeLibrary(library._handle)
+
+
 def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
     """The loader's words as an error: what is missing here, or what is wrong with the binary."""
     for pattern in _MISSING:

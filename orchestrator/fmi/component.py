@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, EndedError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
-from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load
+from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load, unload
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
 from orchestrator.fmi.interrupts import calls
@@ -149,6 +149,8 @@ class Component:
         )
         if newer:
             self._behind.prepare(fmu.dll)
+        else:
+            unload(library)  # it is open a second time in FMPy's object, which gives it back
         return fmu
 
     def _refuse_absent(self, call: str) -> None:

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from orchestrator.fmi.binary import absent_functions, load
+from orchestrator.fmi.binary import absent_functions, load, unload
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
@@ -59,7 +59,11 @@ class Host(Worker):
     def do_absent_functions(self) -> list[list[str]]:
         """Functions that the binary lacks: those that it needs by what it declares, and the others."""
         described = self._description.native if isinstance(self._description, BoundDescription) else self._description
-        return list(absent_functions(described, load(described, Path(self._request["directory"]))))
+        library = load(described, Path(self._request["directory"]))
+        try:
+            return list(absent_functions(described, library))
+        finally:
+            unload(library)
 
     def do_close(self, lost: bool) -> None:
         component = self._instances.pop(self._asked)
