@@ -48,7 +48,8 @@ def test_a_run_can_be_interrupted_at_any_time(patch):
 
 
 _WAITS = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs are started without it
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
 
