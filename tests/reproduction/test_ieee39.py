@@ -62,8 +62,8 @@ def test_the_stray_capacitance_hardly_moves_the_mode_and_too_little_of_it_is_war
         mode = compute_modes(*prepare("gfor", {"grid.stray_B": stray})).named["inter-area"]
         assert mode.frequency_hz == pytest.approx(wanted.frequency_hz, abs=1e-3)
         assert mode.damping_percent == pytest.approx(wanted.damping_percent, abs=0.05)
-    (warning,) = compute_modes(*prepare("gfor", {"grid.stray_B": 0.01})).warnings
-    assert "numerically unstable" in warning
+    warnings = compute_modes(*prepare("gfor", {"grid.stray_B": 0.01})).warnings
+    assert any("numerically unstable" in text for text in warnings)
 
 
 @pytest.mark.slow
