@@ -55,6 +55,11 @@ class Mode:
     def damping_percent(self) -> float:
         return 100 * self.damping_ratio
 
+    @property
+    def is_oscillation(self) -> bool:
+        """Neither a real pole nor a zero; see `oscillations`."""
+        return bool(oscillations(np.array([self.eigenvalue]))[0])
+
     @cached_property
     def by_component(self) -> dict[str, float]:
         """Participation of every component as a whole: the sum over its states, largest first."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.analysis.modes import Mode, find_spectrum, oscillations
+from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.threads import alone
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
@@ -184,7 +184,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
 
 def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:
     spectrum = find_spectrum(model, *COMPUTED)
-    modes = [mode for mode in spectrum.modes if oscillations(np.array([mode.eigenvalue]))[0]]
+    modes = [mode for mode in spectrum.modes if mode.is_oscillation]
     result.modes = ModeSet.of(modes, model.names)
     result.linearised = dict(model.sources)
     result.components = [_in_words(mode) for mode in modes]

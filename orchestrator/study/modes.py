@@ -14,7 +14,7 @@ from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose, continuous
-from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed, oscillations
+from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed
 from orchestrator.analysis.resolution import check_resolution
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
@@ -163,7 +163,7 @@ def modes_from(
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
         everything = find_spectrum(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
         spectrum: Spectrum | None = everything
-        swinging = [mode for mode in everything.modes if oscillations(np.array([mode.eigenvalue]))[0]]
+        swinging = [mode for mode in everything.modes if mode.is_oscillation]
         shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
         candidates = named_modes(case, model, swinging)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}

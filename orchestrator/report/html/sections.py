@@ -13,8 +13,6 @@ from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.report.signals import relative_difference, signal
 
 _BARS = 8
-_LEAST_DAMPING = 5.0
-"""Damping [%] that grid codes commonly ask for; less is marked."""
 
 _KINDS = {
     "growth": "the undisturbed state grows",
