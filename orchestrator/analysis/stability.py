@@ -205,6 +205,14 @@ def grows(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
     return mask
 
 
+def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex | None:
+    """The eigenvalue [rad/s] that grows most, None where none grows; slow ones of a step map are left out (`SLOW`)."""
+    growing = values[grows(values)]
+    if step_map:
+        growing = growing[np.abs(growing) > SLOW]
+    return complex(growing[np.argmax(growing.real)]) if len(growing) else None
+
+
 def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> Hidden:
     """What a frequency range [Hz] does not show of a spectrum."""
     swinging = values[oscillations(values)]

@@ -29,7 +29,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 from orchestrator.study.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.study.design_target import Target, check_range, find_target, mode_name
-from orchestrator.study.guard import GROWTH, GUARDED, Naming, Surroundings, breach, surroundings
+from orchestrator.study.guard import GUARDED, Naming, Surroundings, breach, surroundings
 from orchestrator.study.margins import Margins, compute_margins
 from orchestrator.study.modes import named_modes, running
 from orchestrator.study.refinement import Refinement, Verdict, refine
@@ -293,9 +293,8 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
 
 
 def _unstable(stability: Stability) -> str | None:
-    """What a design that leaves the system unstable is told; growth that the guard takes for none is in the verdict."""
-    grows = stability.stable is False and (stability.largest_growth_rate or 0.0) > GROWTH
-    return f"the system is {stability.sentence()}" if grows else None
+    """What is wrong with a design that leaves the system unstable, at whatever frequency."""
+    return f"the system is {stability.sentence()}" if stability.stable is False else None
 
 
 def _required(request: DesignRequest, initial: complex) -> float:

@@ -8,20 +8,18 @@ import numpy as np
 from orchestrator.analysis.linear_model import LinearModel, Vector
 from orchestrator.analysis.modes import Mode, find_spectrum, to_continuous
 from orchestrator.analysis.pod_design import damping_ratio
+from orchestrator.analysis.stability import fastest_growth
 
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
 
 GUARDED = (0.1, 2.0)
 """Frequencies [Hz] of the modes whose damping is guarded; what is unstable is seen at any frequency."""
 
-GROWTH = 1e-3
-"""Real parts up to this [1/s] are the zero eigenvalue of the free angle, in its numerical accuracy."""
-
 _SAME = 1e-5
 """Eigenvalues nearer to each other, relative to their size, are the same one, computed in two ways."""
 
 _EQUAL = 1e-3
-"""Damping ratios that differ by less count as equal."""
+"""Damping ratios that differ by less count as equal, and growth rates that differ by less than this part of them."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class Surroundings:
     others
         Those from 0.1 to 2 Hz, least damped first.
     growth
-        Largest real part of any eigenvalue [1/s], the target's included.
+        Real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows.
     named
         The mode that the case's own rule gives the target's name; normally the target itself.
     """
@@ -53,7 +51,7 @@ class Surroundings:
 
     @property
     def is_unstable(self) -> bool:
-        return self.growth > GROWTH
+        return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":
         """The same, with a mode taken out of the others."""
@@ -78,12 +76,13 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
     others = tuple(spectrum.modes)
     if target is not None:
         others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
-    return Surroundings(others, spectrum.growth_rate, naming(model, spectrum.modes))
+    fastest = fastest_growth(spectrum.eigenvalues, step_map=model.step_size is not None)
+    return Surroundings(others, fastest.real if fastest else 0.0, naming(model, spectrum.modes))
 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
     """What a design does that it must not: make unstable, or push a mode below the least damping that was above it."""
-    if after.is_unstable and after.growth > before.growth + GROWTH:
+    if after.is_unstable and after.growth > (1 + _EQUAL) * before.growth:
         return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
     worst = after.worst
     if worst is None or worst.damping_ratio >= least:
@@ -97,13 +96,11 @@ def breach(before: Surroundings, after: Surroundings, least: float) -> str | Non
     return None
 
 
-def extremes(model: LinearModel) -> tuple[complex, complex]:
+def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     """The eigenvalue [rad/s] of least damping from 0.1 to 2 Hz (−1 where there is none), and that which grows most."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
-    values = values[values.imag >= 0]
-    return min(guarded(values).tolist(), key=damping_ratio, default=complex(-1)), complex(
-        values[np.argmax(values.real)]
-    )
+    weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
+    return weakest, fastest_growth(values, step_map=model.step_size is not None)
 
 
 def guarded(values: Vector) -> Vector:

@@ -7,7 +7,7 @@ from orchestrator.analysis.loop_margins import LoopMargins, loop_margins
 from orchestrator.analysis.pod_design import LeadLag, damping_ratio
 from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.study.guard import GROWTH, extremes
+from orchestrator.study.guard import extremes
 
 _STRIDE = 2**0.5
 _REACH = 8.0
@@ -60,12 +60,12 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
         Least damping ratio; the limit is lower where a mode is already below it.
     """
     weakest, fastest = extremes(loop.model(nominal.setting))
-    limit, growth = min(least, damping_ratio(weakest)), max(GROWTH, fastest.real)
+    limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
     def lost(factor: float) -> complex | None:
         setting = replace(nominal.setting, gain=nominal.setting.gain * factor)
         weakest, fastest = extremes(loop.model(setting))
-        if fastest.real > growth:
+        if fastest and fastest.real > growth:
             return fastest
         return weakest if damping_ratio(weakest) < limit - 1e-9 else None
 

@@ -14,9 +14,10 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.pod_design import LARGEST_TURN, LeadLag, damping_ratio, lead_lag_turning
+from orchestrator.analysis.stability import grows
 from orchestrator.errors import AnalysisError
 from orchestrator.study.closed_loop import PodLoop, PodSetting
-from orchestrator.study.guard import GROWTH, guarded
+from orchestrator.study.guard import guarded
 
 MOST_STATES = 500
 """In larger systems a survey would take longer than anybody waits."""
@@ -118,7 +119,7 @@ class _Ground:
 
     def _worth(self, values: NDArray[np.complex128]) -> float:
         self.settings += 1
-        if values.real.max() > GROWTH:
+        if grows(values).any():
             return _HOPELESS
         moved = [v for v in guarded(values) if not np.any(np.abs(v - self._others) < _UNMOVED * abs(v))]
         return -min((damping_ratio(complex(v)) for v in moved), default=1.0)
