@@ -7,18 +7,21 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.points.key import code_files
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
     ("orchestrator.errors", "orchestrator.units"),
     ("orchestrator.fmi",),
-    ("orchestrator.coupling", "orchestrator.vendor"),
-    ("orchestrator.ssp",),
-    ("orchestrator.analysis", "orchestrator.cases", "orchestrator.distributed"),
-    ("orchestrator.report", "orchestrator.interop", "orchestrator.watch"),
+    ("orchestrator.coupling", "orchestrator.binding"),
+    ("orchestrator.ssp", "orchestrator.acceptance"),
+    ("orchestrator.analysis", "orchestrator.cases"),
+    ("orchestrator.results", "orchestrator.points", "orchestrator.interop", "orchestrator.watch"),
+    ("orchestrator.report",),
     ("orchestrator.study",),
-    ("orchestrator.black_box",),
+    ("orchestrator.black_box", "orchestrator.pod_design", "orchestrator.sweep"),
     ("orchestrator.certification",),
     ("orchestrator.cli",),
 )
@@ -38,29 +41,23 @@ def modules():
 MODULES = modules()
 
 
-def imported_names(tree, *, typing):
-    """Dotted names that a module imports anywhere; those for type checkers only where ``typing``."""
+def imported_names(tree):
+    """Dotted names that a module imports anywhere."""
     names = set()
-    pending = [tree]
-    while pending:
-        node = pending.pop()
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING") and not typing:
-            pending += node.orelse
-            continue
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"relative import of {node.module}"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
-        pending += ast.iter_child_nodes(node)
     return names
 
 
-def imports(*, typing=True):
+def imports():
     """Module → modules of the packages that it imports."""
     graph = {}
     for name, tree in MODULES.items():
-        targets = imported_names(tree, typing=typing)
+        targets = imported_names(tree)
         graph[name] = {t if t in MODULES else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)} - {name}
         unknown = graph[name] - set(MODULES)
         assert not unknown, f"{name} imports {unknown}, which does not exist"
@@ -83,7 +80,7 @@ def part(name):
 
 def breaches(allowed):
     """Imports, as text, for which ``allowed(importer, imported)`` does not hold."""
-    edges = [(importer, imported) for importer, targets in imports(typing=False).items() for imported in targets]
+    edges = [(importer, imported) for importer, targets in imports().items() for imported in targets]
     assert len(edges) > 50
     return [f"{importer} imports {imported}" for importer, imported in sorted(edges) if not allowed(importer, imported)]
 
@@ -92,9 +89,8 @@ def test_the_imports_are_read():
     """The tools of this file see what is known to be there."""
     graph = imports()
     assert "fmus.toolchain.model" in graph["gfor_fmu.converter"]
-    assert "orchestrator.coupling.master" in graph["orchestrator.coupling.observers"]
-    assert "orchestrator.coupling.master" not in imports(typing=False)["orchestrator.coupling.observers"]
-    assert "pandapower" in imported_names(MODULES["orchestrator.cases.power_flow"], typing=False)
+    assert "orchestrator.coupling.observers" in graph["orchestrator.coupling.master"]
+    assert "pandapower" in imported_names(MODULES["orchestrator.cases.power_flow"])
 
 
 def test_every_module_of_the_orchestrator_is_on_a_floor():
@@ -147,17 +143,33 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
     assert not breaches(allowed)
 
 
-def test_reports_know_studies_for_type_checkers_only():
-    everything = imports()
-    knowing = {name for name, targets in everything.items() if any(within(t, "orchestrator.study") for t in targets)}
-    above = ("orchestrator.cli", "orchestrator.certification", "orchestrator.black_box", "orchestrator.study")
-    knowing = {name for name in knowing if not within(name, *above)}
-    assert knowing
-    assert all(within(name, "orchestrator.report") for name in knowing)
+def test_nothing_is_imported_for_type_checkers_only():
+    """Such an import hides an arrow that runs back up."""
+    hiding = [name for name, tree in MODULES.items() if "TYPE_CHECKING" in ast.unparse(tree)]
+    assert not hiding
+
+
+def test_kept_points_are_worth_nothing_once_their_code_changes():
+    """What computes a point, and all that this imports, is in the hash that names the point's file."""
+    graph, pending = imports(), ["orchestrator.sweep.point", "orchestrator.certification.point"]
+    needed = set()
+    while pending:
+        name = pending.pop()
+        if name not in needed and within(name, "orchestrator"):
+            needed.add(name)
+            pending += graph[name]
+    assert len(needed) > 50
+    hashed = {file.resolve() for file in code_files()}
+    for name in needed - {"orchestrator"}:
+        module, package = (
+            (ROOT / name.replace(".", "/")).with_suffix(".py"),
+            ROOT / name.replace(".", "/") / "__init__.py",
+        )
+        assert {module, package} & hashed, name
 
 
 def test_there_is_no_cycle():
-    graph, state = imports(typing=False), {}
+    graph, state = imports(), {}
 
     def visit(name, path):
         if state.get(name) == "done":
@@ -187,14 +199,12 @@ def test_there_is_no_cycle():
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
-    found = {
-        name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree, typing=True))
-    }
+    found = {name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree))}
     assert found == users
 
 
 def test_only_the_command_line_reads_options():
-    using = {name for name, tree in MODULES.items() if "argparse" in imported_names(tree, typing=True)}
+    using = {name for name, tree in MODULES.items() if "argparse" in imported_names(tree)}
     assert using
     assert all(within(name, "orchestrator.cli") for name in using)
 
@@ -202,12 +212,12 @@ def test_only_the_command_line_reads_options():
 def test_equations_are_written_in_models_only():
     for name, tree in MODULES.items():
         if within(name, "orchestrator"):
-            assert not any(within(n, "casadi") for n in imported_names(tree, typing=True)), name
+            assert not any(within(n, "casadi") for n in imported_names(tree)), name
 
 
 def test_the_slave_needs_nothing_but_python_and_pythonfmu():
     """It is copied into FMUs and runs where no package of this project is installed."""
-    names = imported_names(MODULES["fmus.toolchain.slave"], typing=True)
+    names = imported_names(MODULES["fmus.toolchain.slave"])
     foreign = {name for name in names if name.split(".")[0] not in sys.stdlib_module_names}
     assert foreign
     assert all(within(name, "pythonfmu") for name in foreign)

@@ -13,8 +13,8 @@ from orchestrator.analysis.linear_model import IDENTIFIED
 from orchestrator.black_box.fitting import IdentifiedModel
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.black_box.passivity import Passivity
-from orchestrator.report.plots import STYLE, colour, save_figure
-from orchestrator.report.storage import save_table
+from orchestrator.report.plot_style import STYLE, colour, save_figure
+from orchestrator.results.storage import save_table
 
 
 def save_identification(

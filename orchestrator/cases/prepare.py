@@ -10,6 +10,7 @@ from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.draft import Draft, Place
 from orchestrator.cases.event_tables import scenario_events
@@ -30,7 +31,6 @@ from orchestrator.coupling.system import System
 from orchestrator.coupling.told_step import tell_step
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
-from orchestrator.vendor.binding import bound_fmu
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from orchestrator.acceptance.checks.subject import Point, Use
 from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
-from orchestrator.vendor.checks.subject import Point, Use
 
 _START = ("P_0", "Q_0", "v_0", "theta_0")
 

@@ -7,9 +7,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from orchestrator.acceptance.checks.all import CHECKS
+from orchestrator.acceptance.runner import Report, check_fmu, file_hash
 from orchestrator.errors import InputError
-from orchestrator.vendor.checks.all import CHECKS
-from orchestrator.vendor.runner import Report, check_fmu, file_hash
 
 KEPT = "check.json"
 """The report's name in a certificate's folder."""

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.case_file import BASE, BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
@@ -17,7 +18,6 @@ from orchestrator.certification.study import Certification
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.origin import read_origin
-from orchestrator.vendor.binding import bound_fmu
 
 
 def derived_faults(folder: Path, content: dict[str, Any]) -> list[str]:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.figures import certification_json
 from orchestrator.certification.report import page
 from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
-from orchestrator.vendor.runner import file_hash
 
 HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
 

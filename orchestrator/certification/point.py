@@ -15,12 +15,12 @@ from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_bo
 from orchestrator.cases.case import Case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.distributed.executor import WorkerLostError
 from orchestrator.errors import CosimError
 from orchestrator.fmi.port import SYSTEM_BASE_MVA
+from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.key import same_case
+from orchestrator.points.store import Arrays
 from orchestrator.study.modes import modes_of, running
-from orchestrator.study.point_key import same_case
-from orchestrator.study.point_store import Arrays
 from orchestrator.watch.watch import Watch
 
 COMPUTED = (0.05, 3.0)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from html import escape
 
+from orchestrator.binding.binding import read_table
 from orchestrator.certification import texts
 from orchestrator.certification.case_file import BINDING, FMU, WITH
 from orchestrator.certification.environment import environment
@@ -15,7 +16,6 @@ from orchestrator.fmi.origin import read_origin
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.report.html.elements import table
 from orchestrator.report.linearised import exceptions_in_words
-from orchestrator.vendor.binding import read_table
 
 _LINE = '<span class="blank"></span>'
 """To be filled in by hand."""

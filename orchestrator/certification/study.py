@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -17,13 +18,12 @@ from orchestrator.certification.judgement import PointVerdict, judge, watched
 from orchestrator.certification.point import CONVERTER, PointResult, PointTask, compute_point
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
-from orchestrator.distributed.executor import Executor
 from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.study.point_key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.study.point_store import PointStore
-from orchestrator.study.points import Report, kept_or_computed
-from orchestrator.vendor.binding import bound_fmu
+from orchestrator.points.executor import Executor
+from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
+from orchestrator.points.points import Report, kept_or_computed
+from orchestrator.points.store import PointStore
 
 
 @dataclass

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from orchestrator.acceptance.runner import file_hash
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.criteria import damping_ratio
@@ -20,10 +21,9 @@ from orchestrator.certification.form import check_form
 from orchestrator.certification.point import CONVERTER, Numbers, PointResult, PointTask, compute_point
 from orchestrator.certification.rejudgement import rejudge
 from orchestrator.certification.request import same_reactance
-from orchestrator.distributed.executor import Executor, WorkerLostError
 from orchestrator.errors import InputError
-from orchestrator.study.point_key import fingerprint, key_of, reference_to
-from orchestrator.vendor.runner import file_hash
+from orchestrator.points.executor import Executor, WorkerLostError
+from orchestrator.points.key import fingerprint, key_of, reference_to
 
 TOLERANCE = 1e-5
 """Of an eigenvalue by its size, and of a signal by its range: other processors round otherwise."""

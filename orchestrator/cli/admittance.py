@@ -13,6 +13,7 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.fitting import fit
@@ -24,7 +25,6 @@ from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.vendor.binding import bound_fmu
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.binding.draft import draft_binding
+from orchestrator.binding.tables import REQUIRED
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
-from orchestrator.vendor.draft import draft_binding
-from orchestrator.vendor.tables import REQUIRED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -8,14 +8,14 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.acceptance.checks.base import Result, Verdict
+from orchestrator.acceptance.checks.subject import Use
+from orchestrator.acceptance.junit import write_junit
+from orchestrator.acceptance.runner import Report, check_fmu
 from orchestrator.cases.use import use_in_case
 from orchestrator.cli.arguments import positive
 from orchestrator.errors import InputError
 from orchestrator.fmi.limits import Limits
-from orchestrator.vendor.checks.base import Result, Verdict
-from orchestrator.vendor.checks.subject import Use
-from orchestrator.vendor.junit import write_junit
-from orchestrator.vendor.runner import Report, check_fmu
 
 _COLOURS = {
     Verdict.PASS: "green",

@@ -13,10 +13,10 @@ from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.terminal import make_console, print_questions
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
-from orchestrator.report.design_files import design_json, parameters_of, provenance
-from orchestrator.report.design_sheet import sheet
-from orchestrator.study.design import DesignRequest, design_pod
-from orchestrator.study.design_target import CONTROLLERS
+from orchestrator.pod_design.design import DesignRequest, design_pod
+from orchestrator.pod_design.files import design_json, parameters_of, provenance
+from orchestrator.pod_design.sheet import sheet
+from orchestrator.pod_design.target import CONTROLLERS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

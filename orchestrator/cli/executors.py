@@ -4,11 +4,11 @@ import argparse
 from collections.abc import Sequence
 
 from orchestrator.cli.arguments import count
-from orchestrator.distributed.dask_cluster import DaskCluster
-from orchestrator.distributed.executor import Executor
-from orchestrator.distributed.processes import Processes, number_of_cores
-from orchestrator.distributed.serial import Serial
 from orchestrator.errors import InputError
+from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.executor import Executor
+from orchestrator.points.processes import Processes, number_of_cores
+from orchestrator.points.serial import Serial
 
 
 def add_executor_arguments(parser: argparse.ArgumentParser) -> None:

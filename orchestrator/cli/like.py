@@ -9,7 +9,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.rules import MasterRules
-from orchestrator.report.storage import save_dataset
+from orchestrator.results.storage import save_dataset
 from orchestrator.study.like import run_like
 
 

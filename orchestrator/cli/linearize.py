@@ -7,9 +7,9 @@ from orchestrator.analysis.stability import Stability
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
-from orchestrator.report.linear_model_files import save_linear_model
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
+from orchestrator.study.linear_model_files import save_linear_model
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

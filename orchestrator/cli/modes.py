@@ -11,7 +11,7 @@ from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_sources, print_warnings
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
-from orchestrator.report import tables
+from orchestrator.study import tables
 from orchestrator.study.modes import ModesResult, compute_modes, modes_json, running
 
 
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     results = [_modes(case, prepared, options) for prepared in scenarios]
     written = []
     if folder:
-        from orchestrator.report.study_files import save_modes  # noqa: PLC0415 - plots: a second to import
+        from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
 
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
         written += [path.name for path in save_modes(case, results, folder)]

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.cli.terminal import make_errors, progress_bar
-from orchestrator.distributed.executor import Executor
-from orchestrator.study.points import Report
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import Report
 
 Result = TypeVar("Result")
 

@@ -26,8 +26,8 @@ from orchestrator.cli.terminal import (
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, RunInterruptedError
-from orchestrator.report import tables
-from orchestrator.report.study_files import save_run, save_study, summary_of
+from orchestrator.study import tables
+from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult, run_scenario
 
 

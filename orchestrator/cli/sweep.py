@@ -15,12 +15,12 @@ from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.errors import INTERRUPTED
-from orchestrator.report import sweep_tables
-from orchestrator.report.sweep_dataset import Samples, save_sweep, sweep_json
-from orchestrator.report.sweep_plots import save_sweep_plots
-from orchestrator.study.point_store import PointStore
-from orchestrator.study.sweep import SweepResult, plan_sweep, run_sweep
-from orchestrator.study.sweep_axes import Vary, parse_vary
+from orchestrator.points.store import PointStore
+from orchestrator.sweep import tables
+from orchestrator.sweep.axes import Vary, parse_vary
+from orchestrator.sweep.dataset import Samples, save_sweep, sweep_json
+from orchestrator.sweep.plots import save_sweep_plots
+from orchestrator.sweep.sweep import SweepResult, plan_sweep, run_sweep
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if no point has modes."""
-    executor = choose_executor(options.workers, options.scheduler, ["orchestrator.study.point_worker"])
+    executor = choose_executor(options.workers, options.scheduler, ["orchestrator.sweep.worker"])
     case = load_case(options.case)
     values = {key: value for file in parameters(options) for key, value in file.values.items()} | dict(options.set)
     plan = plan_sweep(case, options.vary, options.scenario, values, options.step, options.range)
@@ -74,10 +74,10 @@ def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bo
     if as_json:
         print(json.dumps(sweep_json(samples), indent=1, ensure_ascii=False))
     else:
-        for line in sweep_tables.stability(samples):
+        for line in tables.stability(samples):
             console.print(line, soft_wrap=True, highlight=False)
-        console.print("", sweep_tables.trajectories(samples), "")
-    for text in sweep_tables.remarks(samples):
+        console.print("", tables.trajectories(samples), "")
+    for text in tables.remarks(samples):
         make_errors().print(escape(text))
     if not as_json:
         stored = f", {result.stored} were there already" if result.stored else ""

@@ -2,22 +2,19 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.report import tables
 from orchestrator.report.linearised import exceptions_in_words
-
-if TYPE_CHECKING:
-    from orchestrator.cases.case import Case
-    from orchestrator.cases.prepare import PreparedScenario
-    from orchestrator.study.modes import ModesResult
-    from orchestrator.study.run import RunResult
+from orchestrator.study import tables
+from orchestrator.study.modes import ModesResult
+from orchestrator.study.run import RunResult
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -42,7 +39,7 @@ def progress_bar(console: Console) -> ProgressBar:
     return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
 
 
-def print_named_modes(console: Console, case: "Case", results: "Sequence[ModesResult]") -> None:
+def print_named_modes(console: Console, case: Case, results: Sequence[ModesResult]) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
     if any(r.electromechanical for r in results):
         title = case.table.reference.title if case.table.reference else None
@@ -53,7 +50,7 @@ def print_named_modes(console: Console, case: "Case", results: "Sequence[ModesRe
         console.print("", tables.mode_shapes(results), "")
 
 
-def print_sources(console: Console, results: "Sequence[ModesResult]") -> None:
+def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
     """Which linear models do not come from perturbing the running FMUs; nothing where all do."""
     said = {r.prepared.title: text for r in results if (text := exceptions_in_words(r.linearised, r.fit_errors))}
     if len(set(said.values())) == 1 and len(said) == len(results):
@@ -62,14 +59,14 @@ def print_sources(console: Console, results: "Sequence[ModesResult]") -> None:
         console.print(f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False)
 
 
-def print_questions(scenarios: "Iterable[PreparedScenario]") -> None:
+def print_questions(scenarios: Iterable[PreparedScenario]) -> None:
     """Ask on standard error, once and before anything is computed, about data that are most unusual."""
     console = make_errors()
     for question in dict.fromkeys(q for prepared in scenarios for q in prepared.questions):
         console.print(f"[bold yellow]question:[/bold yellow] {escape(str(question))}")
 
 
-def print_warnings(results: "Sequence[ModesResult]") -> None:
+def print_warnings(results: Sequence[ModesResult]) -> None:
     """Say on standard error what is to be borne in mind of results."""
     console = make_errors()
     for result in results:
@@ -78,7 +75,7 @@ def print_warnings(results: "Sequence[ModesResult]") -> None:
             console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")
 
 
-def print_findings(results: "Sequence[RunResult]") -> None:
+def print_findings(results: Sequence[RunResult]) -> None:
     """Say on standard error what runs did wrong; a failure is said where the study ends."""
     console = make_errors()
     for result in results:

@@ -1,9 +1,43 @@
 """Observers watch a run from outside: recording, progress and anything a user adds."""
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from orchestrator.coupling.master import Master
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.coupling.tracks import Tracks
+from orchestrator.fmi.component import Component
+
+
+class ObservedRun(Protocol):
+    """What an observer sees of a run; the master is one.
+
+    Attributes
+    ----------
+    index, time
+        Number of communication steps done, and the time [s] reached.
+    y
+        All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+    tracks
+        Where each of them went, step by step, since an observer last looked.
+    """
+
+    @property
+    def index(self) -> int: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def components(self) -> Mapping[str, Component]: ...
+    @property
+    def output_names(self) -> tuple[str, ...]: ...
+    @property
+    def y(self) -> NDArray[np.float64]: ...
+    @property
+    def tracks(self) -> Tracks: ...
+
+    def exchange(self) -> None:
+        """Hand every component the newest outputs of its partners."""
 
 
 class Observer(Protocol):
@@ -17,11 +51,11 @@ class Observer(Protocol):
 
     every: int
 
-    def begin(self, master: "Master", stop_index: int) -> None:
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
         """Called once, when the run is about to start."""
 
-    def observe(self, master: "Master") -> None:
+    def observe(self, run: ObservedRun) -> None:
         """Called at the first communication point and after every ``every`` steps."""
 
-    def end(self, master: "Master") -> None:
+    def end(self, run: ObservedRun) -> None:
         """Called once, also after a failure; what was observed so far must survive."""

@@ -1,10 +1,8 @@
 """Progress of a run, for whatever shows it."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from orchestrator.coupling.master import Master
+from orchestrator.coupling.observers import ObservedRun
 
 
 class Progress:
@@ -15,11 +13,11 @@ class Progress:
         self._report = report
         self._total = 0
 
-    def begin(self, master: "Master", stop_index: int) -> None:
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
         self._total = stop_index
 
-    def observe(self, master: "Master") -> None:
-        self._report(master.index, self._total)
+    def observe(self, run: ObservedRun) -> None:
+        self._report(run.index, self._total)
 
-    def end(self, master: "Master") -> None:
-        self._report(master.index, self._total)
+    def end(self, run: ObservedRun) -> None:
+        self._report(run.index, self._total)

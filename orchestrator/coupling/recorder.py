@@ -1,16 +1,13 @@
 """Recording of variables at regular communication points."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.coupling.observers import ObservedRun
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import RealBatch
-
-if TYPE_CHECKING:
-    from orchestrator.coupling.master import Master
 
 
 class Recorder:
@@ -47,33 +44,33 @@ class Recorder:
     def values(self) -> NDArray[np.float64]:
         return self._values[: self._count]
 
-    def begin(self, master: "Master", stop_index: int) -> None:
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
         by_component: dict[str, list[tuple[int, str]]] = {}
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
-            if component not in master.components or variable not in master.components[component].description.variables:
+            if component not in run.components or variable not in run.components[component].description.variables:
                 raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
             (
-                RealBatch(master.components[component], [v for _, v in entries]),
+                RealBatch(run.components[component], [v for _, v in entries]),
                 np.array([c for c, _ in entries]),
             )
             for component, entries in by_component.items()
         ]
-        rows = (stop_index - master.index) // self.every + 2
+        rows = (stop_index - run.index) // self.every + 2
         self._count = 0
         self._times = np.empty(rows)
         self._values = np.empty((rows, len(self.names)))
 
-    def observe(self, master: "Master") -> None:
+    def observe(self, run: ObservedRun) -> None:
         if self.after_exchange:
-            master.exchange()
-        self._times[self._count] = master.time
+            run.exchange()
+        self._times[self._count] = run.time
         row = self._values[self._count]
         for batch, columns in self._batches:
             row[columns] = batch.read()
         self._count += 1
 
-    def end(self, master: "Master") -> None:
+    def end(self, run: ObservedRun) -> None:
         """Nothing to do: what was recorded stays."""

@@ -1,25 +1,18 @@
-"""Tables for a terminal, with rich."""
+"""What tables for a terminal have in common, with rich, and the table of an FMU's variables."""
 
-import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.report.signals import relative_difference, signal
-
-if TYPE_CHECKING:
-    from orchestrator.cases.case import Case
-    from orchestrator.study.modes import ModesResult
-    from orchestrator.study.run import RunResult
 
 _ITEMS_SHOWN = 5
 """How many of a long list are shown, largest first."""
 
 
-def _table(title: str, *columns: str, left: int = 1) -> Table:
+def make_table(title: str, *columns: str, left: int = 1) -> Table:
     """Headings are shown as they are: rich would take a unit such as [rad/s] for a style and leave it out."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
@@ -27,162 +20,16 @@ def _table(title: str, *columns: str, left: int = 1) -> Table:
     return table
 
 
-def steady_states(results: Sequence["ModesResult"]) -> Table:
-    """Residual of the coupled steady state, scenario by scenario."""
-    table = _table("Steady state", "Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
-    for r in results:
-        flow = r.prepared.power_flow
-        table.add_row(
-            r.prepared.title,
-            str(r.model.number_of_states),
-            *("–" if math.isnan(v) else f"{v:.1e}" for v in (r.operating_point.residual, r.operating_point.drift)),
-            f"{flow.residual:.1e}" if flow else "–",
-        )
-    return table
-
-
-def named_modes(results: Sequence["ModesResult"], reference_title: str | None) -> Table:
-    """The modes that a case looks for, beside somebody else's figures where there are any."""
-    names = list(dict.fromkeys(name for r in results for name in [*r.named, *r.references]))
-    compared = any(r.references for r in results)
-    columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
-    if compared:
-        columns += [f"{reference_title}: f [Hz]", "Damping [%]"]
-    table = _table("Electromechanical modes" if len(names) > 1 else "Electromechanical mode", *columns)
-    for name in names:
-        for r in results:
-            mode, reference = r.named.get(name), r.references.get(name)
-            row = [f"{name}: {r.prepared.title}" if len(names) > 1 else r.prepared.title]
-            if mode is None:
-                row += ["none in range", "", ""]
-            else:
-                row += [eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
-            if reference is not None:
-                row += [f"{reference.frequency_hz:.2f}", f"{reference.damping_percent:.2f}"]
-            table.add_row(*row)
-        table.add_section()
-    return table
-
-
-def all_modes(result: "ModesResult") -> Table:
-    """Every mode of a scenario in the range, least damped first; those with a name are marked."""
-    states, residual = result.model.number_of_states, result.operating_point.residual
-    title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
-    table = _table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
-    table.add_column("Name")
-    table.add_column("Most associated states (participation)", overflow="fold")
-    for mode in result.modes:
-        associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-        table.add_row(
-            eigenvalue_text(mode.eigenvalue),
-            f"{mode.frequency_hz:.4f}",
-            f"{mode.damping_percent:.2f}",
-            result.name_of(mode) or "",
-            associated,
-            style="bold" if result.name_of(mode) else None,
-        )
-    return table
-
-
-def mode_shapes(results: Sequence["ModesResult"]) -> Table:
-    """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
-    table = Table(title="Mode shapes", title_justify="left", title_style="bold", header_style="bold")
-    columns = ["Mode", "Swing together", "Against", "Participation by component"]
-    columns += ["By area"] if any(r.areas for r in results) else []
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    names = list(dict.fromkeys(name for r in results for name in r.named))
-    entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
-    if not names:
-        entries = [(f"{mode.frequency_hz:.3f} Hz", r, mode) for r in results for mode in r.modes]
-    for label, r, mode in entries:
-        sides = [_some(side, str) for side in r.swing_of(mode)]
-        row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}", *sides]
-        row.append(_some(mode.by_component.items(), _share))
-        row += [_some(r.by_area(mode).items(), _share)] if len(columns) > 4 else []
-        table.add_row(*row)
-    return table
-
-
-def _some(items: Iterable[Any], text: Callable[[Any], str]) -> str:
+def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
     """The first few of many."""
     items = list(items)
     shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
 
 
-def _share(entry: tuple[str, float]) -> str:
+def share_text(entry: tuple[str, float]) -> str:
+    """``sg1 28%``."""
     return f"{entry[0]} {entry[1]:.0%}"
-
-
-def ring_downs(results: Sequence["RunResult"]) -> Table:
-    """Frequency and damping of the simulated response against the eigenvalue."""
-    table = _table(
-        "Ring-down of the simulated response against the eigenvalue",
-        "Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]",
-    )  # fmt: skip
-    for r in results:
-        mode, seen = r.modes.electromechanical, r.ring_down
-        if mode and seen:
-            table.add_row(
-                r.modes.prepared.title,
-                f"{seen.frequency_hz:.4f}",
-                f"{mode.frequency_hz:.4f}",
-                f"{seen.damping_percent:.2f}",
-                f"{mode.damping_percent:.2f}",
-            )
-    return table
-
-
-def linear_differences(case: "Case", results: Sequence["RunResult"]) -> Table:
-    """Largest difference between the linear model's response and the simulated one, signal by signal."""
-    signals = dict.fromkeys(panel.signal for plot in case.table.plots for panel in plot.panels)
-    table = _table("Linear model against the simulation: largest difference, of the largest deviation",
-                   "Scenario", *signals)  # fmt: skip
-    for r in results:
-        if r.linear is not None:
-            cells = []
-            for expression in signals:
-                seen, follows = signal(r.dataset, expression), signal(r.linear, expression)
-                share = math.nan if seen is None or follows is None else relative_difference(seen, follows)
-                cells.append("–" if math.isnan(share) else f"{share:.2%}")
-            table.add_row(r.modes.prepared.title, *cells)
-    return table
-
-
-def mode_shifts(results: Sequence["RunResult"]) -> Table:
-    """|λ(H) − λ(continuous)| of the electromechanical mode."""
-    steps = sorted({s.step_size for r in results for s in r.shifts})
-    columns = [f"{h * 1e6:g} µs" for h in steps]
-    table = _table(
-        "Shift of the electromechanical mode by the communication step [rad/s]",
-        "Scenario",
-        "Schedule",
-        *columns,
-        left=2,
-    )
-    for r in results:
-        for schedule in sorted({s.schedule for s in r.shifts}):
-            values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
-            table.add_row(r.modes.prepared.title, schedule, *(f"{values[h]:.1e}" for h in steps))
-    return table
-
-
-def run_statistics(results: Sequence["RunResult"]) -> Table:
-    """Speed, and where the time went."""
-    table = _table("Run", "Scenario", "Steps", "Steps/s", "Inside FMUs", "Of each FMU")
-    for r in results:
-        if r.statistics:
-            s = r.statistics
-            shares = sorted(((c.name, c.share) for c in s.components), key=lambda entry: -entry[1])
-            table.add_row(
-                r.modes.prepared.title,
-                str(s.steps),
-                f"{s.steps_per_second:,.0f}",
-                f"{s.share_in_fmus:.0%}",
-                _some(shares, _share),
-            )
-    return table
 
 
 def fmu_variables(description: FmuDescription) -> Iterable[Table]:
@@ -193,7 +40,7 @@ def fmu_variables(description: FmuDescription) -> Iterable[Table]:
         ]
         if not variables:
             continue
-        table = _table(
+        table = make_table(
             f"{causality} ({len(variables)})",
             "Name",
             "Unit",

@@ -8,7 +8,7 @@ import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.errors import AnalysisError, InputError
-from orchestrator.report.signals import signal
+from orchestrator.results.signals import signal
 
 _WEAKEST = 1e-3
 

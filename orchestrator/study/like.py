@@ -10,7 +10,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.observers import Observer
 from orchestrator.interop.emulation import emulate
 from orchestrator.interop.rules import MasterRules
-from orchestrator.report.storage import trajectory_dataset
+from orchestrator.results.storage import trajectory_dataset
 
 
 def run_like(

@@ -15,7 +15,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import InputError
-from orchestrator.report.signals import variables_of
+from orchestrator.results.signals import variables_of
 from orchestrator.study.modes import continuous_model, running
 
 

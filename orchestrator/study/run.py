@@ -17,8 +17,8 @@ from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import AnalysisError, CosimError, RunInterruptedError
-from orchestrator.report.signals import signal
-from orchestrator.report.storage import trajectory_dataset
+from orchestrator.results.signals import signal
+from orchestrator.results.storage import trajectory_dataset
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 from orchestrator.watch.finding import UNSTABLE, Finding

@@ -2,16 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
-
-if TYPE_CHECKING:
-    from orchestrator.coupling.master import Master
 
 Numbers = NDArray[np.float64]
 
@@ -85,21 +82,21 @@ class Watcher:
         self._tracks = np.empty((4, 0, 0))
         self._count = 0
 
-    def begin(self, master: "Master", stop_index: int) -> None:
-        self._recorder.begin(master, stop_index)
-        self._outputs, self._count = master.output_names, 0
-        self._tracks = np.empty((4, (stop_index - master.index) // self.every + 2, len(master.output_names)))
-        master.tracks.look(master.y)
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
+        self._recorder.begin(run, stop_index)
+        self._outputs, self._count = run.output_names, 0
+        self._tracks = np.empty((4, (stop_index - run.index) // self.every + 2, len(run.output_names)))
+        run.tracks.look(run.y)
 
-    def observe(self, master: "Master") -> None:
-        self._recorder.observe(master)
-        tracks = master.tracks
-        for kept, now in zip(self._tracks, (master.y, tracks.low, tracks.high, tracks.turns), strict=True):
+    def observe(self, run: ObservedRun) -> None:
+        self._recorder.observe(run)
+        tracks = run.tracks
+        for kept, now in zip(self._tracks, (run.y, tracks.low, tracks.high, tracks.turns), strict=True):
             kept[self._count] = now
-        master.tracks.look(master.y)
+        run.tracks.look(run.y)
         self._count += 1
 
-    def end(self, master: "Master") -> None:
+    def end(self, run: ObservedRun) -> None:
         """Nothing to do: what was seen stays."""
 
     def seen(self, recorded: Recorder) -> Seen:

@@ -18,8 +18,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.description import read_description
 from orchestrator.study.modes import compute_modes, running
+from tests.acceptance.gallery.build import Source, Variable, build
 from tests.coupling.small_fmus import small_fmu
-from tests.vendor.gallery.build import Source, Variable, build
 
 STATES = {"x": 2, "v": 3}
 

@@ -14,8 +14,8 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.system import System
 from orchestrator.fmi.description import read_description
-from tests.vendor.gallery.build import build
-from tests.vendor.gallery.members import converter
+from tests.acceptance.gallery.build import build
+from tests.acceptance.gallery.members import converter
 
 STEPS = 50_000
 

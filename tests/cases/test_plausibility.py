@@ -9,7 +9,7 @@ from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.data_rules import RULES
 from orchestrator.cases.plausible_ranges import RANGES
 from orchestrator.errors import CaseError
-from tests.vendor.test_binding import OURS
+from tests.binding.test_binding import OURS
 
 CASE = """\
 name = "plausible"

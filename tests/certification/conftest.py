@@ -1,5 +1,5 @@
 """Fixtures for damping tests."""
 
-from tests.vendor.conftest import gallery
+from tests.acceptance.conftest import gallery
 
 __all__ = ["gallery"]

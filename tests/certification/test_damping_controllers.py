@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
 from orchestrator.certification.damping_controllers import DECLARED, READ, SET, UNKNOWN, UNSEEN, damping_controllers
 from orchestrator.certification.request import PODS, CertificationRequest
 from orchestrator.errors import InputError
-from orchestrator.vendor.binding import bound_fmu
 from tests.certification.fabricated import figures, rings
 from tests.certification.test_recomputing import BOUND
 

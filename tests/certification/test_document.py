@@ -10,6 +10,9 @@ import numpy as np
 import pypdf
 import pytest
 
+from orchestrator.acceptance.checks.all import CHECKS
+from orchestrator.acceptance.checks.base import failed, passed
+from orchestrator.acceptance.runner import Report
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
 from orchestrator.certification import texts
@@ -19,9 +22,6 @@ from orchestrator.certification.judgement import judge
 from orchestrator.certification.point import POWER, PointResult
 from orchestrator.errors import CaseError, InputError
 from orchestrator.report.pdf import find_browser
-from orchestrator.vendor.checks.all import CHECKS
-from orchestrator.vendor.checks.base import failed, passed
-from orchestrator.vendor.runner import Report
 from tests.certification.fabricated import rings
 
 DETAILS = 'number = "7/2026"\napplicant = "Acme <Power>"\noperator = ""\ntester = "Lab 3"\ndate = 2026-11-22\n'

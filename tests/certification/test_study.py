@@ -28,8 +28,8 @@ from orchestrator.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import REACTANCES, CertificationRequest
 from orchestrator.certification.study import certify
 from orchestrator.cli import main
-from orchestrator.distributed.processes import Processes
 from orchestrator.errors import CaseError, InputError
+from orchestrator.points.processes import Processes
 from tests.certification.fabricated import figures, rings
 from tests.certification.sign_turned import turned
 from tests.support.exact import exact_continuous

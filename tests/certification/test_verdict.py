@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.acceptance.checks.base import failed, passed
+from orchestrator.acceptance.runner import Report
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
 from orchestrator.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import REACTANCES
-from orchestrator.vendor.checks.base import failed, passed
-from orchestrator.vendor.runner import Report
 from orchestrator.watch.finding import Finding
 from tests.certification.fabricated import figures, rings
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification import acceptance, verification
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
@@ -17,7 +18,6 @@ from orchestrator.certification.point import POWER
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.vendor.runner import file_hash
 from tests.certification.fabricated import rings
 from tests.certification.test_recomputing import BOUND
 

@@ -16,8 +16,8 @@ from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.description import read_description
+from tests.acceptance.gallery.build import Source, Variable, build
 from tests.coupling.small_fmus import lag_factor, small_fmu
-from tests.vendor.gallery.build import Source, Variable, build
 
 H = 1e-3
 STEPS = 200

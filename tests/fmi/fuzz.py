@@ -14,11 +14,11 @@ import sys
 import zipfile
 from pathlib import Path
 
+from orchestrator.binding.draft import draft_binding
 from orchestrator.errors import FmuFileError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.limits import Limits, apply_limits
-from orchestrator.vendor.draft import draft_binding
 
 XML = "modelDescription.xml"
 NAMES = (

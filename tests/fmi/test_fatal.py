@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from tests.vendor.gallery.build import build
-from tests.vendor.gallery.members import LAG, small
+from tests.acceptance.gallery.build import build
+from tests.acceptance.gallery.members import LAG, small
 
 _STEPS = """
 import sys

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.compiler import compile_library
+from orchestrator.acceptance.runner import check_fmu
 from orchestrator.errors import ComponentError, EndedError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
-from orchestrator.vendor.runner import check_fmu
 
 XML = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="events3" instantiationToken="events3">

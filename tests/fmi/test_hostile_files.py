@@ -16,9 +16,9 @@ from orchestrator.errors import FmuFileError, HostileFmuError
 from orchestrator.fmi import archive
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.description import read_description
-from tests.vendor.gallery.build import build
-from tests.vendor.gallery.hostile import HOSTILE, liar
-from tests.vendor.gallery.members import good
+from tests.acceptance.gallery.build import build
+from tests.acceptance.gallery.hostile import HOSTILE, liar
+from tests.acceptance.gallery.members import good
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.fmi.interrupts import calls
-from tests.vendor.gallery.build import build
-from tests.vendor.gallery.members import LAG, small
+from tests.acceptance.gallery.build import build
+from tests.acceptance.gallery.members import LAG, small
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can send itself Ctrl-C there")
 

@@ -9,6 +9,7 @@ import pytest
 
 from fmus.toolchain.compiler import compile_library
 from orchestrator import fmi
+from orchestrator.acceptance.runner import check_fmu
 from orchestrator.coupling.loop import CompiledLoop, PythonLoop
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
@@ -21,9 +22,8 @@ from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import is_ours, open_component
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
-from orchestrator.vendor.runner import check_fmu
-from tests.vendor.gallery.build import build
-from tests.vendor.gallery.members import converter
+from tests.acceptance.gallery.build import build
+from tests.acceptance.gallery.members import converter
 
 H = 1e-4
 

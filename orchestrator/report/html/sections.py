@@ -10,7 +10,7 @@ from orchestrator.report.html.charts import Curve, Mark, bar_chart, complex_plan
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
-from orchestrator.report.signals import relative_difference, signal
+from orchestrator.results.signals import relative_difference, signal
 
 _BARS = 8
 

@@ -1,0 +1,33 @@
+"""All checks in the order in which they run: what others need comes before them."""
+
+from orchestrator.acceptance.checks import (
+    base,
+    extremes,
+    file,
+    instances,
+    loading,
+    port,
+    resources,
+    ride_through,
+    running,
+    sampling,
+    signs,
+    state,
+    timing,
+)
+
+MODULES = (
+    *(file, loading, running, instances, state, sampling, timing),
+    *(port, signs, ride_through, extremes, resources),
+)
+"""Importing them enters their checks."""
+
+ORDER = (
+    "fmi_validity", "units", "declared_starts", "declared_dependencies", "loads",
+    "runs", "start_values", "call_order", "independence", "repeatability", "reading", "reset", "reinstantiation",
+    "state", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
+    "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",
+)  # fmt: skip
+
+CHECKS = {name: base.CHECKS[name] for name in ORDER}
+"""By name."""

@@ -1,0 +1,146 @@
+"""What a check is, and what it answers."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from math import isfinite
+from typing import Any
+
+from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.errors import UnsupportedFmuError
+
+
+class Verdict(StrEnum):
+    """The answer in one word."""
+
+    PASS = "pass"
+    REMARK = "remark"
+    FAIL = "fail"
+    NOT_APPLICABLE = "not applicable"
+    NOT_SUPPORTED = "not supported"
+
+
+class Whose(StrEnum):
+    """Whose matter a finding is."""
+
+    NOBODY = ""
+    FMU = "the FMU"
+    HERE = "not supported here"
+    CALL = "provoked by a forbidden call"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one check found.
+
+    Attributes
+    ----------
+    check
+        The check's name.
+    fault
+        Name of what is wrong, or not supported; else empty.
+    evidence
+        What was seen, with figures; for `NOT_APPLICABLE` the reason.
+    remedy
+        What to do about it.
+    figures
+        The measured figures, for programs.
+    whose
+        Whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids
+        and only the check makes.
+    """
+
+    check: str
+    verdict: Verdict
+    evidence: str
+    fault: str = ""
+    remedy: str = ""
+    figures: dict[str, Any] = field(default_factory=dict)
+    whose: Whose = Whose.NOBODY
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON has it, which knows no numbers that are none."""
+        return {**asdict(self), "figures": _plain(self.figures)}
+
+    @classmethod
+    def of_dict(cls, values: dict[str, Any]) -> "Result":
+        return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    return float(value) if isfinite(value) else str(value)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question to an FMU.
+
+    Attributes
+    ----------
+    question
+        What it asks, for the report.
+    needs
+        Checks whose failure leaves this one without a meaning.
+    """
+
+    name: str
+    question: str
+    needs: tuple[str, ...]
+    run: Callable[[Subject], Result]
+
+
+CHECKS: dict[str, Check] = {}
+"""All checks by name, in the order in which they run."""
+
+
+SAME = ("independence", "repeatability")
+"""What must hold for two runs to be compared."""
+
+
+def check(
+    name: str, question: str, needs: tuple[str, ...] = ()
+) -> Callable[[Callable[[Subject], Result]], Callable[[Subject], Result]]:
+    """Enter a function into `CHECKS`."""
+
+    def enter(function: Callable[[Subject], Result]) -> Callable[[Subject], Result]:
+        CHECKS[name] = Check(name, question, needs, function)
+        return function
+
+    return enter
+
+
+def passed(name: str, evidence: str, **figures: Any) -> Result:
+    return Result(name, Verdict.PASS, evidence, figures=figures)
+
+
+def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> Result:
+    return Result(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
+
+
+def failed(name: str, fault: str, evidence: str, **figures: Any) -> Result:
+    return Result(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
+
+
+def not_applicable(name: str, because: str) -> Result:
+    return Result(name, Verdict.NOT_APPLICABLE, because)
+
+
+def not_supported(name: str, error: UnsupportedFmuError) -> Result:
+    """What this program or this machine cannot do, which says nothing about the FMU."""
+    evidence, _, remedy = str(error).rpartition("; ")
+    return Result(name, Verdict.NOT_SUPPORTED, evidence or remedy, error.kind, remedy, whose=Whose.HERE)
+
+
+def provoked(name: str, evidence: str) -> Result:
+    """What an FMU does after a call that FMI forbids."""
+    remedy = "only this check makes such a call, and our master never does; an FMU should refuse it, tell the author"
+    return Result(
+        name, Verdict.REMARK, f"a call that FMI forbids provoked it: {evidence}", "", remedy, whose=Whose.CALL
+    )

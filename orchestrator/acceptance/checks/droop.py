@@ -1,0 +1,91 @@
+"""The droop from reactive power to voltage of a converter, found from what it settles to at a stiff bus."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from orchestrator.acceptance.checks.subject import Point
+
+POINT = Point(1.0, 0.0, 0.7, 0.1)
+"""With much active power, so that Q follows P at constant voltage and the internal voltage shows in Q."""
+
+VOLTAGE = 0.02
+FREQUENCY = 0.001
+"""Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
+
+POINTS = (Point(1.0, 0.0, 0.2, -0.2), Point(1.0, 0.0, 0.2, 0.3), Point(1.0, 0.0, -0.5, 0.1))
+"""Further ones, with other powers."""
+
+SETTLED = 1e-3
+"""Power [pu, S_n] by which an answer may still move."""
+
+_GOOD = 0.2
+"""Largest error of the law, in parts of what the droop does where the frequency changes."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Half the difference of what a change up and the same one down bring [pu, S_n], early and settled.
+
+    Attributes
+    ----------
+    i
+        Current in the end, in the frame of the voltage.
+    early_power, power
+        In the first cycle, and in the end.
+    moving
+        How much P and Q still move in the end.
+    far
+        How far they go away at most.
+    """
+
+    i: complex
+    early_power: complex
+    power: complex
+    moving: float
+    far: float
+
+
+def droop(found: Sequence[tuple[Point, Answer, Answer]]) -> float | None:
+    """Fall of the voltage behind an impedance per reactive power [pu, S_n]; None where no such law is seen.
+
+    Parameters
+    ----------
+    found
+        At some operating points what lower voltage and what lower frequency bring.
+
+    Notes
+    -----
+    With E = v + (R + jX)·i, the law ΔE = −n·ΔQ holds for changes of the voltage and of the frequency, at all
+    operating points, with the same R, X and n. A controller of the voltage at the port, or a machine, does not follow
+    it. Q may be measured at the port or behind the impedance.
+    """
+    if any(answer.moving > SETTLED for _, *answers in found for answer in answers):
+        return None
+    fits = []
+    for inside in (False, True):
+        best = least_squares(_errors, (0.02, 0.2, 0.0), args=(found, inside), x_scale=(0.01, 0.1, 0.05))
+        fits.append((float(np.abs(best.fun).max()), *map(float, best.x)))
+    error, resistance, reactance, slope = min(fits)
+    moved = min(abs(frequency.power.imag) for _, _, frequency in found[:1])
+    if reactance < 0.02 or abs(resistance) > reactance or error > _GOOD * abs(slope) * moved:
+        return None
+    return slope
+
+
+def _errors(x: NDArray[np.float64], found: Sequence[tuple[Point, Answer, Answer]], inside: bool) -> NDArray[np.float64]:
+    """ΔE + n·ΔQ for every answer."""
+    resistance, reactance, slope = x
+    errors = []
+    for point, *answers in found:
+        i_0 = complex(point.P, -point.Q)
+        e_0 = 1 + (resistance + 1j * reactance) * i_0
+        for answer, fall, slower in zip(answers, (VOLTAGE, 0.0), (0.0, FREQUENCY), strict=True):
+            v, i = 1 - fall, i_0 + answer.i
+            e = v + (resistance + 1j * reactance * (1 - slower)) * i
+            q_0, q = ((e_0 if inside else 1.0) * i_0.conjugate()).imag, ((e if inside else v) * i.conjugate()).imag
+            errors.append(abs(e) - abs(e_0) + slope * (q - q_0))
+    return np.array(errors)

@@ -1,0 +1,153 @@
+"""What an FMU declares: the standard, units, start values, dependencies."""
+
+from math import isfinite
+from pathlib import Path
+from xml.etree import ElementTree
+
+from orchestrator.acceptance.checks.base import Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.fmi.archive import MODEL_DESCRIPTION
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.validation import validation_problems
+from orchestrator.units import base_exponents
+
+_SOME = 3
+_PORT_UNITS = {
+    "v_re": ("pu", "V", "kV"),
+    "v_im": ("pu", "V", "kV"),
+    "i_re": ("pu", "A", "kA"),
+    "i_im": ("pu", "A", "kA"),
+}
+_PLAIN = ("", "1", "-", "%", "pu", "p.u.", "p.u", "per unit", "per_unit")
+_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+def native(subject: Subject) -> FmuDescription:
+    """What the file itself says, without a binding."""
+    described = subject.description
+    return described.native if isinstance(described, BoundDescription) else described
+
+
+def some_of(texts: list[str], between: str = "; ") -> str:
+    """The first few, and how many more there are."""
+    more = f"{between}and {len(texts) - _SOME} more" if len(texts) > _SOME else ""
+    return between.join(texts[:_SOME]) + more
+
+
+@check("fmi_validity", "Does the file keep to FMI 2.0?")
+def fmi_validity(subject: Subject) -> Result:
+    grave, harmless = validation_problems(subject.directory)
+    if grave:
+        return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
+    if harmless:
+        return remarked(
+            "fmi_validity",
+            some_of(harmless),
+            "breaks the standard without changing an answer here; tell the author",
+            problems=harmless,
+        )
+    return passed("fmi_validity", "FMPy's validator finds no problem")
+
+
+@check("units", "Are units declared, known, and what their definitions say?")
+def units(subject: Subject) -> Result:
+    described = native(subject)
+    wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described)
+    if wrong:
+        return failed("units", "wrong units", some_of(wrong))
+    open_ends = [
+        v.name
+        for v in described.variables.values()
+        if v.causality in ("input", "output") and v.type == "Real" and not v.unit
+    ]
+    if open_ends:
+        return remarked("units", f"no unit is declared for {some_of(open_ends)}", "say the unit in the binding")
+    return passed("units", "every Real input and output has a unit that fits its definition")
+
+
+def _wrong_definitions(directory: Path) -> list[str]:
+    """Units whose name says one thing and whose BaseUnit another."""
+    wrong = []
+    for unit in ElementTree.parse(directory / MODEL_DESCRIPTION).getroot().iterfind("UnitDefinitions/Unit"):
+        name, base = unit.get("name", ""), unit.find("BaseUnit")
+        known = None if base is None or name in _PLAIN else base_exponents(name)
+        if known is None or base is None:
+            continue
+        factor, exponents = known
+        declared = {key: int(base.get(key, "0")) for key in _BASE_UNITS}
+        # An angle may be counted as a number, so rad decides nothing.
+        differs = [k for k in _BASE_UNITS if k != "rad" and declared[k] != exponents.get(k, 0)]
+        said = float(base.get("factor", "1"))
+        if differs:
+            wrong.append(
+                f"unit {name!r} is defined with {_power(differs[0], declared)}, which it does not have"
+                if declared[differs[0]]
+                else f"unit {name!r} is defined without its {differs[0]}"
+            )
+        elif abs(said - factor) > 1e-6 * factor and not float(base.get("offset", "0")):
+            wrong.append(f"unit {name!r} is defined as {said:g} SI units; it is {factor:g}")
+    return wrong
+
+
+def _power(key: str, exponents: dict[str, int]) -> str:
+    return f"{key}^{exponents[key]}"
+
+
+def _wrong_port_units(described: FmuDescription) -> list[str]:
+    """Where an FMU has our port's names, its units must be able to mean the port."""
+    variables = described.variables
+    if not set(_PORT_UNITS) <= set(variables):
+        return []
+    return [
+        f"{name} is declared in {variables[name].unit!r}, no unit of a {'voltage' if name[0] == 'v' else 'current'}"
+        for name, allowed in _PORT_UNITS.items()
+        if variables[name].unit not in (*_PLAIN, *allowed)
+    ] + [
+        f"{name} is declared in {variables[name].unit!r}; without a binding it must be pu"
+        for name, allowed in _PORT_UNITS.items()
+        if variables[name].unit in allowed[1:]
+    ]
+
+
+@check("declared_starts", "Does every input and parameter start, within its own bounds?")
+def declared_starts(subject: Subject) -> Result:
+    missing, wrong = [], []
+    for info in native(subject).variables.values():
+        if info.causality not in ("input", "parameter") or info.type == "Clock":  # a clock ticks, and starts at nothing
+            continue
+        if info.start is None:
+            missing.append(info.name)
+        elif info.type == "Real" and (text := _out_of_bounds(info)):
+            wrong.append(text)
+    if missing or wrong:
+        texts = wrong + ([f"no start value: {some_of(missing)}"] if missing else [])
+        return failed("declared_starts", "bad start values", some_of(texts))
+    return passed("declared_starts", "all have a start value within their bounds")
+
+
+def _out_of_bounds(info: VariableInfo) -> str | None:
+    try:
+        value = float(info.start or "")
+    except ValueError:
+        return f"{info.name} starts at {info.start!r}, which is no number"
+    if not isfinite(value):
+        return f"{info.name} starts at {info.start}"
+    low = -float("inf") if info.minimum is None else info.minimum
+    high = float("inf") if info.maximum is None else info.maximum
+    return None if low <= value <= high else f"{info.name} starts at {value:g}, outside of {low:g} to {high:g}"
+
+
+@check("declared_dependencies", "Does the file say what its outputs depend on?")
+def declared_dependencies(subject: Subject) -> Result:
+    described = native(subject)
+    if not described.outputs:
+        return not_applicable("declared_dependencies", "because the FMU has no outputs")
+    silent = [name for name in described.outputs if described.output_dependencies.get(name) is None]
+    if silent and described.inputs:
+        return remarked(
+            "declared_dependencies",
+            f"nothing is said of {some_of(silent)}, so all inputs are assumed to act at once",
+            "ask for the dependencies, so that a master can order its calls",
+        )
+    return passed("declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on")

@@ -1,0 +1,216 @@
+"""Whether a converter at its port does what a power flow expects of it."""
+
+from cmath import phase
+from collections.abc import Sequence
+from math import isinf, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.running import affordable
+from orchestrator.acceptance.checks.subject import Point, Running, Subject, Vector
+from orchestrator.errors import ComponentError
+from orchestrator.fmi.component import RealBatch
+from orchestrator.fmi.port import SYSTEM_BASE_MVA, BoundDescription
+
+Complexes = NDArray[np.complex128]
+
+POINTS = (
+    Point(1.0, 0.0, 0.5, 0.1),
+    Point(1.03, 0.4, 0.7, -0.1),
+    Point(0.97, -0.5, 0.3, 0.2),
+    Point(1.0, 2.0, 0.6, 0.0),
+    Point(1.01, -2.5, 0.4, -0.2),
+)
+_BALANCE = 0.02
+"""Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
+
+_DRIFT = 1e-3
+"""Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
+
+WHY = {
+    "no port": "because it has no port: give a binding with --binding (`gfor bind` drafts one)",
+    "no start": "because the binding has no start values (P_0, Q_0, v_0, theta_0) to start from a power flow",
+}
+
+
+def _rating(running: Running) -> float:
+    set_to = running.subject.use.values.get("S_n")
+    info = running.component.description.variables.get("S_n")
+    if set_to is not None:
+        return float(set_to)
+    return SYSTEM_BASE_MVA if info is None else float(info.start or SYSTEM_BASE_MVA)
+
+
+def current_limit(subject: Subject) -> float | None:
+    """The largest current that the binding or the FMU declares [pu, S_n]; None where neither does."""
+    described = subject.description
+    if isinstance(described, BoundDescription):
+        return described.port.current_limit
+    info = described.variables.get("I_max")
+    return float(info.start) if info is not None and info.start and info.unit in ("pu", "p.u.") else None
+
+
+def currents(running: Running, deviation: complex, steps: int) -> Complexes:
+    """Step with the voltage moved by a deviation [pu]; the injected current after each step [pu, S_n]."""
+    names = running.subject.inputs
+    change = np.zeros((1, len(names)))
+    change[0, names.index("v_re")], change[0, names.index("v_im")] = deviation.real, deviation.imag
+    return of_current(running, running.hold(change, steps, running.subject.step_size))
+
+
+def of_current(running: Running, values: Vector) -> Complexes:
+    """The injected current [pu, S_n] in rows of outputs."""
+    names = running.subject.outputs
+    found: Complexes = values[:, names.index("i_re")] + 1j * values[:, names.index("i_im")]
+    return found * SYSTEM_BASE_MVA / _rating(running)
+
+
+def _current(running: Running) -> complex:
+    """Injected current [pu, S_n]."""
+    values = RealBatch(running.component, ("i_re", "i_im")).read()
+    return complex(*values) * SYSTEM_BASE_MVA / _rating(running)
+
+
+def _points(subject: Subject) -> tuple[Point, ...]:
+    """The operating point of use, and others."""
+    return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
+
+
+@check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
+def steady_state(subject: Subject) -> Result:
+    if not subject.starts:
+        return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
+    steps, worst = affordable(subject, 5000), 0.0
+    refused = []
+    for point in _points(subject)[:3]:
+        try:
+            with subject.running(point=point) as running:
+                begin = _current(running)
+                moved = np.abs(currents(running, 0j, steps) - begin)
+                worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
+        except ComponentError as error:
+            refused.append(str(error))
+    if len(refused) == 3:
+        return failed("steady_state", "error in a step" if "fmi2DoStep" in refused[0] else "does not start", refused[0])
+    seen = f"the current moves by {worst:.3g} pu of its rating in {steps * subject.step_size:.3g} s at constant voltage"
+    subject.memory["drift"] = worst
+    if isinf(worst):
+        return failed("steady_state", "not a number", "its current is no number at constant voltage")
+    if worst > _DRIFT:
+        return failed("steady_state", "no steady state", seen, drift=worst)
+    if worst > 1e-6:
+        return remarked("steady_state", seen, "let it settle before linearising", drift=worst)
+    return passed("steady_state", seen, drift=worst)
+
+
+@check("power_balance", "Are sign, base and frame such that the power at its port is the power asked of it?")
+def power_balance(subject: Subject) -> Result:
+    """Fit x = a·x_0 + b·conj(x_0) + c over several operating points, for powers and for currents."""
+    if not subject.starts:
+        return not_applicable("power_balance", WHY["no start" if subject.port else "no port"])
+    best: Result | None = None
+    settle = 0 if subject.memory.get("drift", 0.0) <= _DRIFT else affordable(subject, 20000)
+    for steps in dict.fromkeys((0, settle)):
+        asked, found, voltages = _powers(subject, steps)
+        if len(asked) < 3:
+            return not_applicable(
+                "power_balance", f"because it starts at {len(asked)} of {len(_points(subject))} operating points only"
+            )
+        result = _judged(asked, found, voltages, steps * subject.step_size)
+        if best is None or result.verdict == "pass":
+            best = result
+    assert best is not None
+    return best
+
+
+def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex], list[complex]]:
+    """Powers asked for, found, and the voltages at which it starts."""
+    asked, found, voltages = [], [], []
+    for point in _points(subject):
+        try:
+            with subject.running(point=point) as running:
+                if steps:
+                    currents(running, 0j, steps)
+                power = point.voltage * _current(running).conjugate()
+        except ComponentError:
+            continue
+        asked.append(complex(point.P, point.Q))
+        found.append(power)
+        voltages.append(point.voltage)
+    return asked, found, voltages
+
+
+def _judged(asked: Sequence[complex], found: Sequence[complex], voltages: Sequence[complex], after: float) -> Result:
+    s_0, s = np.array(asked), np.array(found)
+    at = "at the start" if not after else f"after {after:.3g} s"
+    if not np.isfinite(s).all():
+        return failed("power_balance", "not a number", f"the power {at} is not finite")
+    worst = float(np.abs(s - s_0).max())
+    k = int(np.argmax(np.abs(s - s_0)))
+    seen = f"{at} S = {_text(found[k])} pu of the rating where {_text(asked[k])} is asked"
+    # What is wrong with an axis shows in the currents, what is wrong with P or Q in the powers.
+    v = np.array(voltages)
+    in_power, in_current = _fit(s_0, s), _fit((s_0 / v).conj(), (s / v).conj())
+    of, (a, b, c, rest) = ("S", in_power) if in_power[3] <= 1.01 * in_current[3] else ("i", in_current)
+    figures = {
+        "of": of,
+        "a": [a.real, a.imag],
+        "b": [b.real, b.imag],
+        "c": [c.real, c.imag],
+        "rest": rest,
+        "worst": worst,
+    }
+    if worst <= _BALANCE:
+        return passed(
+            "power_balance", f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points", **figures
+        )
+    fault, says = _diagnosis(of, a, b, c, rest)
+    return failed("power_balance", fault, f"{seen}: {says}", **figures)
+
+
+def _fit(asked: Complexes, found: Complexes) -> tuple[complex, complex, complex, float]:
+    """The coefficients a, b, c of found = a·asked + b·conj(asked) + c, and the largest rest."""
+    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([asked, asked.conj(), np.ones(len(asked))]), found, rcond=None)
+    return complex(a), complex(b), complex(c), float(np.abs(found - (a * asked + b * asked.conj() + c)).max())
+
+
+def _diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple[str, str]:
+    """Name of the fault, and what the fit says."""
+    fit = f"{of} = ({a:.3g})·{of}_0 + ({b:.3g})·{of}_0* + ({c:.3g})"
+    if rest > _BALANCE or abs(c) > _BALANCE:
+        return "power not as asked", "it does not follow P_0 and Q_0" if abs(a) < _BALANCE else fit
+    if abs(a) <= _BALANCE and abs(b) <= _BALANCE:
+        return "power not as asked", "there is no power at all"
+    if min(abs(a), abs(b)) > _BALANCE:
+        return "wrong axes", f"{fit}, so its axes are scaled or signed differently"
+    if abs(b) > abs(a):
+        return "wrong sign", f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}"
+    turn = phase(a) * 180 / pi
+    if abs(abs(a) - 1) > _BALANCE:
+        return "wrong base", f"the power is {abs(a):.4g} times what is asked{_known(abs(a))}" + (
+            ", with the opposite sign" if abs(turn) > 178 else f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
+        )
+    if abs(turn) > 178:
+        return "wrong sign", "the power has the opposite sign"
+    return "wrong frame", f"the current is turned by {-turn:.1f}°"
+
+
+def _known(ratio: float) -> str:
+    names = {
+        sqrt(3): "√3: phase for line-to-line",
+        sqrt(2): "√2: peak for rms",
+        1.5: "3/2: of peak phase quantities",
+        3.0: "3: three phases for one",
+        1000.0: "1000: kilo",
+    }
+    for value, text in names.items():
+        for name, seen in ((text, value), (f"1/({text})", 1 / value)):
+            if abs(ratio / seen - 1) < 0.01:
+                return f" ({name})"
+    return ""
+
+
+def _text(power: complex) -> str:
+    return f"{power.real:.4g}{power.imag:+.4g}j"

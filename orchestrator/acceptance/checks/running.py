@@ -1,0 +1,198 @@
+"""Whether an FMU runs at all, and gives the same answer twice."""
+
+from math import isnan
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.subject import Subject, Vector, difference, elsewhere
+from orchestrator.errors import ComponentError, EndedError
+from orchestrator.fmi.component import RealBatch
+
+RUN_FOR = 2.0
+"""Time [s] for which an FMU is made to run."""
+
+_PATIENCE = 10.0
+"""How many times as long it may take to come to its experiment's end."""
+
+_HELD, _ROUNDS = 50, 4
+"""Steps for which inputs stay; how often they change before it is looked at the clock."""
+
+_LONGEST = 60.0
+"""Simulated time [s] after which enough was seen."""
+
+LEAST_STEPS = 20
+"""An FMU that ends by itself before that many steps has shown nothing."""
+
+EQUAL = 1e-10
+"""Relative difference up to which two runs are equal."""
+
+
+@check("runs", "Does it run, without crash, hang, exit or numbers that are none?")
+def runs(subject: Subject) -> Result:
+    """Run to where the file says an experiment ends, at least for a while, and in reason."""
+    h, ends = subject.step_size, subject.description.stop_time or 10.0
+    stimulus, least = subject.steps(hold=_HELD * h), subject.memory.get("run_for", RUN_FOR)
+    with subject.running() as running:
+        begin, k = perf_counter(), 0
+        while k * h < _LONGEST and perf_counter() - begin < (least if k * h >= ends else _PATIENCE * least):
+            steps, running.time = _HELD * _ROUNDS, k * h
+            try:
+                values = running.record(steps, h, stimulus)
+            except EndedError as error:
+                return _ended(subject, error)
+            except ComponentError as error:
+                if error.time is None or error.time < ends - 0.5 * h or subject.description.stop_time is None:
+                    return failed("runs", "error in a step", str(error), time=error.time)
+                return remarked("runs", f"it stops after its experiment's end: {error}", "do not run it for longer")
+            if not np.isfinite(values).all():
+                row = int(np.argmin(np.isfinite(values).all(axis=1)))
+                return _not_finite(subject, values[row], (k + row) * h)
+            k += steps
+        seconds = (perf_counter() - begin) / k
+    subject.memory["seconds_per_step"] = seconds
+    return passed(
+        "runs",
+        f"{k} steps of {h:g} s, {k * h:.3g} s in all, at {1e6 * seconds:.1f} µs a step; outputs were read at each",
+        steps=k,
+        step_size=h,
+        microseconds_per_step=1e6 * seconds,
+    )
+
+
+def _ended(subject: Subject, error: EndedError) -> Result:
+    """An orderly end; so early that nothing can be learned, it is a fault."""
+    h, declared, ended = subject.step_size, subject.description.stop_time, error.ended_at
+    steps, early = round(error.time / h), declared is not None and ended < declared - 0.5 * h
+    text = f"it ended its simulation at t = {ended:.6g} s by itself"
+    text += f", before the {declared:g} s that it declares" if early else ""
+    text += f" (it says: {error.log})" if error.log else ""
+    if steps < LEAST_STEPS:
+        return failed("runs", "ends at once", text, time=ended)
+    with subject.running() as running:  # what came with the refused step is lost
+        values = running.record(steps, h, subject.steps(hold=_HELD * h))
+    if not np.isfinite(values).all():
+        row = int(np.argmin(np.isfinite(values).all(axis=1)))
+        return _not_finite(subject, values[row], row * h)
+    subject.memory["ended_at"] = ended
+    return remarked("runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended)
+
+
+def _not_finite(subject: Subject, values: Vector, time: float) -> Result:
+    bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
+    return failed(
+        "runs",
+        "not a number",
+        f"{', '.join(bad[:3])} is {values[~np.isfinite(values)][0]} at t = {time:.6g} s, and fmi2DoStep returned OK",
+        time=time,
+    )
+
+
+def affordable(subject: Subject, steps: int, step_size: float | None = None) -> int:
+    """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
+    fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
+    ends = subject.ends
+    return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size))))
+
+
+@check("repeatability", "Does it give the same answer twice?", needs=("independence",))
+def repeatability(subject: Subject) -> Result:
+    steps = affordable(subject, 1000)
+    stimulus = subject.steps(hold=20 * subject.step_size)
+    first, second = (subject.trajectory(steps, subject.step_size, stimulus) for _ in range(2))
+    apart, place = difference(first, second)
+    if apart > EQUAL:
+        return failed(
+            "repeatability",
+            "not repeatable",
+            f"{subject.watched[place]} differs by {apart:.3g} of its range between two equal runs of {steps} steps",
+            difference=apart,
+        )
+    return passed("repeatability", f"two runs of {steps} steps differ by {apart:.1g}", difference=apart)
+
+
+@check("reading", "Does reading leave it as it was?", needs=SAME)
+def reading(subject: Subject) -> Result:
+    """Read everything, several times and backwards, in one of two equal runs."""
+    steps = affordable(subject, 300)
+    stimulus = subject.steps(hold=10 * subject.step_size)
+    plain = subject.trajectory(steps, subject.step_size, stimulus)
+    rows = [plain[0]]
+    with subject.running() as running:
+        everything = [
+            n for n, v in subject.description.variables.items() if v.type == "Real" and v.reference < 2**32 - 1
+        ]
+        backwards = RealBatch(running.component, everything[::-1])
+        for k in range(steps):
+            running.time = k * subject.step_size
+            running.feed(stimulus(running.time))
+            backwards.read()
+            running.step(subject.step_size)
+            once, twice = running.read(), (backwards.read(), running.read())[1]
+            if not np.array_equal(once, twice, equal_nan=True):
+                return failed(
+                    "reading",
+                    "reading changes it",
+                    f"at t = {running.time:.6g} s, reading twice gives {once.tolist()[:3]} and {twice.tolist()[:3]}",
+                )
+            rows.append(twice)
+    apart, place = difference(plain, np.array(rows))
+    if apart > EQUAL:
+        return failed(
+            "reading",
+            "reading changes it",
+            f"{subject.watched[place]} differs by {apart:.3g} of its range where everything was read in between",
+            difference=apart,
+        )
+    return passed("reading", f"{len(everything)} variables read backwards at every step change nothing")
+
+
+@check("start_values", "Do its variables start where the file says?")
+def start_values(subject: Subject) -> Result:
+    variables = subject.description.variables
+    names = [
+        n
+        for n, v in variables.items()
+        if v.type == "Real"
+        and v.start
+        and v.causality in ("parameter", "input")
+        and v.reference < 2**32 - 1
+        and not (subject.port and n in ("v_re", "v_im"))
+    ]
+    if not names:
+        return not_applicable("start_values", "because no Real parameter or input of its own has a start value")
+    component = subject.open()
+    try:
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        values = component.get(names)
+    except ComponentError as error:
+        return not_applicable("start_values", f"because it cannot be read while it is initialised: {error}")
+    finally:
+        component.close()
+    wrong = [
+        f"{n} is {v:g} and {variables[n].start} is declared"
+        for n, v in values.items()
+        if isnan(v) or abs(v - float(variables[n].start or 0)) > 1e-9 * max(1.0, abs(v))
+    ]
+    if wrong:
+        return failed("start_values", "start values differ", "; ".join(wrong[:3]))
+    if lost := _not_taken(subject):
+        return failed("start_values", "parameter not taken", lost)
+    return passed("start_values", f"{len(names)} parameters and inputs start as declared")
+
+
+def _not_taken(subject: Subject) -> str | None:
+    """A parameter that reads as before after it was set; None if there is none."""
+    wanted = elsewhere(subject)
+    if not wanted:
+        return None
+    try:
+        with subject.running(parameters=wanted) as running:
+            found = running.component.get(list(wanted))
+    except ComponentError:
+        return None  # it may refuse values that do not go together
+    start = subject.description.variables
+    lost = [n for n, v in found.items() if v == float(start[n].start or 0) != wanted[n]]
+    return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None

@@ -1,0 +1,138 @@
+"""Whether a saved state is all of the state."""
+
+from time import perf_counter
+
+from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.running import affordable
+from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, Vector, difference, elsewhere, saved
+from orchestrator.errors import ComponentError
+
+_CLEAR = 1e-6
+"""Relative difference above which something was not restored; an integrator with memory may begin anew below it."""
+
+_EXACT = 1e-12
+
+
+@check("state", "Does a saved state bring back everything?", needs=(*SAME, "reading"))
+def state(subject: Subject) -> Result:
+    """Run, save, run on; restore, and run the same again: what was not saved goes on from where it was."""
+    if not subject.description.can_save_state:
+        return not_applicable("state", "because the FMU does not declare canGetAndSetFMUstate")
+    steps, h = affordable(subject, 600), subject.step_size
+    stimulus = subject.steps(hold=15 * h)
+    worst, place = 0.0, 0
+    with subject.running() as running:
+        running.record(steps // 2 | 1, h, stimulus)  # odd: a control may be between two of its samples
+        _tune(running)
+        at = running.time
+        with saved(running) as kept:
+            first = running.record(steps, h, stimulus)
+            # Somewhere else, so that what stays behind shows.
+            running.record(steps // 3 | 1, h, lambda t: -2 * stimulus(t))
+            for _ in range(2):
+                running.restore(kept)
+                running.time = at
+                again = running.record(steps, h, stimulus)
+                apart, where = difference(first, again)
+                if apart > worst:
+                    worst, place = apart, where
+    if worst > _CLEAR:
+        return failed(
+            "state",
+            "hidden state",
+            f"{subject.watched[place]} differs by {worst:.3g} of its range after "
+            f"fmi2SetFMUstate and {steps} equal steps",
+            difference=worst,
+        )
+    if worst > _EXACT:
+        return remarked(
+            "state",
+            f"{subject.watched[place]} differs by {worst:.3g} of its range after fmi2SetFMUstate",
+            "an integrator that begins anew does that; perturbations should be much larger",
+            difference=worst,
+        )
+    return passed("state", f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g})", difference=worst)
+
+
+@check("state_size", "How large is the state, and does it stay so?", needs=(*SAME, "reading", "state"))
+def state_size(subject: Subject) -> Result:
+    if not (subject.description.can_save_state and subject.description.can_serialize_state):
+        return not_applicable("state_size", "because the FMU does not declare canSerializeFMUstate")
+    h, sizes = subject.step_size, []
+    stimulus = subject.steps(hold=10 * h)
+    with subject.running() as running:
+        for _ in range(4):
+            begin = perf_counter()
+            with saved(running) as kept:
+                seconds = perf_counter() - begin
+                sizes.append(len(running.component.serialize_state(kept)))
+            running.record(50, h, stimulus)
+        again = _serialised(running, h, stimulus)
+    least = 8 * len(subject.description.states)
+    figures = {"bytes": sizes[0], "microseconds": 1e6 * seconds}
+    if sizes[-1] > sizes[0] and sizes == sorted(sizes) and len(set(sizes)) > 2:
+        return failed(
+            "state_size",
+            "growing state",
+            f"the serialised state grows from {sizes[0]} to {sizes[-1]} bytes in 150 steps",
+            **figures,
+        )
+    if again is not None:
+        return failed("state_size", "serialised state", again, **figures)
+    if sizes[0] < least:
+        return failed(
+            "state_size", "incomplete state", f"{sizes[0]} bytes cannot hold {least // 8} continuous states", **figures
+        )
+    return passed("state_size", f"{sizes[0]} bytes, saved in {1e6 * seconds:.0f} µs", **figures)
+
+
+def _tune(running: Running) -> None:
+    """Move the tunable parameters: they belong to the state."""
+    for name, value in elsewhere(running.subject).items():
+        try:
+            running.component.set({name: value})
+        except ComponentError:
+            return
+
+
+def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
+    """What is wrong with a state that went through bytes and back; None if nothing is."""
+    at = running.time
+    with saved(running) as kept:
+        content = running.component.serialize_state(kept)
+    first = running.record(50, h, stimulus)
+    try:
+        copy = running.component.deserialize_state(content)
+        running.restore(copy)
+    except ComponentError as error:
+        return str(error)
+    running.component.free_state(copy)
+    running.time = at
+    apart, place = difference(first, running.record(50, h, stimulus))
+    if apart <= _CLEAR:
+        return _in_another(running, content, at, first, h, stimulus)
+    return (
+        f"{running.subject.watched[place]} differs by {apart:.3g} of its range after a state that went through "
+        f"{len(content)} bytes"
+    )
+
+
+def _in_another(running: Running, content: bytes, at: float, first: Vector, h: float, stimulus: Stimulus) -> str | None:
+    """What is wrong with a state of one instance that another one takes from bytes: a pointer may have been saved."""
+    subject = running.subject
+    if subject.description.one_instance:
+        return None
+    with subject.running("another") as another:
+        try:
+            copy = another.component.deserialize_state(content)
+            another.restore(copy)
+        except ComponentError as error:
+            return f"in another instance, {error}"
+        another.component.free_state(copy)
+        another.time = at
+        apart, place = difference(first, another.record(len(first) - 1, h, stimulus))
+    if apart <= _CLEAR:
+        return None
+    return (
+        f"{subject.watched[place]} differs by {apart:.3g} of its range in another instance that takes the state's bytes"
+    )

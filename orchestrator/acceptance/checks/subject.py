@@ -1,0 +1,325 @@
+"""The FMU under test: instances of it at an operating point, and runs with reproducible inputs."""
+
+from cmath import rect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.acceptance.process import FmuProcess, HostedComponent
+from orchestrator.fmi.component import RealBatch
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.port import START, BoundDescription
+
+Vector = NDArray[np.float64]
+Stimulus = Callable[[float], Vector]
+"""Time [s] → the inputs' deviations from where they start."""
+
+PORT_STEP = 1e-4
+"""Communication step [s] at which converters are coupled."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point: S = P + jQ [pu, S_n] at the bus voltage v∠θ [pu, rad]."""
+
+    v: float = 1.0
+    theta: float = 0.0
+    P: float = 0.5
+    Q: float = 0.1
+
+    @property
+    def voltage(self) -> complex:
+        return rect(self.v, self.theta)
+
+
+@dataclass(frozen=True)
+class Use:
+    """How somebody uses it: what a case gives it.
+
+    Attributes
+    ----------
+    step_size
+        Communication step [s].
+    point
+        Where the power flow puts it.
+    values, inputs
+        Of its parameters, and of inputs that nothing feeds.
+    """
+
+    step_size: float | None = None
+    point: Point | None = None
+    values: Mapping[str, float | bool] = field(default_factory=dict)
+    inputs: Mapping[str, float] = field(default_factory=dict)
+
+
+class Subject:
+    """One FMU, opened as often as a check wants.
+
+    Attributes
+    ----------
+    port
+        Whether it speaks our port, by a binding or by itself.
+    starts
+        Whether it takes the power flow's start values.
+    step_size
+        Communication step of the tests [s].
+    step_is_given
+        Whether the file declares it or the user asks for it.
+    inputs, outputs
+        Names of the Real inputs and outputs.
+    process
+        Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
+    use
+        How somebody uses it.
+    doing
+        What is done to it, for the report of a crash.
+    memory
+        Results that several checks share.
+    """
+
+    process: Callable[[], FmuProcess]
+
+    def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None) -> None:
+        self.description, self.directory, self.doing = description, directory, ""
+        self.use = use or Use()
+        self.memory: dict[str, Any] = {}
+        variables = description.variables
+        self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
+        self.outputs = tuple(n for n in description.outputs if variables[n].type == "Real")
+        self.port = {"v_re", "v_im"} <= set(self.inputs) and {"i_re", "i_im"} <= set(self.outputs)
+        self.port &= (
+            all(variables[n].unit in ("pu", "p.u.") for n in ("v_re", "v_im", "i_re", "i_im")) if self.port else False
+        )
+        bound = description.port.start if isinstance(description, BoundDescription) else dict.fromkeys(START)
+        wanted = ("P_0", "Q_0", "v_0", "theta_0")
+        self.starts = self.port and all(n in bound and n in variables for n in wanted)
+        self.step_is_given = self.use.step_size is not None or description.default_step_size is not None
+        self.step_size = self.use.step_size or self._step_size()
+
+    def _step_size(self) -> float:
+        described = self.description
+        if described.default_step_size is not None:
+            return described.default_step_size
+        if self.port:
+            return PORT_STEP
+        return min(1e-3, described.stop_time / 1000) if described.stop_time else 1e-3
+
+    # -- instances -------------------------------------------------------------------------------
+
+    def open(self, name: str = "fmu") -> HostedComponent:
+        """A new instance, before initialisation."""
+        return HostedComponent(name, self.process())
+
+    @contextmanager
+    def while_doing(self, what: str) -> Iterator[None]:
+        """Name what is done to it; the name stays behind where the FMU ends its process."""
+        self.doing = what
+        yield
+        self.doing = ""
+
+    def running(
+        self, name: str = "fmu", point: Point | None = None, parameters: Mapping[str, float | bool] | None = None
+    ) -> "Running":
+        """A new instance, initialised; use it as a context manager."""
+        component = self.open(name)
+        try:
+            return Running(self, component, point, parameters)
+        except BaseException:
+            component.close()
+            raise
+
+    @property
+    def ends(self) -> float | None:
+        """When its experiment ends [s]: as declared, or where it was seen to end by itself; None where not known."""
+        known = [t for t in (self.description.stop_time, self.memory.get("ended_at")) if t is not None]
+        return min(known, default=None)
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """What tells runs apart: the outputs, or any Real variable that moves where there is none."""
+        if self.outputs:
+            return self.outputs
+        variables = self.description.variables.values()
+        return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
+
+    @property
+    def point(self) -> Point:
+        """Where it starts, where nobody says otherwise."""
+        return self.use.point or Point()
+
+    @property
+    def start_voltage(self) -> complex:
+        """Bus voltage [pu] at which it starts."""
+        return self.point.voltage
+
+    def start_inputs(self, point: Point | None) -> Vector:
+        """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
+        voltage = (point or self.point).voltage
+        known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
+        return np.array([known.get(n, _number(self.description.variables[n].start)) for n in self.inputs])
+
+    # -- stimuli ---------------------------------------------------------------------------------
+
+    @property
+    def amplitudes(self) -> Vector:
+        """A small deviation for each input, within what it declares."""
+        sizes = []
+        for name in self.inputs:
+            info = self.description.variables[name]
+            start = _number(info.start)
+            size = 0.02 if self.port and name in ("v_re", "v_im") else max(0.05 * abs(start), 0.05)
+            room = [abs(limit - start) for limit in (info.minimum, info.maximum) if limit is not None]
+            sizes.append(min([size, *[0.5 * r for r in room if r > 0]]))
+        return np.array(sizes)
+
+    def steps(self, hold: float, seed: int = 1) -> Stimulus:
+        """Steps of random height that are held for ``hold`` seconds; equal seeds give equal steps."""
+        heights = np.random.default_rng(seed).uniform(-1, 1, (4096, len(self.inputs))) * self.amplitudes
+        return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
+
+    def one_step(self) -> Stimulus:
+        """All inputs step at the beginning and stay."""
+        return lambda time: self.amplitudes
+
+    def motion(self, step_size: float) -> Stimulus:
+        """All inputs move with every step."""
+        return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
+
+    def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Vector:
+        """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs)."""
+        with self.running(**options) as running:
+            return running.record(steps, step_size, stimulus)
+
+
+class Running:
+    """An initialised instance that knows its time."""
+
+    def __init__(self, subject: Subject, component: HostedComponent, point: Point | None = None,
+                 parameters: Mapping[str, float | bool] | None = None) -> None:  # fmt: skip
+        self.subject, self.component, self.point = subject, component, point
+        self.parameters = dict(parameters or {})
+        self.begin()
+
+    def begin(self) -> None:
+        """Initialise the instance, new or reset."""
+        subject, component = self.subject, self.component
+        self.time = 0.0
+        if subject.starts:
+            point = self.point or subject.point
+            start = {"P_0": point.P, "Q_0": point.Q, "v_0": point.v, "theta_0": point.theta}
+            component.set({n: v for n, v in start.items() if n in subject.description.variables})
+        component.set({**subject.use.values, **self.parameters})
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        self.rest = subject.start_inputs(self.point)
+        self._in = RealBatch(component, subject.inputs)
+        self._out = RealBatch(component, subject.watched)
+        self.feed(np.zeros(len(self.rest)))
+        component.exit_initialization_mode()
+
+    def feed(self, deviation: Vector) -> None:
+        """Set the inputs to their start values plus a deviation."""
+        self._in.values[:] = self.rest + deviation
+        self._in.write()
+
+    def read(self) -> Vector:
+        return self._out.read().copy()
+
+    def step(self, step_size: float) -> None:
+        self.component.step(self.time, step_size)
+        self.time += step_size
+
+    def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Vector:
+        """Step and read, shape (steps + 1, n); the first row is before the stimulus."""
+        begin = self.time
+        before = self.read()
+        rows = [stimulus(begin + k * step_size) for k in range(steps)]  # not accumulated: equal runs have equal times
+        return np.vstack([before, self.hold(np.array(rows).reshape(steps, len(self.rest)), steps, step_size)])
+
+    def hold(self, deviations: Vector, steps: int, step_size: float) -> Vector:
+        """Step many times at once, shape (steps, n): what was read after each.
+
+        Parameters
+        ----------
+        deviations
+            Of the inputs before the first steps, one row each; after the last row they stay.
+        """
+        begin = self.time
+        if not steps:
+            return np.empty((0, len(self._out.names)))
+        rows = self.rest + deviations if len(self.rest) else np.empty((0, 0))
+        values = self.component.run(self._in, rows, self._out, steps, begin, step_size)
+        self.time = begin + steps * step_size
+        return values
+
+    def save(self) -> Any:
+        return self.component.save_state()
+
+    def restore(self, state: Any) -> None:
+        self.component.restore_state(state)
+
+    def reset(self) -> None:
+        self.component.reset()
+        self.begin()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.component.close()
+
+
+@contextmanager
+def saved(running: Running) -> Iterator[Any]:
+    """A saved state that is freed at the end."""
+    state = running.save()
+    try:
+        yield state
+    finally:
+        running.component.free_state(state)
+
+
+def elsewhere(subject: Subject) -> dict[str, float]:
+    """Other values of the tunable parameters, within their bounds."""
+    found = {}
+    for name, info in subject.description.variables.items():
+        if info.causality == "parameter" and info.variability == "tunable" and info.type == "Real" and info.start:
+            value = _number(info.start)
+            moved = value * 1.1 if value else 0.1
+            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
+                found[name] = moved
+    return found
+
+
+def scales(*trajectories: Vector) -> Vector:
+    """For each output how far it moves in all runs together; its size where it hardly moves."""
+    values = np.concatenate(trajectories)
+    finite = np.where(np.isfinite(values), values, 0.0)
+    size = np.abs(finite).max(axis=0)
+    moved: Vector = np.maximum(np.ptp(finite, axis=0), np.maximum(1e-6 * size, 1e-9))
+    return moved
+
+
+def difference(a: Vector, b: Vector) -> tuple[float, int]:
+    """Largest difference of two runs relative to how far the outputs move, and the output's place."""
+    if not a.size:
+        return 0.0, 0
+    apart = np.abs(a - b) / scales(a, b)
+    apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isfinite(apart), apart, np.inf))
+    place = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    return float(apart[place]), int(place[1])
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text) if text is not None else 0.0
+    except ValueError:
+        return 0.0

@@ -1,0 +1,50 @@
+"""Results of checks for a CI server: JUnit's XML, one test case for each check."""
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from orchestrator.acceptance.checks.base import Verdict
+from orchestrator.acceptance.runner import Report
+from orchestrator.errors import InputError
+
+
+def write_junit(report: Report, path: Path) -> None:
+    """Write a report.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    results = report.results
+    suite = Element(
+        "testsuite",
+        name=f"gfor check {report.fmu.name}",
+        tests=str(len(results)),
+        failures=str(len(report.failures)),
+        skipped=str(sum(r.verdict is Verdict.NOT_APPLICABLE for r in results)),
+        errors=str(sum(r.verdict is Verdict.NOT_SUPPORTED for r in results)),
+    )
+    for result in results:
+        case = SubElement(suite, "testcase", classname=report.fmu.stem, name=result.check)
+        text = _printable(result.evidence)
+        if result.verdict is Verdict.FAIL:
+            failure = SubElement(case, "failure", message=result.fault, type=result.fault)
+            failure.text = f"{text}\nremedy: {result.remedy}"
+        elif result.verdict is Verdict.NOT_SUPPORTED:
+            error = SubElement(case, "error", message=f"not supported here: {result.fault}", type=result.fault)
+            error.text = f"{text}\nremedy: {result.remedy}"
+        elif result.verdict is Verdict.NOT_APPLICABLE:
+            SubElement(case, "skipped", message=text)
+        else:
+            SubElement(case, "system-out").text = text + (f"\nremedy: {result.remedy}" if result.remedy else "")
+    indent(suite)
+    try:
+        path.write_bytes(b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suite, encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"--junit {path}: cannot be written: {error.strerror}; choose another file") from error
+
+
+def _printable(text: str) -> str:
+    """Without what XML 1.0 has no place for."""
+    return "".join(c if c in "\n\t" or c >= " " else "�" for c in text)

@@ -1,0 +1,417 @@
+"""The process of a foreign FMU that is checked, seen from outside: it is asked for measurements, never for a verdict.
+
+What comes from it lies in memory that the FMU's code can write. So it is taken for what the FMU says, of the form that
+was asked for, and nothing else in this process is in the FMU's reach.
+"""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping
+from ctypes import c_uint, memmove
+from dataclasses import asdict
+from math import inf
+from pathlib import Path
+from shutil import rmtree
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
+from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.limits import TO_BEGIN, Limits
+from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
+from orchestrator.fmi.messages import FLOODED, texts
+from orchestrator.fmi.port import BoundDescription
+
+Vector = NDArray[np.float64]
+
+_STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
+_LOOK = 0.05
+"""Time [s] after which it is looked whether the process is still there."""
+
+
+class ProcessEndedError(Exception):
+    """The FMU's process is gone, or was given up; no error of the FMU's, so no check takes it for a refusal.
+
+    Attributes
+    ----------
+    fault
+        Its name.
+    how
+        What happened, in which call and when.
+    """
+
+    def __init__(self, fault: str, how: str) -> None:
+        self.fault, self.how = fault, how
+        super().__init__(f"{fault}: {how}")
+
+
+class FmuProcess:
+    """A process with instances of one FMU.
+
+    Parameters
+    ----------
+    description, directory
+        The FMU, bound or not, and where its archive is extracted.
+    limits
+        What it may take.
+
+    Attributes
+    ----------
+    deadline
+        `time.monotonic` after which no answer is waited for.
+    unlimited
+        What could not be limited, in words.
+    """
+
+    def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
+        self.description, self.limits = description, limits
+        self.deadline = inf
+        self.time = 0.0
+        self._ended: ProcessEndedError | None = None
+        self._number, self._patience = 0, TO_BEGIN
+        self._folder = Path(tempfile.mkdtemp(prefix="gfor_check_"))
+        self._process: subprocess.Popen[bytes] | None = None
+        self._library = unlocked_library()
+        try:
+            self.box = Mailbox(self._folder / "mailbox", create=True)
+            self._into, self._out = (self.box.array(which, np.uint32, MOST) for which in (0, 1))
+            self._room = self.box.array(2, np.float64, ROOM)
+            self._start(directory)
+        except BaseException:
+            self.close()
+            raise
+
+    def _start(self, directory: Path) -> None:
+        described = self.description
+        request = {
+            "fmu": str(self.description.path.resolve()),
+            "port": asdict(described.port) if isinstance(described, BoundDescription) else None,
+            "directory": str(directory),
+            "folder": str(self._folder),
+            "limits": asdict(self.limits),
+            "parent": os.getpid(),
+        }
+        work = self._folder / "work"
+        work.mkdir()
+        with (work / "output").open("wb") as output:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "orchestrator.acceptance.worker", json.dumps(request)],
+                stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
+            )  # fmt: skip
+        try:
+            self.unlimited = tuple(map(str, self.talk("the beginning of its process", -1, "begin")))
+        except ProcessEndedError as error:  # the FMU is not loaded yet
+            raise InputError(f"the FMU's process did not start: {error.how}") from error
+        self._patience = self.limits.seconds
+
+    @property
+    def alive(self) -> bool:
+        return self._ended is None
+
+    # -- questions and answers -------------------------------------------------------------------
+
+    def talk(self, call: str, instance: int, command: str, *arguments: Any) -> Any:
+        """Have something done that needs more than numbers."""
+        if self._ended is not None:
+            raise self._ended
+        self.box.clear_log()
+        self.box.write_text([instance, command, *arguments])
+        self._ask(TALK, call)
+        try:
+            answer = self.box.read_text()
+            if not isinstance(answer, dict) or len(answer) != 1:
+                raise ValueError("it is no answer")
+            ((kind, content),) = answer.items()
+            if kind == "component_error":
+                at, how, log = map(str, content)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise self._tampered(f"{error}") from error
+        if kind == "component_error":
+            raise ComponentError("fmu", at, how, log)
+        if kind == "unsupported" and isinstance(content, list) and len(content) == 2:
+            raise UnsupportedFmuError(str(content[0]), str(content[1]))
+        if kind == "input_error":
+            raise InputError(str(content))
+        return content
+
+    def run(
+        self, instance: int, into: NDArray[np.uint32], rows: Vector, out: NDArray[np.uint32],
+        steps: int = 0, time: float = 0.0, step_size: float = 0.0,
+    ) -> tuple[int, int, int, Vector]:  # fmt: skip
+        """Set inputs, step and read, as often as asked.
+
+        Parameters
+        ----------
+        into, out
+            Value references that are set before a step, and read after it.
+        rows
+            Their values, shape (n, len(into)): one row a step, and none for the steps after the last row.
+
+        Returns
+        -------
+        status, stage, done, values
+            Of the call that was refused, or 0 or 1; what that call is; how many steps were finished; what was read,
+            shape (steps, len(out)), or one row without a step.
+        """
+        if self._ended is not None:
+            raise self._ended
+        if max(len(into), len(out)) > MOST:
+            raise InputError(f"{max(len(into), len(out))} variables cannot be exchanged at once; {MOST} can")
+        head, asked = self.box.head, self.box.run
+        length, values = max(1, steps), np.empty((max(1, steps), len(out)))
+        chunk = max(1, ROOM // max(1, len(into) + len(out)))
+        for begin in range(0, length, chunk):
+            some = np.ascontiguousarray(rows[begin : begin + chunk])
+            count = min(chunk, length - begin)
+            asked.instance, asked.n_steps, asked.n_rows = instance, min(count, steps), len(some)
+            asked.n_in, asked.n_out = len(into), len(out)
+            head.time, head.step = time + begin * step_size, step_size
+            self._into[: len(into)], self._out[: len(out)] = into, out
+            self._room[: some.size] = some.ravel()
+            self.time = head.time
+            status = self._ask(RUN, "")
+            done = min(max(0, asked.done), count)
+            self.time = time + (begin + done) * step_size
+            read = self._room[some.size : some.size + count * len(out)]
+            values[begin : begin + count] = read.reshape(count, len(out))
+            if status > 1:
+                return status, asked.stage, begin + done, values
+        return status, 0, length, values
+
+    def number(self, call: str, instance: int, command: str, *arguments: Any) -> int:
+        """As `talk`, where the answer must be a whole number."""
+        answer = self.talk(call, instance, command, *arguments)
+        if not isinstance(answer, int) or answer < 0:
+            raise self._tampered(f"{str(answer)[:50]!r} in place of a number")
+        return answer
+
+    def table(self, answer: Any) -> dict[str, float | bool]:
+        """The names and numbers that an answer must be."""
+        if isinstance(answer, dict) and all(isinstance(value, int | float) for value in answer.values()):
+            return answer
+        raise self._tampered("a table that is none")
+
+    def progress(self, answer: Any) -> tuple[bool, float | None]:
+        """Whether it ended by itself, and when, as an answer must say it."""
+        if isinstance(answer, list) and len(answer) == 2:
+            ended, reached = answer
+            if isinstance(ended, bool) and (reached is None or isinstance(reached, int | float)):
+                return ended, reached
+        raise self._tampered("an answer that is none")
+
+    def names(self, answer: Any) -> list[str]:
+        """The list of texts that an answer must be."""
+        if isinstance(answer, list) and all(isinstance(text, str) for text in answer):
+            return answer
+        raise self._tampered("a list that is none")
+
+    def hexadecimal(self, answer: Any) -> bytes:
+        """The bytes that an answer must be."""
+        try:
+            return bytes.fromhex(answer)
+        except (TypeError, ValueError) as error:
+            raise self._tampered("bytes that are none") from error
+
+    def _ask(self, kind: int, call: str) -> int:
+        """Ask and wait; the status, or an error that says how the process ended."""
+        assert self._process is not None
+        self._number += 1
+        box, wait, begin, steps = self.box, self._library.mailbox_wait, monotonic(), self.box.head.steps
+        self._library.mailbox_post(box.address, kind, self._number)
+        while not (answered := wait(box.address, self._number, _LOOK)):
+            now = monotonic()
+            if self._process.poll() is not None:
+                if answered := wait(box.address, self._number, 0.0):
+                    break  # with its last breath
+                raise self._died(call)
+            if box.head.steps != steps:
+                steps, begin = box.head.steps, now
+            if now - begin > self._patience:
+                raise self._given_up(f"no answer within {self._patience:g} s in {self._where(call)}")
+            if now > self.deadline:
+                raise self._given_up(f"it takes too long, last in {self._where(call)}")
+        if answered < 0:
+            raise self._tampered("an answer that was not asked for")
+        return int(box.head.status)
+
+    def _where(self, call: str) -> str:
+        call = call or _STAGES.get(self.box.run.stage, "fmi2DoStep")
+        time = self.time + (max(0, self.box.run.done) * self.box.head.step if call == "fmi2DoStep" else 0.0)
+        return f"{call}, at t = {time:.6g} s"
+
+    # -- how it ended ----------------------------------------------------------------------------
+
+    def _tampered(self, seen: str) -> ProcessEndedError:
+        self._kill()
+        self._ended = ProcessEndedError("tampering", f"it wrote into the memory between the processes: {seen}")
+        return self._ended
+
+    def _given_up(self, how: str) -> ProcessEndedError:
+        self._kill()
+        self._ended = ProcessEndedError("hang", how)
+        return self._ended
+
+    def _died(self, call: str) -> ProcessEndedError:
+        assert self._process is not None
+        code, where, limits = self._process.wait(), self._where(call), self.limits
+        said = self._last_words()
+        tail = f"; it wrote: {said}" if said else ""
+        if code == FLOODED:
+            fault, how = "output flood", f"more than {limits.messages} log messages in {where}"
+        elif code < 0 and -code == getattr(signal, "SIGXFSZ", None):
+            fault, how = "output flood", f"more than {limits.output} bytes written in {where}"
+        elif code < 0 or code > 0x80000000:
+            kind = signal.Signals(-code).name if code < 0 else f"code {code:#x}"
+            fault, how = "crash", f"its process died with {kind} in {where}{tail}"
+        else:
+            fault, how = "exit", f"it ended its process with exit code {code} in {where}{tail}"
+        self._kill()
+        self._ended = ProcessEndedError(fault, how)
+        return self._ended
+
+    def _last_words(self) -> str:
+        """The end of what the process wrote."""
+        with (self._folder / "work" / "output").open("rb") as output:
+            output.seek(max(0, output.seek(0, 2) - 2000))
+            lines = output.read().decode("utf-8", "replace").strip().splitlines()
+        return " ".join(lines[-1:])[:300]
+
+    def _kill(self) -> None:
+        """End the process and what it started."""
+        process = self._process
+        if process is None:
+            return
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError, PermissionError):  # nothing is left of it
+                os.killpg(process.pid, signal.SIGKILL)
+
+    def close(self) -> None:
+        """End the process and remove what was written for it."""
+        self._kill()
+        self._ended = self._ended or ProcessEndedError("exit", "its process was closed")
+        rmtree(self._folder, ignore_errors=True)
+
+
+class HostedComponent(Component):
+    """An instance in an `FmuProcess`, used as any other; numbers that are none come through."""
+
+    def __init__(self, name: str, process: FmuProcess) -> None:
+        self.name, self.description, self._process = name, process.description, process
+        self._open = False
+        self.pointer = self.number = process.number("fmi2Instantiate", -1, "open", name)
+        self._open = True
+        functions: Any = (self._set_real, self._get_real, self._do_step)
+        self.set_real, self.get_real, self.do_step = functions
+
+    def _texts(self, least: int = 0) -> list[str]:
+        return texts(self._process.box.read_log(), least)
+
+    def progress_of_step(self) -> tuple[bool, float | None]:
+        return self._process.progress(self._remote("fmi2GetBooleanStatus", "progress_of_step"))
+
+    def _remote(self, call: str, command: str, *arguments: Any, ask: Any = None) -> Any:
+        try:
+            return (ask or self._process.talk)(call, self.number, command, *arguments)
+        except ComponentError as error:
+            raise ComponentError(self.name, error.call, error.status, error.log) from error
+
+    # -- numbers ---------------------------------------------------------------------------------
+
+    def run(self, into: RealBatch, rows: Vector, out: RealBatch, steps: int, time: float, step_size: float) -> Vector:
+        """Step several times; rows of inputs before each, what was read after each.
+
+        Raises
+        ------
+        ComponentError
+            With the time of the step that was refused.
+        """
+        status, stage, done, values = self._process.run(
+            self.number, _references(into), rows, _references(out), steps, time, step_size
+        )
+        if status > 1:
+            self.check(status, _STAGES.get(stage, "fmi2DoStep"), time + done * step_size)
+        return values
+
+    def _set_real(self, _pointer: int, references: int, count: int, values: int) -> int:
+        row = np.empty((1, count))
+        memmove(row.ctypes.data, values, row.nbytes)
+        return self._process.run(self.number, _at(references, count), row, _NONE)[0]
+
+    def _get_real(self, _pointer: int, references: int, count: int, values: int) -> int:
+        status, _, _, found = self._process.run(self.number, _NONE, _EMPTY, _at(references, count))
+        memmove(values, found.ctypes.data, found.nbytes)
+        return status
+
+    def _do_step(self, _pointer: int, time: float, step_size: float, _no_set_state: int) -> int:
+        return self._process.run(self.number, _NONE, _EMPTY, _NONE, 1, time, step_size)[0]
+
+    # -- all else --------------------------------------------------------------------------------
+
+    def setup(self, start_time: float, stop_time: float | None) -> None:
+        self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
+
+    def enter_initialization_mode(self) -> None:
+        self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
+
+    def exit_initialization_mode(self) -> None:
+        self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
+
+    def reset(self) -> None:
+        self._remote("fmi2Reset", "reset")
+
+    def set(self, values: Mapping[str, float | bool]) -> None:
+        if values:
+            self._remote(f"setting {', '.join(values)}", "set", dict(values))
+
+    def values(self, names: Iterable[str]) -> dict[str, float | bool]:
+        return self._process.table(self._remote("reading", "values", list(names)))
+
+    def save_state(self) -> Any:
+        return self._remote("fmi2GetFMUstate", "save_state", ask=self._process.number)
+
+    def restore_state(self, state: Any) -> None:
+        self._remote("fmi2SetFMUstate", "restore_state", state)
+
+    def free_state(self, state: Any) -> None:
+        if self._process.alive:
+            self._remote("fmi2FreeFMUstate", "free_state", state)
+
+    def serialize_state(self, state: Any) -> bytes:
+        return self._process.hexadecimal(self._remote("fmi2SerializeFMUstate", "serialize_state", state))
+
+    def deserialize_state(self, content: bytes) -> Any:
+        return self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex(),
+                            ask=self._process.number)  # fmt: skip
+
+    def close(self) -> None:
+        """Terminate and free the instance; its process goes on."""
+        if self._open and self._process.alive:
+            self._open = False
+            self._remote("fmi2FreeInstance", "close", self._lost)
+
+
+_NONE = np.empty(0, np.uint32)
+_EMPTY = np.empty((0, 0))
+
+
+def _at(address: int, count: int) -> NDArray[np.uint32]:
+    if not count:
+        return _NONE
+    numbers: Any = (c_uint * count).from_address(address)
+    return np.frombuffer(numbers, np.uint32)
+
+
+def _references(batch: RealBatch) -> NDArray[np.uint32]:
+    return _at(batch.arguments[1], len(batch.names))

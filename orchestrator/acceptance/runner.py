@@ -1,0 +1,283 @@
+"""Acceptance tests of one FMU.
+
+The checks run here; the FMU runs in a process of its own, which it may crash, hang or flood, and from which nothing but
+measurements come. So it reaches no verdict.
+"""
+
+import hashlib
+import traceback
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from shutil import rmtree
+from time import monotonic
+from typing import Any
+
+from orchestrator.acceptance.checks.all import CHECKS, ORDER
+from orchestrator.acceptance.checks.base import (
+    Check,
+    Result,
+    Verdict,
+    failed,
+    not_applicable,
+    not_supported,
+    passed,
+    remarked,
+)
+from orchestrator.acceptance.checks.running import RUN_FOR
+from orchestrator.acceptance.checks.subject import Subject, Use
+from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
+from orchestrator.binding.binding import bind, read_table
+from orchestrator.errors import (
+    BindingError,
+    ComponentError,
+    CosimError,
+    EndedError,
+    FmuFileError,
+    HostileFmuError,
+    InputError,
+    UnsupportedFmuError,
+)
+from orchestrator.fmi.archive import extract, listed_twice
+from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.fmi.instance import compile_adapters
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.port import BoundDescription
+
+_PATIENCE = 10
+"""A check may take this many times the limit for one call."""
+
+
+@dataclass
+class Report:
+    """What all checks found.
+
+    Attributes
+    ----------
+    unlimited
+        What could not be limited in the FMU's process, in words.
+    """
+
+    fmu: Path
+    binding: Path | None
+    results: list[Result] = field(default_factory=list)
+    unlimited: tuple[str, ...] = ()
+
+    @property
+    def failures(self) -> list[Result]:
+        return [r for r in self.results if r.verdict is Verdict.FAIL]
+
+    @property
+    def faults(self) -> list[str]:
+        """Names of what is wrong, each once."""
+        return list(dict.fromkeys(r.fault for r in self.failures))
+
+    @property
+    def not_supported(self) -> list[str]:
+        """Names of what this program or machine lacks for this FMU, each once."""
+        return list(dict.fromkeys(r.fault for r in self.results if r.verdict is Verdict.NOT_SUPPORTED))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it was checked, and nothing failed."""
+        return not self.failures and not self.not_supported
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "tool": f"gfor-cosim {version('gfor-cosim')}",
+            "fmu": str(self.fmu),
+            "binding": None if self.binding is None else str(self.binding),
+            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
+            "trusted": self.trusted,
+            "faults": self.faults,
+            "not_supported": self.not_supported,
+            "not_limited": list(self.unlimited),
+            "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
+        }
+
+
+FILE_CHECKS = {
+    "archive": "Can the file be unpacked and read without harm?",
+    "binding": "Does the binding fit the file?",
+}
+"""What is asked before there is anything to run."""
+
+
+def file_hash(path: Path | None) -> str | None:
+    """SHA-256 of a file; None for none."""
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def question_of(name: str) -> str:
+    return FILE_CHECKS[name] if name in FILE_CHECKS else CHECKS[name].question
+
+
+def check_fmu(
+    fmu: Path,
+    binding: Path | None = None,
+    limits: Limits | None = None,
+    only: tuple[str, ...] = (),
+    run_for: float = RUN_FOR,
+    use: Use | None = None,
+) -> Report:
+    """Run the acceptance tests.
+
+    Parameters
+    ----------
+    run_for
+        Wall-clock time for which it is made to run [s].
+    only
+        Names of checks; all of them where empty.
+    use
+        Step, operating point and values with which it is used; what the file declares where None.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or no such check, or the binding is not TOML, not of its form or not filled in.
+    """
+    unknown = [name for name in only if name not in CHECKS]
+    if unknown:
+        raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {', '.join(CHECKS)}")
+    if not fmu.is_file():
+        raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
+    if binding is not None:
+        read_table(binding)  # what is wrong with its form is not the FMU's fault
+    report = Report(fmu, binding)
+    try:
+        native = read_description(fmu)
+        directory = extract(fmu)
+    except UnsupportedFmuError as error:
+        report.results.append(not_supported("archive", error))
+        return report
+    except FmuFileError as error:
+        fault = error.kind if isinstance(error, HostileFmuError) else "unreadable"
+        report.results.append(failed("archive", fault, str(error)))
+        return report
+    try:
+        report.results.append(_unpacked(fmu))
+        bound = None if binding is None else _bound(report, native, binding)
+        compile_adapters(bound or native)  # here, where nobody waits for the FMU
+        subject = Subject(bound or native, directory, use)
+        subject.memory["run_for"] = run_for
+        runner = _Runner(report, subject, limits or Limits())
+        try:
+            runner.run(list(only or CHECKS))
+        finally:
+            runner.close()
+    finally:
+        rmtree(directory, ignore_errors=True)
+    return report
+
+
+def _unpacked(fmu: Path) -> Result:
+    twice = listed_twice(fmu)
+    if not twice:
+        return passed("archive", "unpacked within limits, and read")
+    more = f" and {len(twice) - 3} more" if len(twice) > 3 else ""
+    return remarked(
+        "archive",
+        f"it lists {', '.join(twice[:3])}{more} twice, with equal bytes",
+        "does no harm; other tools may refuse the file, tell whoever packed it",
+    )
+
+
+def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescription | None:
+    """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
+    try:
+        bound = bind(native, binding)
+    except BindingError as error:
+        unit = any("the FMU declares" in p.text or "needs the key 'value'" in p.text for p in error.problems)
+        report.results.append(failed("binding", "wrong units" if unit else "binding does not fit", str(error)))
+        return None
+    report.results.append(passed("binding", "all variables are there, with the units that it says"))
+    return bound
+
+
+class _Runner:
+    """Asks every question, in this process, of an FMU that is in another."""
+
+    def __init__(self, report: Report, subject: Subject, limits: Limits) -> None:
+        self._report, self._subject, self._limits = report, subject, limits
+        self._process: FmuProcess | None = None
+        self._deadline = 0.0
+        subject.process = self.process
+
+    def process(self) -> FmuProcess:
+        """The FMU's process; a new one where it has ended the last one."""
+        if self._process is None or not self._process.alive:
+            self.close()
+            subject = self._subject
+            self._process = FmuProcess(subject.description, subject.directory, self._limits)
+            self._report.unlimited = self._process.unlimited
+        self._process.deadline = self._deadline
+        return self._process
+
+    def run(self, names: list[str]) -> None:
+        results = self._report.results
+        for place, name in enumerate(names):
+            self._deadline = monotonic() + _PATIENCE * self._limits.seconds
+            result = self._answer(CHECKS[name])
+            results.append(result)
+            if name == "runs" and (because := self._too_bad(result)):
+                results += [not_applicable(later, because) for later in names[place + 1 :]]
+                return
+
+    def _too_bad(self, result: Result) -> str:
+        """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""
+        if self._process is not None and not self._process.alive:
+            return f"because it ended its process in 'runs' ({result.fault})"
+        return "because it ends before it shows anything" if result.fault == "ends at once" else ""
+
+    def _answer(self, check: Check) -> Result:
+        """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
+        faulty = [r.check for r in self._report.results if r.fault]
+        asked_of_the_file = ORDER.index(check.name) <= ORDER.index("loads")
+        missing = [name for name in ("loads", *check.needs) if name in faulty and not asked_of_the_file]
+        if missing == ["loads"] and self._report.not_supported:
+            return not_applicable(check.name, "because the FMU cannot run here")
+        if missing:
+            return not_applicable(check.name, f"because it failed in {missing[0]!r}, without which this has no meaning")
+        self._subject.doing = ""
+        try:
+            return check.run(self._subject)
+        except ProcessEndedError as error:
+            doing = self._subject.doing
+            return failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
+        except EndedError as error:
+            return _ended(check.name, self._subject, error)
+        except UnsupportedFmuError as error:
+            return not_supported(check.name, error)
+        except ComponentError as error:
+            return failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
+        except InputError:
+            raise
+        except CosimError as error:
+            return failed(check.name, "refused call", str(error))
+        except Exception as error:  # a check that fails by itself must not hide the others, nor count as passed
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            says = f"the check failed by itself: {error!r} in {Path(where.filename).name}, line {where.lineno}"
+            return failed(check.name, "no verdict", says)
+
+    def close(self) -> None:
+        if self._process is not None:
+            self._process.close()
+
+
+def _ended(name: str, subject: Subject, error: EndedError) -> Result:
+    """An orderly end is no fault; one that comes earlier than before is worth a word."""
+    if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
+        says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"
+        return remarked(
+            name, f"{says}, earlier than otherwise", "no error, but this could not be checked; ask why it ends"
+        )
+    return not_applicable(name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s")
+
+
+_REFUSED = {
+    "fmi2Instantiate": "no instance",
+    "fmi2EnterInitializationMode": "does not start",
+    "fmi2ExitInitializationMode": "does not start",
+    "fmi2DoStep": "error in a step",
+}
+"""Name of the fault where an FMU refuses what every FMU must be able to do."""

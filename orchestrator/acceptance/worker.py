@@ -1,0 +1,84 @@
+"""The process in which a foreign FMU is checked: it does what it is asked; started by `process`.
+
+No check runs here and no verdict is made here: code of the FMU can change whatever is in its process.
+"""
+
+import ctypes
+import gc
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from orchestrator.acceptance.allocations import memory_in_use, open_files
+from orchestrator.fmi.binary import absent_functions, load, unload
+from orchestrator.fmi.component import Component
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.isolation_worker import Worker
+from orchestrator.fmi.mailbox import DIED, Served
+from orchestrator.fmi.port import BoundDescription, PortMap
+
+_MOST = 256
+"""Instances at the same time."""
+
+
+class Host(Worker):
+    """Answers for several instances, each under a number."""
+
+    def __init__(self, request: dict[str, Any]) -> None:
+        super().__init__(request)
+        self._table = (Served * _MOST)()
+        self._instances: dict[int, Component] = {}
+        self._asked = 0
+
+    def _described(self) -> FmuDescription:
+        native, port = super()._described(), self._request["port"]
+        return native if port is None else BoundDescription.of(native, PortMap.of_dict(port))
+
+    def serve(self) -> None:
+        """Answer the mailbox: runs in C, everything else here."""
+        box = self._box
+        while box.library.mailbox_host(box.address, self._parent, self._table, _MOST):
+            self._asked, command, *arguments = box.read_text()
+            self._answer(getattr(self, f"do_{command}"), arguments)
+        os._exit(DIED)
+
+    def _instance(self) -> Component:
+        return self._instances[self._asked]
+
+    def do_open(self, name: str) -> int:
+        component = open_component(name, self._description, self._request["directory"], isolated=False)
+        number = next(n for n in range(_MOST) if n not in self._instances)
+        self._instances[number] = component
+        functions = (component.set_real, component.get_real, component.do_step)
+        self._table[number] = Served(component.pointer, *(ctypes.cast(f, ctypes.c_void_p).value for f in functions))
+        return number
+
+    def do_absent_functions(self) -> list[list[str]]:
+        """Functions that the binary lacks: those that it needs by what it declares, and the others."""
+        described = self._description.native if isinstance(self._description, BoundDescription) else self._description
+        library = load(described, Path(self._request["directory"]))
+        try:
+            return list(absent_functions(described, library))
+        finally:
+            unload(library)
+
+    def do_close(self, lost: bool) -> None:
+        component = self._instances.pop(self._asked)
+        self._table[self._asked] = Served()
+        inner = getattr(component, "inner", component)
+        inner._lost = inner._lost or lost  # told here, as it was found out there
+        component.close()
+
+    def do_memory_in_use(self) -> int:
+        gc.collect()
+        return memory_in_use() or 0
+
+    def do_open_files(self) -> int:
+        return open_files()
+
+
+if __name__ == "__main__":
+    Host(json.loads(sys.argv[1])).serve()

@@ -1,0 +1,1 @@
+"""Bindings: what the variables of a foreign FMU mean at our port."""

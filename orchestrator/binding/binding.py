@@ -1,0 +1,330 @@
+"""Bindings: what a foreign FMU's variables mean at our port, read from ``vendor.toml`` and checked with their units."""
+
+import math
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import cos, radians, sin
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from orchestrator.binding.scales import PER_UNIT, Bases, amount, unit_of
+from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
+from orchestrator.errors import BindingError, InputError, Problem
+from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
+from orchestrator.fmi.port import (
+    START,
+    SYSTEM_BASE_MVA,
+    BoundDescription,
+    Form,
+    Matrix2,
+    PhasorMap,
+    PortMap,
+    SignalMap,
+    StartMap,
+)
+from orchestrator.units import to_unit
+
+_FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RECTANGULAR, "polar": Form.POLAR,
+          "abc": Form.ABC, "power": Form.POWER}  # fmt: skip
+_FREQUENCY = ("omega", "frequency")
+
+
+def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescription:
+    """Describe an FMU, through a binding where one is given.
+
+    The description can be added to a `System` or given to `open_component`; behind a binding it has the variables of
+    our port.
+
+    Raises
+    ------
+    FmuFileError
+        If the FMU cannot be loaded.
+    BindingError
+        With every problem of the binding.
+    """
+    description = read_description(fmu)
+    return description if binding is None else bind(description, binding)
+
+
+def bind(native: FmuDescription, binding: Path | str) -> BoundDescription:
+    """Describe an FMU through a binding file.
+
+    Raises
+    ------
+    BindingError
+        With every problem of the file.
+    """
+    path = Path(binding)
+    return BoundDescription.of(native, _Reader(native, read_table(path), str(path)).port_map())
+
+
+def read_table(path: Path) -> BindingTable:
+    """Read a binding file and check its form.
+
+    Raises
+    ------
+    InputError
+        If there is no such file or it is not TOML.
+    BindingError
+        With every entry that is wrong.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"{path}: the binding cannot be read: {error.strerror}; `gfor bind FILE.fmu` drafts one"
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    try:
+        return BindingTable.model_validate(raw)
+    except ValidationError as error:
+        raise BindingError(str(path), [_problem(detail) for detail in error.errors()]) from error
+
+
+def _problem(detail: Any) -> Problem:
+    place = ".".join(str(part) for part in detail["loc"] if part not in ("StartTable", "list[StartTable]"))
+    match detail["type"]:
+        case "extra_forbidden":
+            return Problem(place, "this key is unknown; check its spelling, or remove it")
+        case "missing":
+            return Problem(place, "this key is missing; add it")
+        case _:
+            return Problem(place, str(detail["msg"]).removeprefix("Value error, "))
+
+
+class _Reader:
+    """Works one table out for one FMU, and collects what is wrong."""
+
+    def __init__(self, native: FmuDescription, table: BindingTable, source: str) -> None:
+        self._native, self._table, self._source = native, table, source
+        self._problems: list[Problem] = []
+
+    def port_map(self) -> PortMap:
+        table = self._table
+        with self._at("fmu.guid"):
+            if table.fmu.guid is not None and table.fmu.guid != self._native.guid:
+                raise ValueError(
+                    f"the binding is for the FMU {table.fmu.guid}, this one is {self._native.guid}; draft it anew"
+                )
+        bases = self._bases()
+        port = None
+        if bases is not None:
+            own_rating = "S_n" in table.start
+            voltage, current = self._voltage(bases), self._current(bases, own_rating)
+            start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
+            if voltage is not None and current is not None:
+                port = PortMap(
+                    bases.rating, bases.frequency, voltage, current, start, signals, settings, self._current_limit()
+                )
+                self._check_once(port)
+        if self._problems or port is None:
+            raise BindingError(self._source, self._problems)
+        return port
+
+    # -- helpers ---------------------------------------------------------------------------------
+
+    @contextmanager
+    def _at(self, place: str) -> Iterator[None]:
+        """What is wrong inside is noted at that place."""
+        try:
+            yield
+        except ValueError as error:
+            self._problems.append(Problem(place, str(error)))
+
+    def _variable(self, name: str, *causalities: str) -> VariableInfo:
+        info = self._native.variables.get(name)
+        if info is None:
+            raise ValueError(f"the FMU has no variable {name!r}; `gfor info {self._native.path.name}` lists them")
+        if causalities and info.causality not in causalities:
+            raise ValueError(f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here")
+        if info.type != "Real":
+            raise ValueError(f"{name} is of type {info.type}; Real is needed here")
+        return info
+
+    def _bases(self) -> Bases | None:
+        rating = self._table.rating
+        bases = None
+        with self._at("rating"):
+            V_n = None if rating.V_n is None else amount(rating.V_n, "kV", "V_n")
+            bases = Bases(amount(rating.S_n, "MVA", "S_n"), V_n, amount(rating.f_n, "Hz", "f_n"))
+        return bases
+
+    def _current_limit(self) -> float | None:
+        declared = self._table.rating.I_max
+        with self._at("rating"):
+            limit = None if declared is None else to_unit(str(declared).removesuffix("pu").strip(), "1")
+            if limit is not None and not 0 < limit < 100:
+                raise ValueError(f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current")
+            return limit
+        return None
+
+    # -- voltage and current ---------------------------------------------------------------------
+
+    def _phasor(
+        self, place: str, table: PhasorTable, causality: str, scale: Callable[[str, VariableInfo], float]
+    ) -> tuple[Form, Matrix2, float]:
+        """Form, matrix from our frame [pu, rating] to the FMU's axes, and angle factor."""
+        form = _FORMS[table.form]
+        needed = 3 if form is Form.ABC else 2
+        if len(table.variables) != needed or len(set(table.variables)) != needed:
+            raise ValueError(
+                f"form {table.form!r} needs {needed} different variables; there are {', '.join(table.variables)}"
+            )
+        infos = [self._variable(name, causality) for name in table.variables]
+        scaled = infos[:1] if form is Form.POLAR else infos
+        scales = [scale(unit_of(info, table.unit), info) for info in scaled]
+        if max(scales) - min(scales) > 1e-12 * max(scales):
+            raise ValueError(f"{' and '.join(table.variables)} are not in one unit")
+        signs = list(table.signs or [1] * needed)
+        if len(signs) != needed:
+            raise ValueError(f"'signs' needs {needed} values, one for each variable")
+        if form in (Form.POLAR, Form.ABC) and any(s != 1 for s in signs):
+            raise ValueError("'signs' are for rectangular axes and powers; turn a frame with 'frame_angle'")
+        if table.form == "qd":
+            signs[1] = -signs[1]  # f = f_q − j·f_d
+        angle = radians(to_unit(table.frame_angle, "deg"))
+        if form is Form.POWER and angle:
+            raise ValueError("powers have no frame; remove 'frame_angle'")
+        k, (s0, s1) = scales[0], signs[:2]
+        matrix = (s0 * k * cos(angle), s0 * -k * sin(angle), s1 * k * sin(angle), s1 * k * cos(angle))
+        return form, matrix, self._angle_factor(form, table, infos)
+
+    @staticmethod
+    def _angle_factor(form: Form, table: PhasorTable, infos: list[VariableInfo]) -> float:
+        if form is not Form.POLAR:
+            if table.angle_unit is not None:
+                raise ValueError(f"'angle_unit' has no meaning for form {table.form!r}; remove it")
+            return 1.0
+        unit = unit_of(infos[1], table.angle_unit)
+        return to_unit("1 rad", unit) if unit != PER_UNIT else 1.0
+
+    def _voltage(self, bases: Bases) -> PhasorMap | None:
+        table, found = self._table.voltage, None
+        with self._at("voltage"):
+            if table.form == "power":
+                raise ValueError("form 'power' is for [current]; a voltage is rectangular, dq, qd, polar or abc")
+            if table.direction != "into the grid":
+                raise ValueError("'direction' is for [current]; remove it")
+
+            def scale(unit: str, info: VariableInfo) -> float:
+                return bases.voltage_unit(unit, table.base, _phase(table), info.name)
+
+            form, matrix, angle_factor = self._phasor("voltage", table, "input", scale)
+            found = PhasorMap(form, tuple(table.variables), matrix, angle_factor, per_rating=False)
+        return found
+
+    def _current(self, bases: Bases, own_rating: bool) -> PhasorMap | None:
+        table, found = self._table.current, None
+        with self._at("current"):
+
+            def scale(unit: str, info: VariableInfo) -> float:
+                if table.form == "power":
+                    return bases.power_unit(unit, table.base, info.name)
+                return bases.current_unit(
+                    unit, table.base, _phase(table) if table.form == "abc" else table.value, info.name
+                )
+
+            form, to_fmu, angle_factor = self._phasor("current", table, "output", scale)
+            direction = 1.0 if table.direction == "into the grid" else -1.0
+            # On the 100 MVA base of the network, for one unit of the rating as delivered.
+            matrix = _inverse(to_fmu, direction * bases.rating / SYSTEM_BASE_MVA)
+            if form is Form.POWER:
+                # Signs act on P and Q, before the current is taken from them.
+                matrix = self._power_matrix(to_fmu, direction * bases.rating / SYSTEM_BASE_MVA)
+            on_rating = unit_of(self._variable(table.variables[0]), table.unit) == PER_UNIT and table.base in (
+                None,
+                "S_n",
+            )
+            found = PhasorMap(
+                form, tuple(table.variables), matrix, angle_factor, per_rating=not own_rating or on_rating
+            )
+        return found
+
+    @staticmethod
+    def _power_matrix(to_fmu: Matrix2, factor: float) -> Matrix2:
+        """For i = conj(s/v), which is linear in P and Q only as long as both have one sign."""
+        if to_fmu[0] * to_fmu[3] < 0:
+            raise ValueError("P and Q need one sign; turn both with 'direction'")
+        return (factor / to_fmu[0], 0.0, 0.0, factor / to_fmu[3])
+
+    # -- start values, signals, settings ---------------------------------------------------------
+
+    def _start(self, bases: Bases, own_rating: bool) -> dict[str, tuple[StartMap, ...]]:
+        found = {}
+        for name, tables in self._table.start.items():
+            maps = []
+            for table in tables if isinstance(tables, list) else [tables]:
+                with self._at(f"start.{name}"):
+                    if name not in START:
+                        raise ValueError(f"there is no start value of that name; choose from {', '.join(START)}")
+                    maps.append(self._start_map(name, table, bases, own_rating))
+            found[name] = tuple(maps)
+        return found
+
+    def _start_map(self, name: str, table: StartTable, bases: Bases, own_rating: bool) -> StartMap:
+        info = self._variable(table.variable, "parameter", "input")
+        if name == "theta_0":
+            unit = unit_of(info, table.unit)
+            offset = radians(to_unit(self._table.voltage.frame_angle, "deg"))
+            factor = 1.0 if unit == PER_UNIT else to_unit("1 rad", unit)
+            return StartMap(info.name, table.sign * factor, table.sign * factor * offset)
+        if name == "S_n":
+            unit = unit_of(info, table.unit)
+            return StartMap(info.name, bases.power_unit(unit, table.base or "1 MVA", info.name) / bases.rating)
+        if name == "v_0":
+            return StartMap(
+                info.name, bases.voltage_unit(unit_of(info, table.unit), table.base, table.value, info.name)
+            )
+        unit = unit_of(info, table.unit)
+        absolute = unit != PER_UNIT or table.base not in (None, "S_n")
+        return StartMap(
+            info.name, table.sign * bases.power_unit(unit, table.base, info.name), 0.0, absolute and own_rating
+        )
+
+    def _signals(self, bases: Bases) -> dict[str, SignalMap]:
+        found = {}
+        for name, table in self._table.signals.items():
+            with self._at(f"signals.{name}"):
+                found[name] = self._signal(name, table, bases)
+        return found
+
+    def _signal(self, name: str, table: SignalTable, bases: Bases) -> SignalMap:
+        info = self._variable(table.variable)
+        if name in _FREQUENCY:
+            return SignalMap(info.name, 1 / bases.frequency_unit(unit_of(info, table.unit), info.name), 0.0, PER_UNIT)
+        return SignalMap(info.name, 1.0, 0.0, unit_of(info, table.unit))
+
+    def _settings(self) -> dict[str, float | bool]:
+        found: dict[str, float | bool] = {}
+        for group, causality in (("parameters", "parameter"), ("inputs", "input")):
+            for name, value in getattr(self._table, group).items():
+                with self._at(f"{group}.{name}"):
+                    info = self._native.variables.get(name)
+                    if info is None or info.causality != causality or info.type == "String":
+                        raise ValueError(f"the FMU has no {causality} of that name that takes a number")
+                    found[name] = value if isinstance(value, bool) else to_unit(value, info.unit)
+        return found
+
+    def _check_once(self, port: PortMap) -> None:
+        """A variable has one meaning, and what starts the FMU leaves a number that is finite."""
+        used = [*port.voltage.variables, *port.current.variables, *port.settings]
+        used += [m.variable for maps in port.start.values() for m in maps]
+        twice = sorted({name for name in used if used.count(name) > 1})
+        if twice:
+            self._problems.append(Problem("", f"{', '.join(twice)}: bound more than once; a variable has one meaning"))
+        if not all(math.isfinite(x) for x in (*port.voltage.matrix, *port.current.matrix)):
+            self._problems.append(Problem("rating", "rating and bases give no finite factors; check their units"))
+
+
+def _phase(table: PhasorTable) -> str | None:
+    """What the amplitude of three phases is: their variables are the phases' instantaneous values."""
+    return "phase peak" if table.form == "abc" else table.value
+
+
+def _inverse(m: Matrix2, factor: float) -> Matrix2:
+    determinant = (m[0] * m[3] - m[1] * m[2]) / factor
+    return m[3] / determinant, -m[1] / determinant, -m[2] / determinant, m[0] / determinant

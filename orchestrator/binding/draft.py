@@ -1,0 +1,240 @@
+"""The first draft of a binding, from what an FMU declares: guesses are marked, and so is what it cannot know."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.binding.tables import REQUIRED
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.port import START
+
+_VOLTAGE = re.compile(r"^(v|u|volt|voltage|vbus|vt|vpcc|vg|ug|upcc)(?![a-z])|volt|spannung", re.IGNORECASE)
+_CURRENT = re.compile(r"^(i|cur|current|iinj|ig|it|ipcc|inj)(?![a-z])|current|strom", re.IGNORECASE)
+_POWER = re.compile(r"^(p|q)(?![a-z])|power|leistung", re.IGNORECASE)
+_VOLTS, _AMPERES = ("V", "kV", "mV", "MV"), ("A", "kA", "mA")
+_WATTS = ("W", "kW", "MW", "GW", "var", "kvar", "Mvar", "VA", "kVA", "MVA", "VAr", "MVAr")
+
+_PARTS = {
+    "rectangular": (r"re|real|r|x", r"im|imag|imaginary|i|y"),
+    "dq": (r"d", r"q"),
+    "polar": (r"mag|magnitude|abs|amp|amplitude|m|rms|mod|modulus", r"ang|angle|arg|phase|phi|theta|deg|a"),
+    "abc": (r"a|1|u|l1|r", r"b|2|v|l2|s", r"c|3|w|l3|t"),
+    "power": (r"p|active", r"q|reactive"),
+}
+"""How the members of a pair or of three phases are told apart at the end of their names."""
+
+_START_NAMES = {
+    "S_n": r"^s_?(n|nom|r|rated|base|b)\b|rat(ed|ing)|^mva(base)?\b|mbase",
+    "P_0": r"^p_?(0|init|ini|ref0|start|set|ref|gen)\b|(init|start)\w*_?(active|p)\b|active.*(init|start)",
+    "Q_0": r"^q_?(0|init|ini|ref0|start|set|ref|gen)\b|(init|start)\w*_?(reactive|q)\b|reactive.*(init|start)",
+    "v_0": r"^[vu]_?(0|init|ini|start|t0|pcc0)\b|volt\w*_?(0|init|ini|start)\b",
+    "theta_0": r"^(theta|phi|delta|ang|angle|phase|arg)_?(0|init|ini|start|v0)\b|ang\w*_?(0|init|start)\b",
+}
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A port's form and variables, and how sure that is."""
+
+    form: str
+    variables: tuple[VariableInfo, ...]
+
+
+def draft_binding(native: FmuDescription, beside: Path | None = None) -> str:
+    """Write the text of a binding file.
+
+    Parameters
+    ----------
+    beside
+        Folder of the binding file, from which the FMU's path is written; its name alone where None.
+
+    Returns
+    -------
+    str
+        TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
+        `bind` accepts none of them.
+    """
+    voltage = _find(native, "input", _VOLTAGE, _VOLTS, ("rectangular", "dq", "polar", "abc"))
+    current = _find(native, "output", _CURRENT, _AMPERES, ("rectangular", "dq", "polar", "abc"))
+    current = current or _find(native, "output", _POWER, _WATTS, ("power",))
+    starts = {name: _start(native, name, taken=()) for name in START}
+    taken = {v.name for guess in (voltage, current) if guess for v in guess.variables}
+    file = native.path.name if beside is None else _relative(native.path, beside)
+    lines = [
+        f"# Binding of {native.model_name}, drafted from its model description by `gfor bind`.",
+        "# GUESS marks what the names suggest: confirm it. REQUIRED marks what the FMU does not say: fill it in.",
+        "# Then: gfor check FILE.fmu --binding THIS_FILE finds wrong signs and bases by their power balance.",
+        "",
+        "[fmu]",
+        f"file = {_quoted(file)}",
+        f"guid = {_quoted(native.guid)}",
+        "",
+        *_rating(starts["S_n"], native),
+        "",
+        *_phasor("voltage", voltage, native.inputs),
+        "",
+        *_phasor("current", current, native.outputs),
+        "",
+        *_starts({name: info for name, info in starts.items() if info is None or info.name not in taken}),
+        *_signals(native, taken),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+
+
+def _comment(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
+def _relative(path: Path, beside: Path) -> str:
+    try:
+        return path.resolve().relative_to(beside.resolve()).as_posix()
+    except ValueError:
+        return path.resolve().as_posix()
+
+
+# -- guesses -------------------------------------------------------------------------------------
+
+
+def _find(
+    native: FmuDescription, causality: str, names: re.Pattern[str], units: Sequence[str], forms: Sequence[str]
+) -> Guess | None:
+    """Two variables, or three, that are named alike but for their last part."""
+    candidates = [
+        v
+        for v in native.variables.values()
+        if v.causality == causality and v.type == "Real" and (names.search(_last(v.name)) or names.search(v.description)
+                                                             or v.unit in units)
+    ]  # fmt: skip
+    best: tuple[int, Guess] | None = None
+    for form in forms:
+        for found in _matches(candidates, _PARTS[form], loose=form == "power"):
+            score = sum(2 * bool(names.search(_last(v.name))) + (v.unit in units) for v in found) + len(found)
+            if best is None or score > best[0]:
+                best = score, Guess(form, found)
+    return None if best is None else best[1]
+
+
+def _matches(
+    candidates: Sequence[VariableInfo], parts: Sequence[str], *, loose: bool
+) -> Iterable[tuple[VariableInfo, ...]]:
+    for first in candidates:
+        stem = _stem(first.name, parts[0])
+        if stem is None:
+            continue
+        others = [
+            next((v for v in candidates if v is not first and _stem(v.name, part) == stem), None) for part in parts[1:]
+        ]
+        if all(others) and (stem or loose):
+            yield (first, *[v for v in others if v is not None])
+
+
+def _stem(name: str, part: str) -> str | None:
+    """The name without its last part; None where it does not end so."""
+    match = re.fullmatch(rf"(?P<stem>.*?)[._\[(]?(?:{part})[\])]?", name, re.IGNORECASE)
+    return match["stem"].lower() if match else None
+
+
+def _last(name: str) -> str:
+    return name.rpartition(".")[2]
+
+
+def _start(native: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo | None:
+    pattern = re.compile(_START_NAMES[name], re.IGNORECASE)
+    known = [v for v in native.variables.values() if v.type == "Real" and v.name not in taken]
+    for causality in ("parameter", "input"):
+        exact = [v for v in known if v.causality == causality and v.name == name]
+        close = [v for v in known if v.causality == causality and pattern.search(_last(v.name))]
+        if exact or close:
+            return (exact or close)[0]
+    return None
+
+
+# -- text ----------------------------------------------------------------------------------------
+
+
+def _rating(S_n: VariableInfo | None, native: FmuDescription) -> list[str]:
+    lines = ["[rating]"]
+    if S_n is not None and S_n.start is not None:
+        unit = S_n.unit if S_n.unit in ("MVA", "kVA", "VA", "GVA") else "MVA"
+        lines.append(f'S_n = "{float(S_n.start):g} {unit}"  # GUESS: start value of {S_n.name}')
+    else:
+        lines.append(f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"')
+    lines.append('# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A')
+    f_n = next((v for v in native.variables.values() if v.name == "f_n" and v.start), None)
+    lines.append(f'f_n = "{float(f_n.start or 50) if f_n else 50:g} Hz"  # GUESS')
+    return lines
+
+
+def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
+    lines = [f"[{table}]"]
+    listed = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
+    if guess is None:
+        forms = "rectangular, dq, qd, polar or abc" + (", or power" if table == "current" else "")
+        lines += [
+            f'form = "{REQUIRED}: {forms}"',
+            f'variables = ["{REQUIRED}: one or more of: {_comment(listed)}"]',
+        ]
+    else:
+        lines.append(f'form = "{guess.form}"  # GUESS; qd is f = f_q − j·f_d, dq is f = f_d + j·f_q')
+        lines.append(f"variables = [{', '.join(_quoted(v.name) for v in guess.variables)}]  # GUESS")
+        lines += [f"# {v.name} [{v.unit or 'no unit'}]: {_comment(v.description)}" for v in guess.variables]
+    lines += _units(table, guess)
+    if table == "current":
+        lines.append('direction = "into the grid"  # GUESS; or "into the converter"')
+    lines.append("# frame_angle = \"-90 deg\"  # by which the FMU's frame leads the network's")
+    return lines
+
+
+def _units(table: str, guess: Guess | None) -> list[str]:
+    units = {v.unit for v in guess.variables} if guess else {""}
+    first = guess.variables[0].unit if guess else ""
+    lines = []
+    if first in ("", "1", "-"):
+        lines.append(f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"')
+    elif first in _VOLTS and guess and guess.form != "abc":
+        lines.append(f'value = "{REQUIRED}: line-to-line rms, phase rms or phase peak"')
+    elif first in _AMPERES and guess and guess.form != "abc":
+        lines.append(f'value = "{REQUIRED}: rms or peak"')
+    if table == "current" and (first in ("pu", "p.u.", "", "1", "-") or not units):
+        text = _comment(" ".join(v.description for v in guess.variables)) if guess else ""
+        base = re.search(r"(\d+(?:\.\d+)?)\s*([kMG]?VA)\b", text)
+        known = (
+            f'"{base[1]} {base[2]}"  # GUESS: from the description' if base else '"S_n"  # GUESS; or such as "100 MVA"'
+        )
+        lines.append(f"base = {known}")
+    if guess and guess.form == "polar" and guess.variables[1].unit not in ("rad", "deg"):
+        lines.append(f'angle_unit = "{REQUIRED}: rad or deg"')
+    return lines
+
+
+def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
+    lines = ["# Where the power flow's start values go; without them the FMU starts where it wants to."]
+    for name, info in starts.items():
+        if info is None:
+            lines.append(f'# [start.{name}]\n# variable = "…"  # nothing was found that looks like it')
+            continue
+        lines += [f"[start.{name}]", f"variable = {_quoted(info.name)}  # GUESS: {_comment(info.description)}"]
+        if info.unit in ("", "1", "-"):
+            lines.append(f'unit = "{REQUIRED}: the FMU declares none"')
+        if info.unit in _VOLTS:
+            lines.append(f'value = "{REQUIRED}: line-to-line rms, phase rms or phase peak"')
+    return lines
+
+
+def _signals(native: FmuDescription, taken: Iterable[str]) -> list[str]:
+    found = next(
+        (n for n in native.outputs if re.fullmatch(r"(omega|w|speed|freq\w*|f)", _last(n), re.IGNORECASE)), None
+    )
+    if found is None or found in taken:
+        return []
+    return [
+        "",
+        "[signals.omega]",
+        f"variable = {_quoted(found)}  # GUESS: {_comment(native.variables[found].description)}",
+    ]

@@ -1,1 +1,0 @@
-"""Many independent computations: one after another, on the cores of a machine, or on a cluster."""

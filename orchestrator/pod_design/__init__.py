@@ -1,0 +1,1 @@
+"""Design of a power-oscillation damper: lead/lag, gain, refinement, margins."""

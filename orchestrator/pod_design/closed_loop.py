@@ -1,0 +1,157 @@
+"""A running system whose POD controllers can be set, and linearised with any setting.
+
+Gain and lead/lag are tunable and the controllers' signals are zero in steady state, so the operating point is the same
+for every setting: only the converters need be linearised again, and the rest of the system is kept.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from orchestrator.analysis.component_linearization import linearize_component
+from orchestrator.analysis.continuation import Eigenpair, follow
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.analysis.stability import Stability, judge
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.told_step import as_if_told
+from orchestrator.errors import AnalysisError, InputError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.pod_design.lead_lag import LeadLag, damping_ratio
+
+_TUNED = ("enabled", "K", "T_S1", "T_S2")
+
+
+@dataclass(frozen=True)
+class PodSetting:
+    """Gain [pu of the converter's rating] and lead/lag of a controller; with gain 0 it is off."""
+
+    gain: float
+    filters: LeadLag
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A setting and the target mode that it gives."""
+
+    setting: PodSetting
+    pair: Eigenpair
+
+    @property
+    def eigenvalue(self) -> complex:
+        """[rad/s]"""
+        return self.pair.eigenvalue
+
+    @property
+    def damping_ratio(self) -> float:
+        return damping_ratio(self.eigenvalue)
+
+
+class PodLoop:
+    """Sets one controller of some components alike, and linearises.
+
+    Parameters
+    ----------
+    master
+        A running system at its operating point.
+    components
+        Names of the components that have the controller.
+    controller
+        ``pod_p`` or ``pod_q``.
+
+    Raises
+    ------
+    InputError
+        If a controller's parameters cannot be changed while its FMU runs.
+    """
+
+    def __init__(self, master: Master, components: Sequence[str], controller: str) -> None:
+        self._master, self._components, self._controller = master, tuple(components), controller
+        for name in components:
+            _check_tunable(name, master.components[name].description, controller)
+        self._apply(PodSetting(0.0, LeadLag(0.0, 0.0, 0)))
+        self._blocks = Blocks(master)
+        self._off = compose(self._blocks, master.schedule)
+
+    def model(self, setting: PodSetting) -> LinearModel:
+        """The linear model of the whole system with this setting."""
+        if setting.gain == 0:
+            return self._off
+        self._linearize_converters(self._blocks, setting)
+        return compose(self._blocks, self._master.schedule)
+
+    def stability(self, setting: PodSetting) -> Stability:
+        """The verdict on the whole system with this setting, at any frequency."""
+        model = self.model(setting)
+        try:
+            return judge(model, system=self._continuous_model(setting))
+        except AnalysisError:
+            return judge(model)
+
+    def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
+        """The same without any communication step, with half the gain and with the gain; it is linear in the gain.
+
+        Raises
+        ------
+        AnalysisError
+            If a component does not give its derivatives.
+        """
+        half, full = (self._continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
+        return half, full
+
+    def _continuous_model(self, setting: PodSetting) -> LinearModel:
+        with as_if_told(self._master, 0.0):
+            self._linearize_converters(self._continuous_blocks, setting, derivatives=True)
+        return continuous(self._continuous_blocks)
+
+    @cached_property
+    def _continuous_blocks(self) -> Blocks:
+        """Made within `as_if_told`."""
+        return Blocks(self._master, derivatives=True)
+
+    def _linearize_converters(self, blocks: Blocks, setting: PodSetting, *, derivatives: bool = False) -> None:
+        self._apply(setting)
+        for name in self._components:
+            exchange = self._master.exchanges[name]
+            blocks.components[name] = linearize_component(
+                exchange, self._master.time, blocks.step_size, derivatives=derivatives
+            )
+
+    def place(self, start: Placed, gain: float, filters: LeadLag | None = None) -> Placed:
+        """Follow the target mode to another gain.
+
+        Parameters
+        ----------
+        start
+            Where the mode is known. It must have the same lead/lag, or a gain of 0.
+        filters
+            By default those of the start.
+
+        Raises
+        ------
+        AnalysisError
+            If the mode cannot be followed.
+        """
+        setting = PodSetting(gain, filters or start.setting.filters)
+        if start.setting.gain and start.setting.filters != setting.filters:
+            raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
+        if gain == start.setting.gain:
+            return Placed(setting, start.pair)
+        pair = follow(
+            start.pair, lambda value: self.model(replace(setting, gain=value)), start.setting.gain, setting.gain
+        )
+        return Placed(setting, pair)
+
+    def _apply(self, setting: PodSetting) -> None:
+        values = {"enabled": setting.gain != 0, "K": setting.gain, "T_S1": setting.filters.T_S1,
+                  "T_S2": setting.filters.T_S2}  # fmt: skip
+        for name in self._components:
+            self._master.components[name].set({f"{self._controller}.{key}": value for key, value in values.items()})
+
+
+def _check_tunable(name: str, description: FmuDescription, controller: str) -> None:
+    fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
+    if fixed:
+        raise InputError(
+            f"component {name!r}: {', '.join(fixed)} cannot be changed while the FMU runs; a design needs them tunable"
+        )

@@ -1,0 +1,313 @@
+"""Design of POD-P or POD-Q by eigenvalue sensitivity, from linearisations of the coupled system (the paper's method).
+
+The sensitivities are finite differences between two real linearisations, and the result is checked on the closed loop.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from orchestrator.analysis.continuation import pair_at
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.stability import Stability
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.case import Case
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
+from orchestrator.pod_design.guard import GUARDED, Naming, Surroundings, breach, surroundings
+from orchestrator.pod_design.lead_lag import (
+    NO_COMPENSATION,
+    LeadLag,
+    angle_deg,
+    bounded,
+    damping_ratio,
+    lead_lag,
+    predicted_mode,
+    required_gain,
+    sensitivity,
+)
+from orchestrator.pod_design.margins import Margins, compute_margins
+from orchestrator.pod_design.refinement import Refinement, Verdict, refine
+from orchestrator.pod_design.target import Target, check_range, find_target, mode_name
+from orchestrator.study.modes import named_modes, running
+
+Report = Callable[[str], None]
+
+_OFF = PodSetting(0.0, NO_COMPENSATION)
+
+_MET = 5e-4  # a damping ratio that falls short by less counts as met: 0.05 points
+
+
+@dataclass(frozen=True)
+class DesignRequest:
+    """What is asked for.
+
+    Attributes
+    ----------
+    damping, damping_increment
+        Required damping ratio of the target, or its required increase; the former goes first.
+    delta_gain
+        ΔK of the finite-difference sensitivity [pu of the converter's rating].
+    gain_bounds
+        [K_min, K_max] in the same unit.
+    compensated_gain
+        Compute the gain from the sensitivity with the lead/lag in place, instead of the one without it.
+    least_damping
+        Damping ratio below which no other mode may be pushed.
+    """
+
+    controller: str
+    component: str | None = None
+    scenario: str | None = None
+    mode: str | None = None
+    damping: float | None = None
+    damping_increment: float = 0.10
+    delta_gain: float = 50.0
+    gain_bounds: tuple[float, float] = (200.0, 400.0)
+    stages: int | None = None
+    compensated_gain: bool = False
+    least_damping: float = 0.05
+    refine: bool = False
+    margins: bool = True
+    overrides: Mapping[str, Value] = field(default_factory=dict)
+    parameters: Sequence[ParameterFile] = ()
+    step_size: float | None = None
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Mode [rad/s] and eigenvalue sensitivity [rad/s per pu] at the gain ΔK, without and with the lead/lag."""
+
+    mode: complex
+    value: complex
+    compensated_mode: complex
+    compensated: complex
+
+
+@dataclass(frozen=True)
+class PodDesign:
+    """A design with every figure on the way.
+
+    Attributes
+    ----------
+    initial, required_damping, predicted
+        λ_0 [rad/s], ζ_d, λ_d [rad/s].
+    filters, gain, designed
+        By the paper's equations, and the closed loop with them.
+    final
+        The closed loop with the final setting: the refined one, else the same.
+    before, after
+        The other modes without the controller, and with the final setting.
+    broken
+        What the final setting does to other modes that it must not.
+    stability_before, stability
+        The verdict over the whole spectrum without the controller, and with the final setting.
+    """
+
+    request: DesignRequest
+    case: str
+    target: Target
+    prepared: PreparedScenario
+    mode_name: str
+    initial: complex
+    required_damping: float
+    predicted: complex
+    sensitivities: Sensitivities
+    filters: LeadLag
+    gain_non_compensated: float
+    gain_compensated: float
+    gain: float
+    designed: Placed
+    refinement: Refinement | None
+    final: Placed
+    before: Surroundings
+    after: Surroundings
+    broken: str | None
+    margins: Margins | None
+    stability_before: Stability
+    stability: Stability
+
+    @property
+    def unbounded_gain(self) -> float:
+        """The gain before the bounds [pu]."""
+        return self.gain_compensated if self.request.compensated_gain else self.gain_non_compensated
+
+    @property
+    def met(self) -> bool:
+        """Whether the closed loop has the required damping, and leaves the other modes alone."""
+        return self.damping_met and self.broken is None
+
+    @property
+    def damping_met(self) -> bool:
+        return self.achieved_damping >= self.required_damping - _MET
+
+    @property
+    def achieved(self) -> complex:
+        """The mode [rad/s] that counts with the final setting; see `Surroundings.counting`."""
+        return self.after.counting(self.final.eigenvalue)
+
+    @property
+    def achieved_damping(self) -> float:
+        return damping_ratio(self.achieved)
+
+    @property
+    def active_bound(self) -> str | None:
+        """``lower`` or ``upper`` where the design's gain was brought to a bound."""
+        if self.gain == self.unbounded_gain:
+            return None
+        return "lower" if self.gain > self.unbounded_gain else "upper"
+
+
+def design_pod(case: Case, request: DesignRequest, report: Report = lambda text: None) -> PodDesign:
+    """Design a controller and check it on the closed loop.
+
+    Parameters
+    ----------
+    report
+        Told what is being computed.
+
+    Raises
+    ------
+    InputError
+        If scenario, component, mode or requirement cannot be found or make no sense.
+    AnalysisError
+        If the mode has no sensitivity, the lead/lag would need more stages, or the mode cannot be followed.
+    """
+    report("preparing the case")
+    target = find_target(
+        case,
+        request.controller,
+        scenario=request.scenario,
+        pattern=request.component,
+        stages=request.stages,
+        overrides=request.overrides,
+        parameters=request.parameters,
+    )
+    own: dict[str, Value] = {}
+    for name in target.components:
+        own |= {f"{name}.{request.controller}.enabled": False, f"{name}.{request.controller}.N_S": float(target.stages)}
+    overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
+    name = mode_name(case, request.mode)
+    (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.parameters)
+
+    def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
+        return named_modes(case, model, modes).get(name)
+
+    for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
+        check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)
+    with running(prepared) as master:
+        report("operating point")
+        find_operating_point(master)
+        loop = PodLoop(master, target.components, request.controller)
+        report("modes without the controller")
+        model = loop.model(_OFF)
+        before = surroundings(model, None, naming)
+        if before.named is None:
+            raise InputError(
+                f"scenario {target.scenario!r} shows no mode {name!r} between {GUARDED[0]:g} and {GUARDED[1]:g} Hz; "
+                f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
+            )
+        off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
+        start = _Start(case.name, request, target, prepared, name, off, before.without(before.named), naming)
+        return _design(start, loop, report)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """What is there before the design begins."""
+
+    case: str
+    request: DesignRequest
+    target: Target
+    prepared: PreparedScenario
+    mode_name: str
+    off: Placed
+    before: Surroundings
+    naming: Naming
+
+
+def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
+    request, off, before = start.request, start.off, start.before
+    initial = off.eigenvalue
+    required = _required(request, initial)
+    predicted = predicted_mode(required, initial)
+
+    def around(placed: Placed) -> Surroundings:
+        return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
+
+    def judge(placed: Placed) -> Verdict:
+        after = around(placed)
+        damping = damping_ratio(after.counting(placed.eigenvalue))
+        return Verdict(damping, breach(before, after, request.least_damping))
+
+    report("sensitivity of the mode")
+    bare = loop.place(off, request.delta_gain)
+    S = sensitivity(bare.eigenvalue, initial, request.delta_gain)
+    filters = lead_lag(angle_deg(S), initial.imag, start.target.stages)
+    turned = loop.place(off, request.delta_gain, filters)
+    S_turned = sensitivity(turned.eigenvalue, initial, request.delta_gain)
+    gains = [required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
+    gain = bounded(gains[request.compensated_gain], request.gain_bounds)
+
+    report("closed loop with the design")
+    final = designed = loop.place(off, gain, filters)
+    refinement = None
+    if request.refine:
+        report("refinement")
+        refinement = refine(
+            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others]
+        )
+        final = refinement.chosen or designed
+    after, stability = around(final), loop.stability(final.setting)
+    margins = None
+    if request.margins and final.setting.gain and stability.stable is not False:
+        report("margins")
+        margins = compute_margins(loop, off, final, request.least_damping)
+    return PodDesign(
+        request=request,
+        case=start.case,
+        target=start.target,
+        prepared=start.prepared,
+        mode_name=start.mode_name,
+        initial=initial,
+        required_damping=required,
+        predicted=predicted,
+        sensitivities=Sensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned),
+        filters=filters,
+        gain_non_compensated=gains[0],
+        gain_compensated=gains[1],
+        gain=gain,
+        designed=designed,
+        refinement=refinement,
+        final=final,
+        before=before,
+        after=after,
+        broken=breach(before, after, request.least_damping) or _unstable(stability),
+        margins=margins,
+        stability_before=loop.stability(_OFF),
+        stability=stability,
+    )
+
+
+def _unstable(stability: Stability) -> str | None:
+    """What is wrong with a design that leaves the system unstable, at whatever frequency."""
+    return f"the system is {stability.sentence()}" if stability.stable is False else None
+
+
+def _required(request: DesignRequest, initial: complex) -> float:
+    """ζ_d, checked against what is there already."""
+    present = damping_ratio(initial)
+    required = request.damping if request.damping is not None else present + request.damping_increment
+    if required <= present:
+        raise InputError(
+            f"--damping {required:g}: without the controller the mode has a damping ratio of {present:.4f} already; "
+            "ask for more, or for an increase with --damping-increment"
+        )
+    if required >= 1:
+        raise InputError(
+            f"the required damping ratio is {required:.3f} (the mode has {present:.3f}); it must be less than 1"
+        )
+    return required

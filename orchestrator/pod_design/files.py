@@ -1,0 +1,144 @@
+"""A POD design as JSON, and as a parameter file's values and comments."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator.analysis.modes import Mode
+from orchestrator.pod_design.closed_loop import Placed
+from orchestrator.pod_design.design import PodDesign
+from orchestrator.pod_design.lead_lag import LeadLag, angle_deg, damping_ratio
+from orchestrator.pod_design.margins import Margins
+from orchestrator.pod_design.sheet import LABELS, mode_text, percent, verdict
+
+
+def design_json(d: PodDesign) -> dict[str, Any]:
+    """The machine-readable form of `gfor design`."""
+    S, setting = d.sensitivities, d.final.setting
+    content = {
+        "controller": d.request.controller,
+        "target_mode": _complex(d.initial),
+        "sensitivity": _polar(S.value),
+        "T_S1": setting.filters.T_S1,
+        "T_S2": setting.filters.T_S2,
+        "N_S": d.target.stages,
+        "K": setting.gain,
+        "K_unbounded": d.unbounded_gain,
+        "predicted_mode": _complex(d.predicted),
+        "achieved_mode": _complex(d.achieved),
+        "requirement": {
+            "damping_ratio": d.required_damping,
+            "increment": d.required_damping - damping_ratio(d.initial),
+            "gain_bounds": list(d.request.gain_bounds),
+            "delta_gain": d.request.delta_gain,
+            "least_damping_of_others": d.request.least_damping,
+        },
+        "met": d.met,
+        "verdict": verdict(d),
+        "target_damping_ratio": damping_ratio(d.initial),
+        "achieved_damping_ratio": d.achieved_damping,
+        "followed_mode": _complex(d.final.eigenvalue),
+        "compensated_sensitivity": _polar(S.compensated),
+        "K_non_compensated": d.gain_non_compensated,
+        "K_compensated": d.gain_compensated,
+        "active_bound": d.active_bound,
+        "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.after.worst)},
+        "stable": d.stability.stable,
+        "largest_growth_rate": d.stability.largest_growth_rate,
+        "stability": {"before": d.stability_before.as_json(), "after": d.stability.as_json()},
+        "largest_real_part": {"before": d.before.growth, "after": d.after.growth},
+        "margins": _margins_json(d.margins) if d.margins else None,
+        "refinement": _refinement_json(d) if d.refinement else None,
+        "case": d.case,
+        "scenario": d.target.scenario,
+        "mode": d.mode_name,
+        "components": list(d.target.components),
+    }
+    return content
+
+
+def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
+    """The final setting as values of a parameter file."""
+    setting, values = d.final.setting, {}
+    for component in d.target.key:
+        own: Mapping[str, bool | float | str] = {
+            "enabled": setting.gain > 0,
+            "K": _rounded(setting.gain),
+            "T_S1": _rounded(setting.filters.T_S1),
+            "T_S2": _rounded(setting.filters.T_S2),
+            "N_S": d.target.stages,
+        }
+        values.update({f"{component}.{d.request.controller}.{key}": value for key, value in own.items()})
+    return values
+
+
+def provenance(d: PodDesign, command: str) -> list[str]:
+    """The comments of a parameter file."""
+    return [
+        f"{LABELS[d.request.controller]} for {d.case}, designed by eigenvalue sensitivity"
+        + (" and refined on the closed loop" if d.refinement else ""),
+        f"command: {command}",
+        f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
+        f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
+        "K in pu of the converter's rating, T_S1 and T_S2 in s",
+    ]
+
+
+def _rounded(value: float) -> float:
+    """Eight significant digits: far beyond what a setting can mean, and legible."""
+    return float(f"{value:.8g}")
+
+
+def _complex(value: complex) -> dict[str, float]:
+    return {"real": value.real, "imag": value.imag}
+
+
+def _polar(value: complex) -> dict[str, float]:
+    return {"magnitude": abs(value), "phase_deg": angle_deg(value)}
+
+
+def _other_json(mode: Mode | None) -> dict[str, Any] | None:
+    if mode is None:
+        return None
+    return _complex(mode.eigenvalue) | {"damping_ratio": mode.damping_ratio, "state": mode.participation[0][0]}
+
+
+def _margins_json(m: Margins) -> dict[str, Any]:
+    return {
+        "damping_limit": m.limit,
+        "gain_up": m.up,
+        "gain_down": m.down,
+        "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
+        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
+        "largest_factor_tried": m.reach,
+        "phase_margin_deg": m.loop.phase_deg if m.loop else None,
+        "phase_margin_hz": m.loop.phase_hz if m.loop else None,
+        "delay_margin_s": m.loop.delay if m.loop else None,
+        "delay_margin_hz": m.loop.delay_hz if m.loop else None,
+        "sensitivity_peak": m.loop.peak if m.loop else None,
+        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None,
+        "damping_ratio_with": m.variations,
+    }
+
+
+def _refinement_json(d: PodDesign) -> dict[str, Any]:
+    def placed(p: Placed) -> dict[str, Any]:
+        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio}
+
+    def filters(f: LeadLag) -> dict[str, float]:
+        return {"T_S1": f.T_S1, "T_S2": f.T_S2}
+
+    refinement = d.refinement
+    assert refinement is not None
+    return {
+        "designed": filters(d.filters) | placed(d.designed),
+        "sweeps": [
+            {
+                "lead_lag": s.why,
+                **filters(s.filters),
+                "points": [placed(p) for p in s.points],
+                "chosen": placed(s.chosen),
+            }
+            for s in refinement.sweeps
+        ],
+        "notes": refinement.notes,
+    }

@@ -1,0 +1,109 @@
+"""What a POD setting does to all the other modes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.modes import Mode, find_spectrum, to_continuous
+from orchestrator.analysis.stability import fastest_growth
+from orchestrator.pod_design.lead_lag import damping_ratio
+
+Naming = Callable[[LinearModel, list[Mode]], Mode | None]
+
+GUARDED = (0.1, 2.0)
+"""Frequencies [Hz] of the modes whose damping is guarded; what is unstable is seen at any frequency."""
+
+_SAME = 1e-5
+"""Eigenvalues nearer to each other, relative to their size, are the same one, computed in two ways."""
+
+_EQUAL = 1e-3
+"""Damping ratios that differ by less count as equal, and growth rates that differ by less than this part of them."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All modes but the target.
+
+    Attributes
+    ----------
+    others
+        Those from 0.1 to 2 Hz, least damped first.
+    growth
+        Real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows.
+    named
+        The mode that the case's own rule gives the target's name; normally the target itself.
+    """
+
+    others: tuple[Mode, ...]
+    growth: float
+    named: Mode | None
+
+    @property
+    def other_named(self) -> Mode | None:
+        """The mode of the target's name, where that is not the mode that was followed."""
+        return self.named if any(self.named is mode for mode in self.others) else None
+
+    @property
+    def worst(self) -> Mode | None:
+        return self.others[0] if self.others else None
+
+    @property
+    def is_unstable(self) -> bool:
+        return self.growth > 0
+
+    def without(self, mode: Mode) -> "Surroundings":
+        """The same, with a mode taken out of the others."""
+        return replace(self, others=tuple(m for m in self.others if m is not mode))
+
+    def counting(self, target: complex) -> complex:
+        """The target [rad/s], or the mode that now bears its name where that has less damping.
+
+        A strong controller can make two modes trade places; then neither may be called the target alone.
+        """
+        candidates = [target, *([self.other_named.eigenvalue] if self.other_named else [])]
+        return min(candidates, key=damping_ratio)
+
+    def below(self, damping: float) -> int:
+        """How many modes have less than this damping ratio."""
+        return sum(mode.damping_ratio < damping for mode in self.others)
+
+
+def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
+    """Everything but the mode at ``target`` [rad/s]; ``naming`` finds the mode that bears the target's name."""
+    spectrum = find_spectrum(model, *GUARDED)
+    others = tuple(spectrum.modes)
+    if target is not None:
+        others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
+    fastest = fastest_growth(spectrum.eigenvalues, step_map=model.step_size is not None)
+    return Surroundings(others, fastest.real if fastest else 0.0, naming(model, spectrum.modes))
+
+
+def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
+    """What a design does that it must not: make unstable, or push a mode below the least damping that was above it."""
+    if after.is_unstable and after.growth > (1 + _EQUAL) * before.growth:
+        return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
+    worst = after.worst
+    if worst is None or worst.damping_ratio >= least:
+        return None
+    was = before.worst.damping_ratio if before.worst else least
+    if after.below(least) > before.below(least) or worst.damping_ratio < min(was, least) - _EQUAL:
+        return (
+            f"the mode at {worst.frequency_hz:.3f} Hz ({worst.participation[0][0]}) has {worst.damping_percent:.2f} % "
+            f"of damping, below {100 * least:g} %"
+        )
+    return None
+
+
+def extremes(model: LinearModel) -> tuple[complex, complex | None]:
+    """The eigenvalue [rad/s] of least damping from 0.1 to 2 Hz (−1 where there is none), and that which grows most."""
+    values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+    weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
+    return weakest, fastest_growth(values, step_map=model.step_size is not None)
+
+
+def guarded(values: Vector) -> Vector:
+    """Those of some eigenvalues [rad/s] that are in the guarded range."""
+    hertz = values.imag / (2 * np.pi)
+    return np.asarray(values[(hertz >= GUARDED[0]) & (hertz <= GUARDED[1])])

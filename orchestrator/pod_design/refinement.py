@@ -1,0 +1,303 @@
+"""Refinement of a POD design on the real closed loop, until the required damping is met or out of reach.
+
+The paper's design stops at a prediction from the sensitivity at a small gain. Here the gain is searched with the mode
+itself, and where the gain alone does not do, the lead/lag is centred anew on the mode where it is, with the
+sensitivity that it has there. Where that does not do either, all settings are surveyed.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+
+from orchestrator.errors import AnalysisError
+from orchestrator.pod_design.closed_loop import Placed, PodLoop
+from orchestrator.pod_design.lead_lag import (
+    LARGEST_TURN,
+    LeadLag,
+    angle_deg,
+    compensation_deg,
+    lead_lag,
+    lead_lag_turning,
+    local_non_compensated,
+)
+from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On a setting: the damping ratio that counts, and what it does to other modes that it must not."""
+
+    damping: float
+    broken: str | None
+
+
+Judge = Callable[[Placed], Verdict]
+
+_GAINS = 9
+_TURN = 15.0
+"""Angle [°] by which the compensation is turned, to either side as long as that helps, once re-centring does not."""
+_ROUNDS = 5
+_WORTH = 5e-4
+"""A damping ratio that is better by less is not worth another round."""
+_SMALL_GAIN = 0.1
+"""For the sensitivity at a gain of 0 [pu]."""
+_TOLERANCE = 2e-4
+"""The gain is searched until the damping ratio is met within this."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The target mode over the range of the gain, with one lead/lag.
+
+    Attributes
+    ----------
+    why
+        Where the lead/lag comes from.
+    points
+        With rising gain.
+    chosen
+        The smallest gain that meets the requirement, else the gain of the best damping.
+    """
+
+    why: str
+    filters: LeadLag
+    points: tuple[Placed, ...]
+    chosen: Placed
+
+
+@dataclass
+class Refinement:
+    """What was tried, and what came of it.
+
+    Attributes
+    ----------
+    chosen
+        The best setting that breaks no other mode; None if there is none within the bounds.
+    score
+        Its damping ratio that counts.
+    met
+        Whether it has the required damping.
+    """
+
+    sweeps: list[Sweep] = field(default_factory=list)
+    chosen: Placed | None = None
+    score: float = -1.0
+    met: bool = False
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def best(self) -> Placed:
+        """The best damping of all that was tried, whatever it does to other modes."""
+        return max((s.chosen for s in self.sweeps), key=lambda p: p.damping_ratio)
+
+    @property
+    def highest_swept(self) -> Placed:
+        """The best damping at any gain of any sweep."""
+        return max((p for s in self.sweeps for p in (*s.points, s.chosen)), key=lambda p: p.damping_ratio)
+
+
+def refine(
+    loop: PodLoop,
+    off: Placed,
+    filters: LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    judge: Judge,
+    others: Sequence[complex],
+) -> Refinement:
+    """Search gain and lead/lag on the closed loop.
+
+    Parameters
+    ----------
+    off
+        The target with the controller off.
+    filters
+        The design's lead/lag, to begin with.
+    required
+        Damping ratio of the target.
+    bounds
+        Of the gain [pu].
+    judge
+        Looks at all modes with a setting.
+    others
+        The other modes without the controller [rad/s].
+    """
+    result = Refinement()
+    near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
+    for why, candidate, gain in chain(near, _surveyed(loop, result, off, others, filters.N_S, bounds)):
+        try:
+            found = sweep(loop, off, candidate, required, bounds, why, gain)
+        except AnalysisError as error:
+            result.notes.append(f"{why}: {error}")
+            continue
+        result.sweeps.append(found)
+        allowed = _guarded(loop, found, judge, result.notes)
+        if allowed is None:
+            continue
+        damping = judge(allowed).damping
+        if damping < allowed.damping_ratio:
+            result.notes.append(
+                f"{why}: at a gain of {allowed.setting.gain:.4g} the target trades places with another mode, which "
+                f"then bears its name with {100 * damping:.2f} %"
+            )
+        if damping > result.score:
+            result.score, result.chosen = damping, allowed
+        if damping >= required - _TOLERANCE:
+            result.met = True
+            break
+    return result
+
+
+def sweep(
+    loop: PodLoop,
+    off: Placed,
+    filters: LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    why: str,
+    special: float | None = None,
+) -> Sweep:
+    """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
+
+    Parameters
+    ----------
+    special
+        A gain in the bounds that is looked at in any case [pu].
+    """
+    points: list[Placed] = []
+    here = off
+    for gain in sorted({*np.linspace(*bounds, _GAINS).tolist(), *([] if special is None else [special])}):
+        try:
+            here = loop.place(here, gain, filters)
+        except AnalysisError:
+            if not points:
+                raise
+            break  # so far the mode can be followed, and so far it was swept
+        points.append(here)
+    above = next((k for k, p in enumerate(points) if p.damping_ratio >= required), None)
+    if above == 0:
+        chosen = points[0]
+    elif above is not None:
+        chosen = _crossing(loop, points[above - 1], points[above], required)
+    else:
+        chosen = _peak(loop, points)
+    return Sweep(why, filters, tuple(points), chosen)
+
+
+def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Placed:
+    """The smallest gain between two that has the required damping: regula falsi that does not stall."""
+    for k in range(20):
+        if high.damping_ratio - required <= _TOLERANCE:
+            break
+        share = (required + _TOLERANCE / 2 - low.damping_ratio) / (high.damping_ratio - low.damping_ratio)
+        share = min(max(share, 0.05), 0.95) if k % 3 < 2 else 0.5
+        middle = loop.place(low, low.setting.gain + share * (high.setting.gain - low.setting.gain))
+        low, high = (low, middle) if middle.damping_ratio >= required else (middle, high)
+    return high
+
+
+def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
+    """The best damping around the best of some gains."""
+    if len(points) == 1:
+        return points[0]
+    k = max(range(len(points)), key=lambda i: points[i].damping_ratio)
+    best, step = points[k], (points[-1].setting.gain - points[0].setting.gain) / (_GAINS - 1)
+    low, high = points[0].setting.gain, points[-1].setting.gain
+    for _ in range(3):
+        step /= 2
+        for gain in (best.setting.gain - step, best.setting.gain + step):
+            if low <= gain <= high and gain > 0:
+                best = max(best, loop.place(best, gain), key=lambda p: p.damping_ratio)
+    return best
+
+
+def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[tuple[str, LeadLag]]:
+    """Lead/lag settings to try, each from what the sweeps before it brought."""
+    yield "as designed", first
+    if first.N_S == 0 or not result.sweeps:
+        return
+    base = result.sweeps[0].chosen
+    for k in range(1, _ROUNDS + 1):
+        try:
+            candidate = recentred(loop, base)
+        except AnalysisError as error:
+            result.notes.append(f"re-centring {k}: {error}")
+            break
+        count = len(result.sweeps)
+        yield f"re-centred, round {k}", candidate
+        if len(result.sweeps) == count or result.sweeps[-1].chosen.damping_ratio < base.damping_ratio + _WORTH:
+            break
+        base = result.sweeps[-1].chosen
+    base = result.chosen or result.best
+    for direction in (+1, -1):
+        turn, reached = direction * _TURN, result.score
+        while (candidate_turned := _turned(base, turn)) is not None:
+            yield f"turned by {turn:+.0f}°", candidate_turned
+            if result.score < reached + _WORTH:
+                break
+            turn, reached = turn + direction * _TURN, result.score
+
+
+def _surveyed(
+    loop: PodLoop, result: Refinement, off: Placed, others: Sequence[complex], stages: int, bounds: tuple[float, float]
+) -> Iterator[tuple[str, LeadLag, float | None]]:
+    """The best settings of all; looked for where nothing else has met the requirement."""
+    states = len(loop.model(off.setting).names)
+    if stages == 0 or bounds[1] <= 0:
+        return
+    if states > MOST_STATES:
+        result.notes.append(f"not all settings were surveyed: the system has {states} states, more than {MOST_STATES}")
+        return
+    try:
+        found = survey(loop, off.eigenvalue, others, stages, bounds)
+    except AnalysisError as error:
+        result.notes.append(f"survey: {error}")
+        return
+    result.notes.append(
+        f"surveyed {found.settings} settings, of every turn of the lead/lag, centred from {CENTRES[0]:g} to "
+        f"{CENTRES[1]:g} times the mode's frequency, with every gain in the bounds: the best leaves no mode that it "
+        f"moves below {100 * found.damping:.2f} %"
+    )
+    for number, setting in enumerate(found.best, start=1):
+        yield f"surveyed, {number}", setting.filters, setting.gain
+
+
+def _turned(base: Placed, turn: float) -> LeadLag | None:
+    """The lead/lag of a setting with its angle changed, centred on the mode there; None if its stages cannot."""
+    filters = base.setting.filters
+    total = filters.N_S * filters.stage_angle_deg + turn
+    if abs(total) >= LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
+        return None
+    return lead_lag_turning(total, base.eigenvalue.imag, filters.N_S)
+
+
+def recentred(loop: PodLoop, here: Placed) -> LeadLag:
+    """The design's formulas again, at the mode where it is and with the sensitivity that it has there."""
+    gain, filters = here.setting.gain, here.setting.filters
+    change = 0.01 * gain or _SMALL_GAIN
+    moved = loop.place(here, gain + change)
+    slope = (moved.eigenvalue - here.eigenvalue) / change
+    phase = angle_deg(local_non_compensated(slope, here.eigenvalue, filters))
+    if here.eigenvalue.imag <= 0:
+        raise AnalysisError(f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on")
+    if abs(compensation_deg(phase)) >= LARGEST_TURN * filters.N_S:
+        raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
+    return lead_lag(phase, here.eigenvalue.imag, filters.N_S)
+
+
+def _guarded(loop: PodLoop, found: Sweep, judge: Judge, notes: list[str]) -> Placed | None:
+    """The sweep's choice, or the largest gain below it that leaves the other modes alone; None if none does."""
+    reason = judge(found.chosen).broken
+    if reason is None:
+        return found.chosen
+    notes.append(f"{found.why}: at a gain of {found.chosen.setting.gain:.4g} {reason}")
+    good = found.points[0]
+    if good.setting.gain >= found.chosen.setting.gain or judge(good).broken is not None:
+        return None
+    bad = found.chosen
+    for _ in range(5):
+        middle = loop.place(good, (good.setting.gain + bad.setting.gain) / 2)
+        good, bad = (good, middle) if judge(middle).broken else (middle, bad)
+    return good

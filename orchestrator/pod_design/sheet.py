@@ -1,0 +1,228 @@
+"""A POD design as a calculation sheet."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+from rich.markup import escape
+from rich.table import Table
+
+from orchestrator.analysis.modes import Mode
+from orchestrator.pod_design.closed_loop import Placed
+from orchestrator.pod_design.design import PodDesign
+from orchestrator.pod_design.lead_lag import (
+    LARGEST_STAGE_ANGLE,
+    angle_deg,
+    compensation_deg,
+    damping_ratio,
+)
+from orchestrator.pod_design.margins import Margins
+from orchestrator.pod_design.refinement import Refinement
+from orchestrator.report.tables import eigenvalue_text
+
+LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
+
+
+def sheet(d: PodDesign) -> Iterable[Table | str]:
+    """The design step by step: formula, figures, units; then what came of it."""
+    yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: {d.case}, " + (
+        f"scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
+    )
+    steps = Table(header_style="bold")
+    for column in ("", "Step", "Formula", "Result"):
+        steps.add_column(column, overflow="fold")
+    for number, row in enumerate(_steps(d), start=1):
+        steps.add_row(str(number), *row)
+    yield steps
+    if d.refinement:
+        yield _refinement(d.refinement, d.required_damping)
+    yield _result(d)
+    if d.margins:
+        yield _margins(d.margins, d)
+    elif d.stability.stable is False:
+        yield "[yellow]no margins: the system is unstable with this setting[/yellow]"
+    yield from _notes(d)
+
+
+def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
+    S, K, f = d.sensitivities, f"{d.request.delta_gain:g}", d.filters
+    phase, N = angle_deg(S.value), d.target.stages
+    omega = d.initial.imag
+    yield "Target mode, POD off", "λ₀ = σ₀ ± jω₀", f"{mode_text(d.initial)}; ω₀ = {omega:.4f} rad/s"
+    yield "Required damping", _requirement(d), f"ζ_d = {percent(d.required_damping)}"
+    yield "Mode aimed at", "λ_d = −ζ_d·ω₀ ± jω₀", mode_text(d.predicted)
+    yield f"Mode with K = ΔK = {K} pu, no lead/lag", "λ_NC (T_S1 = T_S2 = 0)", mode_text(S.mode)
+    yield "Non-compensated sensitivity", "Ŝ_NC = (λ_NC − λ₀)/ΔK", f"{abs(S.value):.6f} rad/s per pu ∠ {phase:.2f}°"
+    if N == 0:
+        yield "Lead/lag", "N_S = 0", "none"
+    else:
+        kind = "lead" if phase >= 0 else "lag"
+        formula = "(180° − φ_NC)/N_S" if phase >= 0 else "(180° + φ_NC)/N_S"
+        each = abs(compensation_deg(phase)) / N
+        beyond = f"; more than {LARGEST_STAGE_ANGLE:g}°: consider more stages" if each > LARGEST_STAGE_ANGLE else ""
+        yield f"Angle of each of N_S = {N} stages", f"φ = {formula}, {kind}", f"{each:.2f}°{beyond}"
+        ratio = "(1 − sin φ)/(1 + sin φ)" if phase >= 0 else "(1 + sin φ)/(1 − sin φ)"
+        yield "Filtering ratio", f"a = {ratio}", f"{f.filtering_ratio:.4f}"
+        yield (
+            "Lead/lag, centred on ω₀",
+            "T_S1 = 1/(ω₀√a); T_S2 = a·T_S1",
+            f"T_S1 = {f.T_S1:.4f} s; T_S2 = {f.T_S2:.4f} s",
+        )
+    yield (
+        f"Sensitivity with the lead/lag, ΔK = {K} pu",
+        "Ŝ = (λ(ΔK) − λ₀)/ΔK",
+        f"{abs(S.compensated):.6f} rad/s per pu ∠ {angle_deg(S.compensated):.2f}°",
+    )
+    used = ("", " (not used)") if not d.request.compensated_gain else (" (not used)", "")
+    yield "Gain", "K = |λ_d − λ₀|/|Ŝ_NC|", f"{d.gain_non_compensated:.2f} pu{used[0]}"
+    yield "Gain with the lead/lag's own sensitivity", "K = |λ_d − λ₀|/|Ŝ|", f"{d.gain_compensated:.2f} pu{used[1]}"
+    low, high = d.request.gain_bounds
+    bound = f"{d.active_bound} bound active" if d.active_bound else "no bound active"
+    yield "Gain within its bounds", f"K ∈ [{low:g}, {high:g}] pu", f"{d.gain:.2f} pu ({bound})"
+    yield "Closed loop with this design", "eigenvalue of the coupled FMUs", mode_text(d.designed.eigenvalue)
+
+
+def _requirement(d: PodDesign) -> str:
+    return "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.damping_increment)}"
+
+
+def _refinement(r: Refinement, required: float) -> Table:
+    table = _table("Refinement on the closed loop", "Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gains swept [pu]",
+                   "Damping over them [%]", f"Best, or first with {percent(required)}")  # fmt: skip
+    for s in r.sweeps:
+        gains = [p.setting.gain for p in s.points]
+        dampings = [100 * p.damping_ratio for p in s.points]
+        table.add_row(
+            s.why,
+            f"{s.filters.T_S1:.4f}",
+            f"{s.filters.T_S2:.4f}",
+            f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
+            " ".join(f"{x:.1f}" for x in dampings),
+            f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
+        )
+    return table
+
+
+def _result(d: PodDesign) -> Table:
+    f = d.final.setting.filters
+    table = _table("Result", "", "Without POD", "With the final setting")
+    table.add_row("Setting", "off", f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
+                                    f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s")  # fmt: skip
+    table.add_row(f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved))
+    table.add_row("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.after.worst))
+    table.add_row("Largest real part of all", f"{d.before.growth:+.3g} 1/s", f"{d.after.growth:+.3g} 1/s")
+    return table
+
+
+def _margins(m: Margins, d: PodDesign) -> Table:
+    table = _table("Margins of the final setting", "Quantity", "Value")
+    gain = d.final.setting.gain
+    lost = f"no eigenvalue unstable, no mode from 0.1 to 2 Hz below {percent(m.limit)}"
+    up, down = f"more than × {m.reach:g}, the most tried", "down to 0"
+    if m.up is not None and m.lost_up is not None:
+        up = f"× {m.up:.2f} (K = {m.up * gain:.0f}), then {mode_text(m.lost_up)} is lost"
+    if m.down is not None and m.lost_down is not None:
+        down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
+    table.add_row(f"Gain up, {lost}", up)
+    table.add_row("Gain down, the same", down)
+    for name, value in _loop_rows(m):
+        table.add_row(name, value)
+    for name, damping in m.variations.items():
+        table.add_row(f"Damping of the target with {name}, the rest as it is", percent(damping))
+    return table
+
+
+def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
+    """Names and values of the loop's margins."""
+    if m.loop is None:
+        yield "Phase and delay margin", f"not known: {m.no_loop}"
+        return
+    never = "no limit: the gain around the loop is 1 at no frequency"
+    for name, size, hertz in (
+        ("Phase margin, the loop broken at K", m.loop.phase_deg and f"{m.loop.phase_deg:.1f}°", m.loop.phase_hz),
+        ("Delay margin", m.loop.delay and f"{1e3 * m.loop.delay:.1f} ms", m.loop.delay_hz),
+        ("Largest sensitivity 1/|1 + L|", f"{m.loop.peak:.2f}", m.loop.peak_hz),
+    ):
+        yield name, f"{size} at {hertz:.3g} Hz" if size else never
+
+
+def _notes(d: PodDesign) -> Iterable[str]:
+    for note in d.refinement.notes if d.refinement else ():
+        yield f"[dim]{note}[/dim]"
+    yield f"[bold {'green' if d.met else 'yellow'}]{'met' if d.met else 'not met'}[/]: {verdict(d)}"
+
+
+def verdict(d: PodDesign) -> str:
+    """In words: whether the requirement is met, by how much, and why not."""
+    text = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
+    if d.after.other_named:
+        text += (
+            f"; with this gain two modes have traded places: the one that was followed is at "
+            f"{eigenvalue_text(d.final.eigenvalue)} rad/s with {percent(d.final.damping_ratio)}, the one that the case "
+            f"now calls {d.mode_name} has {percent(d.after.other_named.damping_ratio)}, and the lesser counts"
+        )
+    if d.broken:
+        text += f"; but {d.broken}"
+    if d.damping_met:
+        if not d.refinement and d.active_bound == "lower":
+            text += f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it"
+        return text
+    if d.refinement:
+        return text + _out_of_reach(d, d.refinement)
+    if d.active_bound == "upper":
+        text += (
+            f"; the upper bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: raise "
+            "--gain-bounds, choose another controller, or see with --refine what is within reach"
+        )
+    elif d.active_bound == "lower":
+        text += "; more gain than the sensitivity asks for does not help here: see with --refine what does"
+    else:
+        text += "; the sensitivity at ΔK does not hold as far as the mode has to move: use --refine"
+    return text
+
+
+def _out_of_reach(d: PodDesign, r: Refinement) -> str:
+    """What the sweeps have shown."""
+    if not r.sweeps:
+        return "; the refinement could not follow the mode with any setting within the bounds"
+    low, high = d.request.gain_bounds[0], max(s.points[-1].setting.gain for s in r.sweeps)
+    best = r.highest_swept
+    text = (
+        f"; no setting within the bounds was found that meets it: {len(r.sweeps)} lead/lag settings were swept over "
+        f"gains from {low:g} to {high:g} pu. The best damping of the followed mode at any of them was "
+        f"{percent(best.damping_ratio)}, with {_setting(best)}"
+    )
+    if best.damping_ratio > d.final.damping_ratio + 5e-4:
+        text += ", which the limits for the other modes rule out, or the trading of places, as said above"
+    if d.final.setting.gain == low > 0:
+        text += ". The setting chosen is at the lower bound of the gain: a lower one in --gain-bounds may allow more"
+    return text
+
+
+def _setting(p: Placed) -> str:
+    f = p.setting.filters
+    return f"K = {p.setting.gain:.4g} pu, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+
+
+def mode_text(value: complex) -> str:
+    """A mode with frequency and damping."""
+    return f"{eigenvalue_text(value)} rad/s ({value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))})"
+
+
+def _other(mode: Mode | None) -> str:
+    return f"{mode_text(mode.eigenvalue)}, {mode.participation[0][0]}" if mode else "none"
+
+
+def percent(ratio: float) -> str:
+    """A ratio in percent."""
+    return f"{100 * ratio:.2f} %"
+
+
+def _components(names: Sequence[str]) -> str:
+    return f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
+    for column in columns:
+        table.add_column(escape(column), overflow="fold")
+    return table

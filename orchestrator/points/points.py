@@ -1,0 +1,83 @@
+"""Many points of a study: those that are kept are read, the others computed, and kept as soon as they are there."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol, Self, TypeVar
+
+from orchestrator.points.executor import Executor, WorkerLostError
+from orchestrator.points.store import Arrays, PointStore
+
+Report = Callable[[int, int], None]
+"""Is told how many points are done, of how many."""
+
+
+class Keyed(Protocol):
+    """What is asked of a point."""
+
+    @property
+    def key(self) -> str:
+        """Name of its file, as `key_of` makes it."""
+        ...
+
+
+class Keepable(Protocol):
+    """What comes out of a point."""
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the same would come out again, so that it is worth keeping."""
+        ...
+
+    def stored(self) -> tuple[dict[str, Any], Arrays]:
+        """Header and arrays for a `PointStore`."""
+        ...
+
+    @classmethod
+    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
+        """What was stored so; None if this is none."""
+        ...
+
+    @classmethod
+    def lost(cls, task: Any, error: WorkerLostError) -> Self:
+        """That of a point whose worker died."""
+        ...
+
+
+Task = TypeVar("Task", bound=Keyed)
+Point = TypeVar("Point", bound=Keepable)
+
+
+def kept_or_computed(
+    kind: type[Point],
+    compute: Callable[[Task], Point],
+    tasks: Sequence[Task],
+    executor: Executor,
+    store: PointStore,
+    report: Report,
+) -> Iterator[tuple[int, Point, bool]]:
+    """Give the index of each task with its point, in any order, and whether an earlier start had left that.
+
+    Parameters
+    ----------
+    kind
+        Of the points.
+    compute
+        The point of a task; it may run in another process.
+    """
+    missing: list[int] = []
+    for index, task in enumerate(tasks):
+        found = store.load(task.key)
+        point = kind.restored(*found) if found else None
+        if point is None:
+            missing.append(index)
+        else:
+            yield index, point, True
+    done = len(tasks) - len(missing)
+    report(done, len(tasks))
+    for number, outcome in executor.run(compute, [tasks[index] for index in missing]):
+        index = missing[number]
+        computed = kind.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
+        if computed.lasting:
+            store.save(tasks[index].key, *computed.stored())
+        done += 1
+        report(done, len(tasks))
+        yield index, computed, False

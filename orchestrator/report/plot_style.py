@@ -1,0 +1,41 @@
+"""The look that all plots share."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+STYLE: dict[Any, Any] = {
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 11,
+    "font.size": 9.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+}
+_COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour in every plot."""
+_DPI = 150
+_LEGEND_WIDTH = 96
+"""Characters that fit in a line of a legend, marks included."""
+
+
+def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """Below the axes, in as many columns as the longest label leaves room for."""
+    columns = max(1, min(3, _LEGEND_WIDTH // (6 + max(map(len, labels), default=1))))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def colour(index: int) -> str:
+    """A scenario's colour, the same in every plot."""
+    return _COLOURS[index % len(_COLOURS)]
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure, with the folder it belongs in."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=_DPI)

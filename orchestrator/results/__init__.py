@@ -1,0 +1,1 @@
+"""What a study leaves behind: its signals, and the files that hold them."""

@@ -1,0 +1,203 @@
+"""Everything a study leaves in its output folder."""
+
+import cmath
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.results.signals import relative_difference
+from orchestrator.results.storage import save_dataset, save_json, save_table
+from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
+from orchestrator.study.modes import ModesResult
+from orchestrator.study.run import RunResult
+from orchestrator.study.signal_plots import plot_signals
+
+_LEAST_PARTICIPATION = 1e-3
+"""Smaller factors are left out of the files."""
+
+
+def save_run(result: RunResult, folder: Path) -> None:
+    """Write one scenario's trajectory and modes, as soon as they are there."""
+    scenario = folder / result.modes.prepared.name
+    save_dataset(result.dataset, scenario / "trajectory")
+    if result.linear is not None:
+        result.linear.assign_attrs(result.dataset.attrs).to_netcdf(scenario / "linear.nc", engine="scipy")
+    save_table(_mode_rows([result.modes]), scenario / "modes.csv")
+
+
+def save_modes(case: Case, results: Sequence[ModesResult], folder: Path) -> list[Path]:
+    """Write modes, participation and shapes of all scenarios; return the plots."""
+    folder.mkdir(parents=True, exist_ok=True)
+    save_table(_mode_rows(results), folder / "modes.csv")
+    save_table(_participation_rows(results), folder / "participation.csv")
+    save_table(_shape_rows(results), folder / "mode_shapes.csv")
+    reference = case.table.reference
+    circles = f"; circles: {reference.title}" if reference and any(r.references for r in results) else ""
+    plots = [folder / "eigenvalues.png"]
+    plot_eigenvalues(results, f"Modes (large: electromechanical{circles})", plots[0])
+    for plot, name in ((plot_participation, "participation.png"), (plot_mode_shapes, "mode_shapes.png")):
+        if plot(results, folder / name):
+            plots.append(folder / name)
+    return plots
+
+
+def save_study(case: Case, results: Sequence[RunResult], folder: Path) -> list[Path]:
+    """Write what concerns all scenarios together; return the plots."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "case.toml").write_text(case.text, encoding="utf-8")
+    save_table(_shift_rows(results), folder / "step_size.csv")
+    save_json(_summary(case, results), folder / "summary.json")
+    plots = []
+    for table in case.table.plots:
+        path = folder / f"{table.name}.png"
+        if plot_signals(table, results, path):
+            plots.append(path)
+    return [*plots, *save_modes(case, [r.modes for r in results], folder)]
+
+
+def _mode_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
+    return [
+        {
+            "scenario": r.prepared.name,
+            "real [1/s]": f"{m.eigenvalue.real:.8g}",
+            "imag [rad/s]": f"{m.eigenvalue.imag:.8g}",
+            "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}",
+            "name": r.name_of(m) or "",
+            "participation": "; ".join(f"{name} {factor:.4f}" for name, factor in m.participation[:6]),
+        }
+        for r in results
+        for m in r.modes
+    ]
+
+
+def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
+    """Participation by state, by component and by area in every mode."""
+    return [
+        {
+            "scenario": r.prepared.name,
+            "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}",
+            "name": r.name_of(m) or "",
+            "of": kind,
+            "element": element,
+            "participation": f"{factor:.6g}",
+        }
+        for r in results
+        for m in r.modes
+        for kind, factors in (("state", dict(m.participation)), ("component", m.by_component), ("area", r.by_area(m)))
+        for element, factor in factors.items()
+        if factor >= _LEAST_PARTICIPATION
+    ]
+
+
+def _shape_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
+    """Magnitude and angle of the states that swing, relative to the mode's largest of them."""
+    rows = []
+    for r in results:
+        for m in r.modes:
+            largest = max((m.shape[s] for s in r.swing), key=abs, default=0)
+            rows += [
+                {
+                    "scenario": r.prepared.name,
+                    "frequency [Hz]": f"{m.frequency_hz:.6g}",
+                    "damping [%]": f"{m.damping_percent:.6g}",
+                    "name": r.name_of(m) or "",
+                    "state": state,
+                    "magnitude": f"{abs(m.shape[state] / largest):.6g}",
+                    "angle [deg]": f"{math.degrees(cmath.phase(m.shape[state] / largest)):.4g}",
+                }
+                for state in r.swing
+                if largest
+            ]
+    return rows
+
+
+def _shift_rows(results: Sequence[RunResult]) -> list[dict[str, Any]]:
+    return [
+        {
+            "scenario": r.modes.prepared.name,
+            "schedule": s.schedule,
+            "step size [s]": s.step_size,
+            "real [1/s]": f"{s.eigenvalue.real:.8g}",
+            "imag [rad/s]": f"{s.eigenvalue.imag:.8g}",
+            "continuous real [1/s]": f"{s.continuous.real:.8g}",
+            "continuous imag [rad/s]": f"{s.continuous.imag:.8g}",
+            "shift [rad/s]": f"{s.shift:.4g}",
+        }
+        for r in results
+        for s in r.shifts
+    ]
+
+
+def _summary(case: Case, results: Sequence[RunResult]) -> dict[str, Any]:
+    return {"case": case.name, "scenarios": [summary_of(r) for r in results]}
+
+
+def summary_of(result: RunResult) -> dict[str, Any]:
+    """Figures of one scenario: steady state, named modes, references, ring-down, speed, findings, failure."""
+    modes = result.modes
+    seen, stats = result.ring_down, result.statistics
+    return {
+        "name": modes.prepared.name,
+        "title": modes.prepared.title,
+        "residual": None if math.isnan(modes.operating_point.residual) else modes.operating_point.residual,
+        "states": modes.model.number_of_states,
+        "stable": modes.stability.stable,
+        "largest_growth_rate": modes.stability.largest_growth_rate,
+        "stability": modes.stability.as_json(),
+        "outside_range": None if modes.hidden is None else modes.hidden.as_json(),
+        "modes": {name: _mode_summary(mode) for name, mode in modes.named.items()},
+        "references": {name: table.model_dump(exclude_none=True) for name, table in modes.references.items()},
+        "ring_down": _mode_summary(seen),
+        "steps_per_second": stats.steps_per_second if stats else None,
+        "share_in_fmus": stats.share_in_fmus if stats else None,
+        "linear_difference": _linear_differences(result),
+        "swing": {name: modes.swing_of(mode) for name, mode in modes.named.items()},
+        "step_size": modes.prepared.step_size,
+        "stop_time": modes.prepared.stop_time,
+        "schedule": modes.prepared.schedule.name,
+        "events": [str(event) for event in modes.prepared.events],
+        "power_flow": _power_flow(modes.prepared),
+        "linearised": modes.linearised,
+        "fit_errors": modes.fit_errors,
+        "warnings": list(modes.warnings),
+        "stable_in_simulation": not result.went_unstable,
+        "findings": [finding.as_json() for finding in result.findings],
+        "failure": str(result.failure) if result.failure else None,
+    }
+
+
+def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
+    """Voltages [pu, degrees] by bus, and what every unit feeds [MVA, MW, Mvar]."""
+    flow = prepared.power_flow
+    if flow is None:
+        return None
+    units = {}
+    for name, power in flow.powers.items():
+        plan = prepared.system.components[name]
+        rating = float(plan.parameters.get("S_n", plan.description.variables["S_n"].start or 0.0))
+        units[name] = {"rating_mva": rating, "p_mw": power.real * rating, "q_mvar": power.imag * rating}
+    buses = {bus: [abs(v), math.degrees(cmath.phase(v))] for bus, v in flow.voltages.items()}
+    return {"residual": flow.residual, "buses": buses, "units": units}
+
+
+def _linear_differences(result: RunResult) -> dict[str, float] | None:
+    """Of every recorded signal, as a share of its largest deviation."""
+    if result.linear is None:
+        return None
+    return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}
+
+
+def _mode_summary(mode: Any) -> dict[str, float] | None:
+    if mode is None:
+        return None
+    return {
+        "real": mode.eigenvalue.real,
+        "imag": mode.eigenvalue.imag,
+        "frequency_hz": mode.frequency_hz,
+        "damping_percent": mode.damping_percent,
+    }

@@ -1,0 +1,139 @@
+"""Plots of modes: the eigenvalue map, participation bars, and who swings against whom."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from orchestrator.cases.schema import ReferenceModeTable
+from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
+from orchestrator.study.modes import ModesResult
+
+_BARS = 10
+"""Components with a bar in each mode, those that take part most."""
+
+_NAMED = 4
+"""Components of each side of a mode shape that are named, largest first."""
+
+
+def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> None:
+    """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
+    named = [m.frequency_hz for r in results for m in r.named.values()]
+    highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
+    shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 5.0), layout="constrained")
+        axis = figure.subplots()
+        for index, result in enumerate(results):
+            modes = shown[id(result)]
+            axis.scatter(
+                [m.eigenvalue.real for m in modes],
+                [m.frequency_hz for m in modes],
+                marker="x",
+                s=[70 if result.name_of(m) else 30 for m in modes],
+                linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
+                color=colour(index),
+                label=result.label,
+                zorder=3,
+            )
+            for reference in result.references.values():
+                at = _real_and_hz(reference)
+                axis.scatter(*at, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
+        left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
+        axis.set_xlim(left, 0.35)
+        axis.set_ylim(0, highest_hz)
+        damping_rays(axis, left, highest_hz)
+        axis.axvline(0, color="#888888", linewidth=0.8)
+        axis.set_xlabel("Real part [1/s]")
+        axis.set_ylabel("Frequency [Hz]")
+        axis.set_title(title, loc="left")
+        add_legend(figure, *axis.get_legend_handles_labels())
+        save_figure(figure, path)
+
+
+def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
+    """Real part [1/s] and frequency [Hz], from the damping ratio where the source gives no eigenvalue."""
+    if reference.real is not None:
+        return reference.real, reference.frequency_hz
+    ratio = reference.damping_percent / 100
+    return float(-ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz), reference.frequency_hz
+
+
+def damping_rays(axis: Any, left: float, highest_hz: float) -> None:
+    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz]."""
+    for percent in (5, 10, 15, 20, 30):
+        ratio = percent / 100
+        slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi  # −Re λ per Hz
+        end = min(highest_hz, -left / slope)
+        axis.plot([0, -slope * end], [0, end], color="#b0b0b0", linewidth=0.7, linestyle="--", zorder=1)
+        axis.annotate(f"{percent} %", (-slope * end, end), color="#888888", fontsize=8, ha="right", va="top")
+
+
+def plot_participation(results: Sequence[ModesResult], path: Path) -> bool:
+    """Participation of the components in each named mode, one bar a scenario; False if no mode has a name."""
+    names = list(dict.fromkeys(name for r in results for name in r.named))
+    if not names:
+        return False
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.6, 0.9 + 2.1 * len(names)), layout="constrained")
+        axes = figure.subplots(len(names), 1, squeeze=False)[:, 0]
+        for axis, name in zip(axes, names, strict=True):
+            shares = {k: r.named[name].by_component for k, r in enumerate(results) if name in r.named}
+            most = {c: max(s.get(c, 0.0) for s in shares.values()) for s in shares.values() for c in s}
+            components = sorted(most, key=lambda c: -most[c])[:_BARS]
+            width = 0.8 / len(results)
+            for k, share in shares.items():
+                at = np.arange(len(components)) + (k - (len(results) - 1) / 2) * width
+                heights = [100 * share.get(c, 0.0) for c in components]
+                axis.bar(at, heights, width, color=colour(k), label=results[k].prepared.title, zorder=3)
+            axis.set_xticks(range(len(components)), components)
+            axis.set_ylabel("Participation [%]")
+            axis.grid(visible=False, axis="x")
+            axis.set_title(f"Mode {name}" if len(names) > 1 else f"{name.capitalize()} mode", loc="left")
+        handles, labels = axes[0].get_legend_handles_labels()
+        add_legend(figure, handles, labels)
+        save_figure(figure, path)
+    return True
+
+
+def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
+    """Speeds in each named mode as arrows, one row a mode and one column a scenario; False if there are none."""
+    names = list(dict.fromkeys(name for r in results for name in r.named))
+    if not names or not any(r.swing for r in results):
+        return False
+    rows, columns = len(names), len(results)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(max(4.0, 2.5 * columns), 0.4 + 2.75 * rows), layout="constrained")
+        axes = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "polar"})
+        for row, name in enumerate(names):
+            for column, result in enumerate(results):
+                axis = axes[row, column]
+                _compass(axis, result, name, colour(column))
+                mode = result.named.get(name)
+                figures = f"\n{mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %" if mode else "\nnone in range"
+                axis.set_title(f"{name}: {result.prepared.title}{figures}", fontsize=8.5)
+        save_figure(figure, path)
+    return True
+
+
+def _compass(axis: Any, result: ModesResult, name: str, shade: str) -> None:
+    axis.set_ylim(0, 1.08)
+    axis.spines["polar"].set_visible(False)
+    axis.set_yticks([0.5, 1.0], [])
+    axis.set_xticks(np.deg2rad([0, 90, 180, 270]), [])
+    mode = result.named.get(name)
+    if mode is None:
+        return
+    together, against = mode.swing(result.swing, least=0.0)
+    if not together:
+        return
+    leader = mode.shape[together[0]]
+    for state in (*together, *against):
+        value = mode.shape[state] / leader
+        axis.plot([np.angle(value)] * 2, [0, abs(value)], color=shade, linewidth=1.0, alpha=0.85)
+        axis.plot(np.angle(value), abs(value), marker="o", markersize=2.5, color=shade)
+    right, left = (", ".join(s.partition(".")[0] for s in side[:_NAMED]) for side in (together, against))
+    axis.set_xlabel(f"→ {right}\n← {left}", fontsize=7.5)

@@ -1,0 +1,1 @@
+"""Modes followed along one parameter or over a grid of them."""

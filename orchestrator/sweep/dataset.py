@@ -1,0 +1,265 @@
+"""A sweep as a labelled dataset, as a long table, and as JSON."""
+
+import fnmatch
+import itertools
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.results.storage import provenance, save_table
+from orchestrator.sweep.point import PointRecord
+from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
+from orchestrator.sweep.trajectories import Place, Trajectory
+
+_FIGURES = {
+    "real": ("1/s", "Real part of the eigenvalue"),
+    "imag": ("rad/s", "Imaginary part of the eigenvalue"),
+    "frequency": ("Hz", "Frequency"),
+    "damping": ("%", "Damping ratio"),
+    "similarity": ("1", "Similarity to the same trajectory at the point before"),
+}
+_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}
+"""xarray's own attributes have the short names."""
+
+_BEGINNINGS = "start followed refined entered broken"
+
+
+Curve = list[tuple[Place, dict[str, Any]]]
+"""A trajectory's figures by place."""
+
+
+def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
+    """States of a scenario that the case calls its swing states."""
+    names = dict.fromkeys(n for record in sweep.points.values() if record.modes for n in record.modes.names)
+    return [name for name in names if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
+
+
+class Samples:
+    """Figures of the trajectories, point by point."""
+
+    def __init__(self, result: SweepResult) -> None:
+        self.result = result
+        self._curves: dict[int, Curve] = {}
+        self.axes = result.plan.axes
+        patterns = result.plan.case.table.analysis.swing
+        self.states = [*dict.fromkeys(s for sweep in result.scenarios for s in swing_states(sweep, patterns))]
+        everything = (r.modes.names for s in result.scenarios for r in s.points.values() if r.modes)
+        self.components = [*dict.fromkeys(name.partition(".")[0] for names in everything for name in names)]
+
+    def of(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Curve:
+        """Places of the grid, in order, with the figures of a trajectory there."""
+        if id(trajectory) not in self._curves:
+            self._curves[id(trajectory)] = list(self._samples(sweep, trajectory))
+        return self._curves[id(trajectory)]
+
+    def _samples(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Iterator[tuple[Place, dict[str, Any]]]:
+        for place, point in trajectory.points.items():
+            modes = sweep.points[place].modes
+            if modes is None:
+                continue
+            value = complex(modes.eigenvalues[point.mode])
+            factors = modes.participation()[point.mode]
+            states = {n: float(f) for n, f in zip(modes.names, factors, strict=True) if n in self.states}
+            components: dict[str, float] = {}
+            for name, factor in zip(modes.names, factors, strict=True):
+                component = name.partition(".")[0]
+                components[component] = components.get(component, 0.0) + float(factor)
+            yield (
+                place,
+                {
+                    "real": value.real,
+                    "imag": value.imag,
+                    "frequency": value.imag / (2 * np.pi),
+                    "damping": -100 * value.real / abs(value) if value else 0.0,
+                    "similarity": point.similarity,
+                    "named": point.named,
+                    "beginning": point.beginning,
+                    "states": states,
+                    "components": components,
+                },
+            )
+
+    def setting(self, place: Place) -> dict[str, float | bool]:
+        """Values of the varied parameters at a place of the grid."""
+        return {axis.key: axis.values[int(i)] for axis, i in zip(self.axes, place, strict=True)}
+
+
+def sweep_dataset(samples: Samples) -> xr.Dataset:
+    """Everything over (scenario, varied parameters, trajectory); NaN where a trajectory is not."""
+    result, axes = samples.result, samples.axes
+    sizes = [len(axis.values) for axis in axes]
+    grid = [axis.key for axis in axes]
+    longest = max((len(s.trajectories) for s in result.scenarios), default=0)
+    shape = (len(result.scenarios), *sizes, longest)
+    dims = ["scenario", *grid, "trajectory"]
+    figures = {name: np.full(shape, np.nan) for name in _FIGURES}
+    named, beginning = np.zeros(shape, dtype=np.int8), np.full(shape, -1, dtype=np.int8)
+    of_states = np.full((*shape, len(samples.states)), np.nan)
+    of_components = np.full((*shape, len(samples.components)), np.nan)
+    names = [[""] * longest for _ in result.scenarios]
+    residual, errors = np.full(shape[:-1], np.nan), np.full(shape[:-1], "", dtype=object)
+    growth, stable = np.full(shape[:-1], np.nan), np.full(shape[:-1], -1, dtype=np.int8)
+    for s, sweep in enumerate(result.scenarios):
+        for t, trajectory in enumerate(sweep.trajectories):
+            names[s][t] = trajectory.name
+            for place, sample in samples.of(sweep, trajectory):
+                at = (s, *(int(i) for i in place), t)
+                for name, array in figures.items():
+                    array[at] = sample[name]
+                named[at], beginning[at] = sample["named"], sample["beginning"]
+                of_states[at] = [sample["states"].get(name, np.nan) for name in samples.states]
+                of_components[at] = [sample["components"].get(name, np.nan) for name in samples.components]
+        for place in itertools.product(*map(range, sizes)):
+            residual[(s, *place)] = sweep.points[place].residual
+            errors[(s, *place)] = sweep.points[place].error or ""
+            verdict = sweep.points[place].stability
+            if verdict.get("stable") is not None:
+                stable[(s, *place)] = verdict["stable"]
+            if verdict.get("largest_growth_rate") is not None:
+                growth[(s, *place)] = verdict["largest_growth_rate"]
+    flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
+    data: dict[str, Any] = {
+        _IN_DATASET.get(name, name): (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
+        for name, array in figures.items()
+    }
+    of = "Participation in the mode of"
+    data |= {
+        "named": (dims, named, {"units": "1", "long_name": "Whether the case's name for a mode falls on it here"}),
+        "beginning": (dims, beginning, {"units": "1", "long_name": "How the trajectory comes to be here", **flags}),
+        "participation": ([*dims, "state"], of_states, {"units": "1", "long_name": f"{of} a state"}),
+        "component_participation": (
+            [*dims, "component"], of_components, {"units": "1", "long_name": f"{of} a component, all its states"},
+        ),
+        "residual": (dims[:-1], residual, {"units": "pu", "long_name": "Change of the steady state in one step"}),
+        "stable": (
+            dims[:-1],
+            stable,
+            {"units": "1", "long_name": "Whether nothing grows at any frequency", "_FillValue": np.int8(-1)},
+        ),
+        "largest_growth_rate": (
+            dims[:-1], growth, {"units": "1/s", "long_name": "Largest real part of the whole spectrum"},
+        ),
+        "error": (dims[:-1], errors.astype(str), {"long_name": "Why there are no modes"}),
+    }  # fmt: skip
+    coordinates: dict[str, Any] = {
+        "scenario": ("scenario", [s.prepared.name for s in result.scenarios], {"long_name": "Scenario"}),
+        "trajectory": ("trajectory", np.arange(1, longest + 1, dtype=np.int32), {"long_name": "Trajectory"}),
+        "trajectory_name": (["scenario", "trajectory"], np.array(names, dtype=str), {"long_name": "Name"}),
+        "state": ("state", samples.states, {"long_name": "State"}),
+        "component": ("component", samples.components, {"long_name": "Component"}),
+    }
+    for axis in axes:
+        values = [float(value) for value in axis.values]
+        coordinates[axis.key] = (axis.key, values, {"units": axis.unit or "1", "long_name": axis.title})
+    return xr.Dataset(data, coords=coordinates, attrs=_attributes(samples))
+
+
+def _attributes(samples: Samples) -> dict[str, Any]:
+    result = samples.result
+    origin = provenance(result.plan.case, result.plan.scenarios[0])
+    everyone = [provenance(result.plan.case, prepared) for prepared in result.plan.scenarios]
+    own = {
+        key: json.dumps({p["scenario"]: p[key] for p in everyone}) for key in ("title", "values", "schedule", "fmus")
+    }
+    low, high = result.plan.frequency_range
+    return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
+        "overrides": json.dumps(result.plan.overrides),
+        "frequency_range_hz": [low, high],
+    }  # fmt: skip
+
+
+def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
+    """One row for every trajectory at every point of the grid, and one for every point that failed."""
+    rows = []
+    units = {axis.key: f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in samples.axes}
+    for sweep in samples.result.scenarios:
+        for trajectory in sweep.trajectories:
+            for place, sample in samples.of(sweep, trajectory):
+                setting = {units[key]: value for key, value in samples.setting(place).items()}
+                figures = {
+                    f"{name} [{unit}]" if unit != "1" else name: f"{sample[name]:.10g}"
+                    for name, (unit, _) in _FIGURES.items()
+                }
+                shares = {f"participation {s}": _share(sample["states"], s) for s in samples.states}
+                shares |= {f"participation {c}": _share(sample["components"], c) for c in samples.components}
+                rows.append(
+                    {"scenario": sweep.prepared.name, **setting, "trajectory": trajectory.name, **figures}
+                    | {"named": int(sample["named"]), "beginning": sample["beginning"].name.lower()}
+                    | {**shares, **_verdict(sweep.points[place]), "error": ""}
+                )
+    empty = dict.fromkeys(rows[0] if rows else ["scenario", *units.values(), "error"], "")
+    for sweep, place, error in samples.result.failures():
+        setting = {units[key]: value for key, value in samples.setting(place).items()}
+        rows.append(empty | {"scenario": sweep.prepared.name, **setting, "error": error})
+    return rows
+
+
+def _verdict(record: PointRecord) -> dict[str, str]:
+    """The stability of a point in a row of the table."""
+    rate = record.stability.get("largest_growth_rate")
+    word = "" if record.stability.get("stable") is None else str(record.stability["stable"]).lower()
+    return {"stable": word, "largest growth rate [1/s]": "" if rate is None else f"{rate:.10g}"}
+
+
+def _share(shares: dict[str, float], name: str) -> str:
+    return f"{shares[name]:.6g}" if name in shares else ""
+
+
+def sweep_json(samples: Samples) -> dict[str, Any]:
+    """The machine-readable form of `gfor sweep`."""
+    result = samples.result
+    failed: dict[str, list[dict[str, Any]]] = {s.prepared.name: [] for s in result.scenarios}
+    for sweep, place, error in result.failures():
+        failed[sweep.prepared.name].append({"values": samples.setting(place), "error": error})
+    return {
+        "case": result.plan.case.name,
+        "parameters": [{"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes],
+        "step_size_s": result.plan.scenarios[0].step_size,
+        "points": {"computed": result.computed, "stored": result.stored, "refining": result.refined},
+        "scenarios": [
+            {
+                "name": sweep.prepared.name,
+                "title": sweep.prepared.title,
+                "stable": sweep.stable,
+                "unstable": [
+                    {"values": samples.setting(place)} | sweep.points[place].stability
+                    for place in sweep.unstable(samples.axes)
+                ],
+                "trajectories": [
+                    {
+                        "name": trajectory.name,
+                        "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
+                    }
+                    for trajectory in sweep.trajectories
+                ],
+                "failed": failed[sweep.prepared.name],
+            }
+            for sweep in result.scenarios
+        ],
+    }
+
+
+def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "values": setting,
+        "real": sample["real"],
+        "imag": sample["imag"],
+        "frequency_hz": sample["frequency"],
+        "damping_percent": sample["damping"],
+        "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"],
+        "named": sample["named"],
+        "beginning": sample["beginning"].name.lower(),
+        "participation": sample["states"],
+        "components": sample["components"],
+    }
+
+
+def save_sweep(samples: Samples, folder: Path) -> None:
+    """Write sweep.nc and sweep.csv."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sweep_dataset(samples).to_netcdf(folder / "sweep.nc", engine="scipy")
+    save_table(sweep_rows(samples), folder / "sweep.csv")

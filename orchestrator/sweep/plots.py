@@ -1,0 +1,177 @@
+"""Plots of a sweep: trajectories in the complex plane, and figures of the named modes over the parameter."""
+
+from collections.abc import Callable, Iterator
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from orchestrator.report.plot_style import STYLE, colour, save_figure
+from orchestrator.study.mode_plots import damping_rays
+from orchestrator.sweep.dataset import Curve, Samples
+from orchestrator.sweep.sweep import ScenarioSweep
+from orchestrator.sweep.trajectories import Trajectory
+
+_LEAST_DAMPED = 75.0
+"""Modes that are damped more than this [%] all along are left out of the plane."""
+
+_DASHES = ("-", "--", ":", "-.")
+
+
+def save_sweep_plots(samples: Samples, folder: Path) -> list[Path]:
+    """Draw what there is to draw; return the files."""
+    plots: list[tuple[Callable[[Samples, Path], bool], str]] = [
+        (plot_trajectories, "trajectories.png"),
+        (plot_named, "named_modes.png"),
+        (plot_swing, "participation.png"),
+    ]
+    return [folder / name for plot, name in plots if plot(samples, folder / name)]
+
+
+def _rows(curve: Curve) -> Iterator[Curve]:
+    """Pieces of a curve without a gap, along the last axis."""
+    piece: Curve = []
+    for place, sample in curve:
+        if piece and not (place[:-1] == piece[-1][0][:-1] and place[-1] == piece[-1][0][-1] + 1):
+            yield piece
+            piece = []
+        piece.append((place, sample))
+    if piece:
+        yield piece
+
+
+def plot_trajectories(samples: Samples, path: Path) -> bool:
+    """Complex plane with rays of equal damping; a circle where each trajectory starts."""
+    drawn: list[tuple[int, Trajectory, Curve]] = []
+    for k, sweep in enumerate(samples.result.scenarios):
+        for trajectory in sweep.trajectories:
+            curve = samples.of(sweep, trajectory)
+            if any(sample["damping"] < _LEAST_DAMPED for _, sample in curve):
+                drawn.append((k, trajectory, curve))
+    points = [sample for _, _, curve in drawn for _, sample in curve if sample["damping"] < _LEAST_DAMPED]
+    if not points:
+        return False
+    left = min(-1.0, 1.05 * min(p["real"] for p in points))
+    right = max(0.35, 1.2 * max(p["real"] for p in points))
+    highest = 1.08 * max(p["frequency"] for p in points)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 6.2), layout="constrained")
+        axis = figure.subplots()
+        for k, trajectory, curve in drawn:
+            strong = trajectory.carries is not None
+            for piece in _rows(curve):
+                at = [s["real"] for _, s in piece], [s["frequency"] for _, s in piece]
+                axis.plot(*at, color=colour(k), linewidth=1.8 if strong else 0.9, alpha=1.0 if strong else 0.7)
+                axis.plot(*at, ".", color=colour(k), markersize=4.5 if strong else 2.5)
+                axis.plot(at[0][0], at[1][0], "o", color=colour(k), markerfacecolor="white", markersize=6, zorder=4)
+            if strong:
+                ends = [(s["real"], s["frequency"]) for _, s in curve]
+                number = trajectory.name.removeprefix(trajectory.carries or "").strip()
+                axis.annotate(number, ends[-1], xytext=(5, 3), textcoords="offset points", color=colour(k), fontsize=9)
+        for k, sweep in enumerate(samples.result.scenarios):
+            unstable = len(sweep.unstable(samples.axes))
+            words = f": UNSTABLE at {unstable} of its points" if unstable else ""
+            axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
+        axis.set_xlim(left, right)
+        axis.set_ylim(0, highest)
+        damping_rays(axis, left, highest)
+        axis.axvline(0, color="#888888", linewidth=0.8)
+        axis.set_xlabel("Real part [1/s]")
+        axis.set_ylabel("Frequency [Hz]")
+        title = "\n".join(f"{axis_label(a)} from {a.values[0]:g} to {a.values[-1]:g}" for a in samples.axes)
+        axis.set_title(f"{title} (circle: start; thick: named modes)", loc="left")
+        figure.legend(loc="outside lower center", ncols=3)
+        save_figure(figure, path)
+    return True
+
+
+def axis_label(axis: Any) -> str:
+    """``grid.X_L [pu]``."""
+    return f"{axis.key} [{axis.unit}]" if axis.unit else str(axis.key)
+
+
+def _named(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve]]:
+    return [
+        (k, sweep, trajectory, samples.of(sweep, trajectory))
+        for k, sweep in enumerate(samples.result.scenarios)
+        for trajectory in sweep.trajectories
+        if trajectory.carries is not None
+    ]
+
+
+def _draw(axis: Any, samples: Samples, curve: Curve, value: Callable[[dict[str, Any]], float], **style: Any) -> None:
+    """One curve over the last axis; thick where the mode has the case's name, thin where another has it."""
+    last = samples.axes[-1]
+    for piece in _rows(curve):
+        x = np.array([float(last.values[int(place[-1])]) for place, _ in piece])
+        y = np.array([value(sample) for _, sample in piece])
+        named = np.array([sample["named"] for _, sample in piece])
+        axis.plot(x, y, linewidth=0.9, alpha=0.75, **style)
+        axis.plot(x, np.where(named, y, np.nan), linewidth=2.4, **style)
+    if last.logarithmic:
+        axis.set_xscale("log")
+
+
+def plot_named(samples: Samples, path: Path) -> bool:
+    """Damping and frequency of the named modes over the last parameter; False if none has a name."""
+    curves = _named(samples)
+    if not curves:
+        return False
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.6, 6.0), layout="constrained")
+        axes = figure.subplots(2, 1, sharex=True)
+        for k, _, trajectory, curve in curves:
+            style = {"color": colour(k), "linestyle": _dash(trajectory)}
+            for axis, figure_of in zip(axes, ("damping", "frequency"), strict=True):
+                _draw(axis, samples, curve, itemgetter(figure_of), **style)
+        axes[0].axhline(0, color="#888888", linewidth=0.8)
+        axes[0].set_ylabel("Damping [%]")
+        axes[1].set_ylabel("Frequency [Hz]")
+        axes[1].set_ylim(bottom=0)
+        _finish(figure, axes, samples, curves)
+        save_figure(figure, path)
+    return True
+
+
+def plot_swing(samples: Samples, path: Path) -> bool:
+    """Participation of the swing states in the named modes; False if there are none."""
+    curves = _named(samples)
+    states = samples.states[:6]
+    if not curves or not states:
+        return False
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.6, 0.8 + 2.3 * len(states)), layout="constrained")
+        axes = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        for k, _, trajectory, curve in curves:
+            style = {"color": colour(k), "linestyle": _dash(trajectory)}
+            for axis, state in zip(axes, states, strict=True):
+                _draw(axis, samples, curve, _percent_of(state), **style)
+                axis.set_ylabel(f"{state} [%]")
+        axes[0].set_ylim(bottom=0)
+        _finish(figure, axes, samples, curves)
+        save_figure(figure, path)
+    return True
+
+
+def _percent_of(state: str) -> Callable[[dict[str, Any]], float]:
+    return lambda sample: 100 * float(sample["states"].get(state, np.nan))
+
+
+def _dash(trajectory: Trajectory) -> str:
+    number = trajectory.name.removeprefix(trajectory.carries or "").strip()
+    return _DASHES[(int(number) - 1) % len(_DASHES)] if number.isdigit() else _DASHES[0]
+
+
+def _finish(figure: Figure, axes: Any, samples: Samples, curves: Any) -> None:
+    for k, sweep, trajectory, _ in curves:
+        label = sweep.prepared.title
+        label += f": {trajectory.name}" if trajectory.name != trajectory.carries else ""
+        axes[0].plot([], [], color=colour(k), linestyle=_dash(trajectory), label=label)
+    handles, labels = axes[0].get_legend_handles_labels()
+    axes[0].set_title("Named modes (thick: where the case's name falls on the mode)", loc="left")
+    axes[-1].set_xlabel(axis_label(samples.axes[-1]))
+    axes[-1].margins(x=0.01)
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)

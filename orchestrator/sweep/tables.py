@@ -1,0 +1,114 @@
+"""A sweep on a terminal."""
+
+import math
+
+from rich.markup import escape
+from rich.table import Table
+
+from orchestrator.sweep.dataset import Samples
+from orchestrator.sweep.plots import axis_label
+from orchestrator.sweep.trajectories import Place
+
+_FAILURES_SHOWN = 5
+
+
+def trajectories(samples: Samples) -> Table:
+    """Where each trajectory leads, its least damping and its least similarity from point to point.
+
+    Those with a name, or all where the case gives none.
+    """
+    title = escape(f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}")
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    table.add_column("Mode", overflow="fold")
+    for column in ("f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity"):
+        table.add_column(escape(column), justify="right")
+    anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
+    for sweep in samples.result.scenarios:
+        for trajectory in sweep.trajectories:
+            curve = samples.of(sweep, trajectory)
+            if not curve or (anything and trajectory.carries is None):
+                continue
+            (_, first), (_, last) = curve[0], curve[-1]
+            where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
+            alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
+            named = sum(f["named"] for _, f in curve)
+            table.add_row(
+                f"{sweep.prepared.title}: {trajectory.name}",
+                f"{first['frequency']:.3f} → {last['frequency']:.3f}",
+                f"{first['damping']:.2f} → {last['damping']:.2f}",
+                f"{least['damping']:.2f} at {_values(samples, where)}",
+                f"{len(curve)}" if named in (0, len(curve)) else f"{len(curve)}, named at {named}",
+                f"{min(alike):.2f}" if alike else "–",
+            )
+        table.add_section()
+    return table
+
+
+def stability(samples: Samples) -> list[str]:
+    """The verdict on every scenario over all its points, as rich markup; an unstable one first."""
+    axes, lines = samples.axes, []
+    order = {False: 0, None: 1, True: 2}
+    for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
+        title, places = escape(sweep.prepared.title), sweep.unstable(axes)
+        total = math.prod(len(axis.values) for axis in axes)
+        if places:
+            worst = sweep.points[places[0]].stability["sentence"].removeprefix("UNSTABLE: ")
+            where = escape(f"at {len(places)} of {total} points; worst at {place_text(samples, places[0])}: {worst}")
+            lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
+        elif sweep.stable is None:
+            lines.append(f"[bold yellow]not known[/]: {title}: a point without a verdict is among {total}")
+        else:
+            lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
+    return lines
+
+
+def remarks(samples: Samples) -> list[str]:
+    """What the user must know of points that failed, trajectories that break, and points in between."""
+    result, texts = samples.result, []
+    failures = list(result.failures())
+    if failures:
+        texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")
+        texts += [
+            f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
+            for sweep, place, error in failures[:_FAILURES_SHOWN]
+        ]
+        more = len(failures) - _FAILURES_SHOWN
+        texts += [f"  … and {more} more, in sweep.csv"] if more > 0 else []
+    breaks = [
+        (sweep, trajectory, place)
+        for sweep in result.scenarios
+        for trajectory in sweep.trajectories
+        for place, point in trajectory.points.items()
+        if point.beginning.name == "BROKEN"
+    ]
+    for sweep, trajectory, place in breaks[:_FAILURES_SHOWN]:
+        texts.append(
+            f"{sweep.prepared.name}: {trajectory.name} begins at {place_text(samples, place)}, not recognised in the "
+            "point before; take more points there"
+        )
+    more = len(breaks) - _FAILURES_SHOWN
+    texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
+    if result.refined:
+        texts.append(
+            f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
+            "(where, is marked 'refined' in sweep.csv)"
+        )
+    return texts
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number != 1 else "")
+
+
+def place_text(samples: Samples, place: Place) -> str:
+    """``grid.X_L = 0.1 pu``."""
+    setting = samples.setting(place)
+    return ", ".join(f"{a.key} = {_value(setting[a.key])} {a.unit}".rstrip() for a in samples.axes)
+
+
+def _values(samples: Samples, place: Place) -> str:
+    return ", ".join(_value(value) for value in samples.setting(place).values())
+
+
+def _value(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"

@@ -1,0 +1,171 @@
+"""The trajectories of a scenario's modes over a grid of points, with the names that the case gives."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from orchestrator.analysis.mode_tracking import Followed, ModeSet, follow, near_an_end
+from orchestrator.sweep.point import PointRecord
+
+Place = tuple[float, ...]
+"""Indices of a point on all axes; not whole on the last one for points between those of the grid."""
+
+
+class Beginning(IntEnum):
+    """How a trajectory comes to be at a point."""
+
+    START = 0
+    """The first point of the grid, or the first after points that failed."""
+    FOLLOWED = 1
+    REFINED = 2
+    """Recognised only by points in between."""
+    ENTERED = 3
+    """From beyond the range of frequencies."""
+    BROKEN = 4
+    """Not recognised in the point before: its former part is another trajectory, or there is none."""
+
+
+@dataclass(frozen=True)
+class TrajectoryPoint:
+    """A trajectory at one point of the grid.
+
+    Attributes
+    ----------
+    mode
+        Index in the point's record.
+    similarity
+        Least one on the way from the point of the grid before; NaN where the trajectory begins.
+    """
+
+    mode: int
+    similarity: float
+    beginning: Beginning
+    named: bool
+
+
+@dataclass
+class Trajectory:
+    """A mode, followed.
+
+    Attributes
+    ----------
+    name
+        That of the case, with a number where several trajectories have it in turn; else "mode" and a number.
+    carries
+        The case's name.
+    """
+
+    name: str = ""
+    carries: str | None = None
+    points: dict[Place, TrajectoryPoint] = field(default_factory=dict)
+
+
+def find_trajectories(
+    points: Mapping[Place, PointRecord], names: Sequence[str], frequency_range: tuple[float, float]
+) -> list[Trajectory]:
+    """Follow the modes of a scenario along the last axis, row by row.
+
+    A row's first point is linked to that of the row before, and so is any mode that has no predecessor within its
+    row.
+
+    Parameters
+    ----------
+    points
+        By place; failed ones are passed over.
+    names
+        Of the modes that the case looks for, most important first.
+    frequency_range
+        [Hz]
+    """
+    modes = {place: record.modes for place, record in points.items() if record.modes is not None}
+    route = list(_route(modes))
+    followed = follow(modes, route)
+    first = {place for place, origins in route if not origins}
+    trajectories: dict[int, Trajectory] = {}
+    for place, _ in route:
+        if not _on_grid(place):
+            continue
+        record = points[place]
+        for i, number in enumerate(followed.trajectory[place]):
+            alike, beginning = _history(followed, modes, first, place, i, frequency_range)
+            trajectory = trajectories.setdefault(number, Trajectory())
+            trajectory.points[place] = TrajectoryPoint(i, alike, beginning, i in record.named.values())
+    return _with_names(list(trajectories.values()), points, names)
+
+
+def _on_grid(place: Place) -> bool:
+    return place[-1] == int(place[-1])
+
+
+def _route(modes: Iterable[Place]) -> Iterator[tuple[Place, list[Place]]]:
+    """Places row by row, each with the one before it and the one above it, as far as they have modes."""
+    seen: set[Place] = set()
+    before: Place | None = None
+    for place in sorted(modes):
+        origins = [before] if before is not None and before[:-1] == place[:-1] else []
+        above = next(
+            (
+                (*place[:axis], place[axis] - 1, *place[axis + 1 :])
+                for axis in reversed(range(len(place) - 1))
+                if place[axis] > 0
+            ),
+            None,
+        )
+        if above in seen:
+            origins.append(above)
+        yield place, origins
+        seen.add(place)
+        before = place
+
+
+def _history(
+    followed: Followed[Place],
+    modes: Mapping[Place, ModeSet],
+    first: set[Place],
+    place: Place,
+    index: int,
+    frequency_range: tuple[float, float],
+) -> tuple[float, Beginning]:
+    """Least similarity since the last point of the grid, and how the trajectory came here."""
+    number, refined, alike = followed.trajectory[place][index], False, 1.0
+    while True:
+        origin = followed.origin[place][index]
+        if origin is None:
+            frequency = float(modes[place].frequencies[index])
+            entered = near_an_end(frequency, frequency_range)
+            return np.nan, (Beginning.START if place in first else Beginning.ENTERED if entered else Beginning.BROKEN)
+        alike = min(alike, followed.similarity[place][index])
+        if _on_grid(origin):
+            return alike, Beginning.REFINED if refined else Beginning.FOLLOWED
+        refined = True
+        place, index = origin, followed.trajectory[origin].index(number)
+
+
+def _with_names(
+    trajectories: list[Trajectory], points: Mapping[Place, PointRecord], names: Sequence[str]
+) -> list[Trajectory]:
+    """Sorted: those with a name as they first have it, then the others by frequency."""
+    carriers: dict[str, list[Trajectory]] = {name: [] for name in names}
+    for place in sorted(p for p, record in points.items() if record.modes is not None and _on_grid(p)):
+        for name, i in points[place].named.items():
+            owner = next(t for t in trajectories if place in t.points and t.points[place].mode == i)
+            if owner.carries is None:
+                owner.carries = name
+                carriers[name].append(owner)
+    ordered = []
+    for name, owners in carriers.items():
+        for k, owner in enumerate(owners, start=1):
+            owner.name = f"{name} {k}" if len(owners) > 1 else name
+            ordered.append(owner)
+
+    def first_frequency(trajectory: Trajectory) -> float:
+        place, point = next(iter(trajectory.points.items()))
+        modes = points[place].modes
+        return float(modes.frequencies[point.mode]) if modes else 0.0
+
+    others = sorted((t for t in trajectories if t.carries is None), key=first_frequency)
+    for k, trajectory in enumerate(others, start=len(ordered) + 1):
+        trajectory.name = f"mode {k}"
+    return [*ordered, *others]

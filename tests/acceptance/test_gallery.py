@@ -1,0 +1,123 @@
+"""Every faulty FMU is caught by the name of its fault, and no good one is failed: the confusion table."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.native_fmu import cached_native
+from orchestrator.acceptance.runner import check_fmu
+from orchestrator.fmi.limits import Limits
+from tests.acceptance.gallery.hostile import HOSTILE
+from tests.acceptance.gallery.members import faulty, good
+
+TABLE = Path(__file__).parent / "gallery" / "README.md"
+OURS = ("gfor", "synchronous_generator_st1", "synchronous_generator_st4b", "two_area_grid")
+LIMITS = Limits(seconds=6.0)
+"""Less than a user's, so that what hangs is given up soon."""
+
+
+def checked(path, binding=None, only=()):
+    return check_fmu(path, binding, LIMITS, only, run_for=0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "only"),
+    [
+        ("hidden_state", "state"),
+        ("sign_bound", "power_balance"),
+        ("delayed", "delay"),
+        ("step_dependent", "step_invariance"),
+        ("rounded_steps", "internal_step"),
+        ("shared", "independence"),
+        ("crash", "runs"),
+        ("undeclared_feedthrough_lag", "feedthrough"),
+        ("reset_parameter", "reset"),
+    ],
+)
+def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, gallery):
+    member = next(m for m in faulty() if m.name == name)
+    found = check_fmu(*gallery(name), LIMITS, (only,), run_for=0.3)
+    assert found.faults == [member.fault]
+    (failure,) = found.failures
+    assert failure.evidence
+    assert failure.remedy
+    clean = check_fmu(*gallery("lag" if name.endswith("lag") else "converter"), LIMITS, (only,), run_for=0.3)
+    assert clean.trusted
+    assert clean.results[-1].verdict == "pass"
+
+
+@pytest.mark.parametrize(
+    ("name", "only", "words"),
+    [
+        ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
+        (
+            "sixty_hertz",
+            "rated_frequency",
+            "so it is made for 60 Hz where 50 Hz is bound",
+        ),
+        (
+            "crash_in_dip",
+            "limits",
+            "in the dip to 0.2 pu at 2.5 s: its process died with SIGSEGV in fmi2DoStep",
+        ),
+    ],
+)
+def test_the_verdict_says_what_happened(name, only, words, gallery):
+    found = check_fmu(*gallery(name), LIMITS, (only,), run_for=0.3)
+    assert words in found.failures[0].evidence
+
+
+@pytest.mark.slow
+def test_the_droop_of_a_converter_whose_q_is_reversed_is_found_in_number(gallery):
+    """By static answers alone: 5 % of the gallery's converter, with the wrong sign."""
+    found = check_fmu(*gallery("q_measured"), LIMITS, ("signs",), run_for=0.3)
+    assert "rises by 5 % a pu of reactive power" in found.failures[0].evidence
+
+
+@pytest.mark.parametrize("name", ["forged_everywhere", "forged_in_binary", "forged_and_stays"])
+def test_an_fmu_does_not_reach_its_verdict(name, gallery):
+    """It writes results to every path and file, and over the memory that it shares; then it ends or stays."""
+    asked = ("fmi_validity", "runs", "repeatability")
+    found = check_fmu(*gallery(name), LIMITS, asked, run_for=0.3)
+    assert [r.check for r in found.results] == ["archive", *asked]
+    assert found.results[2].verdict == "fail"
+    assert not found.trusted
+    assert not any("all is well" in r.evidence for r in found.results)
+
+
+def test_forged_results_do_not_hide_what_is_wrong(gallery):
+    found = check_fmu(*gallery("forged_results"), LIMITS, ("runs", "repeatability"), run_for=0.3)
+    assert found.faults == ["not a number"]
+
+
+@pytest.mark.slow
+def test_the_confusion_table(gallery, fmu_path, tmp_path):
+    rows = [(m.name, "", "", *gallery(m.name), m.only) for m in good()]
+    rows += [(f"{name} (Python-backed)", "", "", fmu_path(name), None) for name in OURS]
+    rows += [(f"{name} (native)", "", "", cached_native(build_model(name)), None) for name in OURS]
+    rows += [(m.name, m.fault, m.thread, *gallery(m.name), m.only) for m in faulty()]
+    plain, _ = gallery("gain")
+    rows += [(name, fault, "", make(tmp_path, plain), None) for name, (make, fault) in HOSTILE.items()]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        reports = list(pool.map(lambda row: checked(*row[3:]), rows))
+    lines, wrong = [], []
+    for (name, fault, thread, *_), report in zip(rows, reports, strict=True):
+        caught = (fault in report.faults) if fault else report.trusted
+        assert not [r for r in report.results if "failed by itself" in r.evidence]
+        also = ", ".join(f for f in report.faults if f != fault)
+        said = f"[{thread}](https://github.com/{thread.replace('#', '/issues/')})" if thread else "—"
+        lines.append(f"| {name} | {fault or '—'} | {said} | {'yes' if caught else 'NO'} | {also or '—'} |")
+        wrong += [] if caught else [f"{name}: {fault or 'good'}, found {report.faults}: {report.failures}"]
+    assert not wrong, "\n".join(wrong)
+    table = "\n".join(
+        ["| FMU | its fault | reported in | caught, or passed if good | also found |", "|---|---|---|---|---|", *lines]
+    )
+    if os.environ.get("GFOR_WRITE_TABLES"):
+        before = TABLE.read_text(encoding="utf-8").partition("| FMU |")[0]
+        TABLE.write_text(f"{before}{table}\n", encoding="utf-8")
+    written = TABLE.read_text(encoding="utf-8")
+    for line in lines:
+        assert " | ".join(line.split(" | ")[:4]) in written, line

@@ -1,0 +1,61 @@
+"""Every threshold of the acceptance checks, from both sides: a defect a little above it, and one a little below."""
+
+import pytest
+
+from orchestrator.acceptance.runner import check_fmu
+from orchestrator.fmi.limits import Limits
+from tests.acceptance.gallery.build import Source, Variable, build
+from tests.acceptance.gallery.members import converter
+
+LIMITS = Limits(seconds=10.0)
+SLIGHT = (Variable("u", 0, "input", 0, "1"), Variable("y", 1, "output", unit="1"),
+          Variable("k", 2, "parameter", 1, "1", variability="tunable"))  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory):
+    """The verdict of one check on an FMU, with its fault."""
+    folder = tmp_path_factory.mktemp("slight")
+
+    def run(source, check):
+        report = check_fmu(build(source, folder), None, LIMITS, (check,), run_for=0.2)
+        result = next(r for r in report.results if r.check == check)
+        return result.verdict, result.fault
+
+    return run
+
+
+def slight(**defines):
+    """A lag with a slight defect."""
+    return Source("slight", "../slight.c", defines, SLIGHT)
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1.025, ("pass", "")), (0.965, ("fail", "wrong base"))])
+def test_a_power_is_as_asked_within_two_percent_of_the_rating(judged, factor, verdict):
+    """The largest of the powers asked for is 0.71 pu of the rating."""
+    assert judged(converter("slight", I_FACTOR=factor), "power_balance") == verdict
+
+
+@pytest.mark.parametrize(("angle", "verdict"), [(1e-7, "pass"), (3e-7, "remark"), (1.2e-4, "remark"), (1.7e-4, "fail")])
+def test_a_current_that_moves_in_steady_state(judged, angle, verdict):
+    """By seven times the angle [rad] by which the start is turned; 1e-6 pu is worth a remark, 1e-3 a fault."""
+    assert judged(converter("slight", FAULT_DRIFT=angle), "steady_state")[0] == verdict
+
+
+@pytest.mark.parametrize(
+    ("leak", "verdict"),
+    [
+        (0.0, ("pass", "")),
+        (1e-11, ("remark", "")),
+        (4e-7, ("remark", "")),
+        (4e-6, ("fail", "hidden state")),
+    ],
+)
+def test_a_saved_state_is_exact_or_said_not_to_be(judged, leak, verdict):
+    """What is forgotten moves the output by about ``leak`` of its range; 1e-12 is said, and 1e-6 is a fault."""
+    assert judged(slight(LEAK=leak, FAULT_HIDDEN=1), "state") == verdict
+
+
+@pytest.mark.parametrize(("noise", "verdict"), [(1e-11, ("pass", "")), (3e-9, ("fail", "not repeatable"))])
+def test_two_runs_are_equal_to_ten_digits(judged, noise, verdict):
+    assert judged(slight(NOISE=noise), "repeatability") == verdict

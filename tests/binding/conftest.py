@@ -1,0 +1,5 @@
+"""Fixtures for bindings."""
+
+from tests.acceptance.conftest import gallery
+
+__all__ = ["gallery"]

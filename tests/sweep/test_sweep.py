@@ -1,0 +1,272 @@
+"""`gfor sweep` as a user meets it, on a case whose answers are known."""
+
+import csv
+import json
+import re
+from functools import partial
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from orchestrator.cases.case import load_case
+from orchestrator.errors import InputError
+from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.processes import Processes
+from orchestrator.points.serial import Serial
+from orchestrator.points.store import PointStore
+from orchestrator.sweep import sweep as sweep_module
+from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.point import compute_point
+from orchestrator.sweep.sweep import plan_sweep, run_sweep
+from tests.support.interruption import interrupted_after
+from tests.sweep.sweep_case import two_oscillators
+
+FULL_TURN = 2 * np.pi
+
+
+@pytest.fixture
+def gfor(gfor):
+    """Run ``gfor sweep``."""
+    return partial(gfor, "sweep")
+
+
+@pytest.fixture
+def case(tmp_path):
+    return two_oscillators(tmp_path)
+
+
+def sweep(case, folder, *vary, executor=None, **settings):
+    plan = plan_sweep(load_case(case), [parse_vary(text) for text in vary], **settings)
+    return run_sweep(plan, executor or Serial(), PointStore(folder))
+
+
+def curve(scenario, name):
+    """Frequencies [Hz] of a trajectory by place."""
+    (trajectory,) = [t for t in scenario.trajectories if t.name == name]
+    return {p: float(scenario.points[p].modes.frequencies[t.mode]) for p, t in trajectory.points.items()}
+
+
+# -- what it says ------------------------------------------------------------------------------------
+
+
+def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
+    out = tmp_path / "out"
+    code, text, err = gfor(case, "--vary", "a1.gain=3:12:7", "--workers", 1, "--out", out)
+    assert (code, err) == (0, "")
+    assert "Trajectories over a1.gain [1/s]" in text
+    assert f"14 points computed. Results in {out}: sweep.nc, sweep.csv, trajectories.png" in text
+    with xr.open_dataset(out / "sweep.nc") as data:
+        assert dict(data.sizes) == {"scenario": 2, "a1.gain": 7, "trajectory": 2, "state": 2, "component": 5}
+        gain = data["a1.gain"].values
+        assert gain == pytest.approx(np.linspace(3, 12, 7))
+        for scenario, other in (("one", FULL_TURN), ("two", 4.0)):
+            here = data.sel(scenario=scenario)
+            assert [str(n) for n in here["trajectory_name"].values] == ["first", "mode 2"]
+            first, second = (here.isel(trajectory=k) for k in (0, 1))
+            assert first["frequency"].values == pytest.approx(np.sqrt(gain * FULL_TURN) / FULL_TURN, rel=1e-5)
+            assert second["frequency"].values == pytest.approx(np.sqrt(other * FULL_TURN) / FULL_TURN, rel=1e-5)
+            assert first["eigenvalue_imag"].values == pytest.approx(first["frequency"].values * FULL_TURN)
+            assert np.all(first["named"] == 1)
+            assert first["component_participation"].sel(component="a1").values == pytest.approx(0.5, abs=1e-3)
+            assert float(second["participation"].sum("state").max()) < 1e-6
+            assert float(first["similarity"][1:].min()) > 0.9
+        assert data["a1.gain"].attrs == {"units": "1/s", "long_name": "Gain"}
+        assert data["frequency"].attrs["units"] == "Hz"
+        assert "small_integrator" in data.attrs["fmus"]
+        assert data.attrs["case_file"] == case.read_text(encoding="utf-8")
+    with (out / "sweep.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 7 * 2
+    assert {"scenario", "a1.gain [1/s]", "trajectory", "damping [%]", "participation a1.x", "beginning"} <= set(rows[0])
+    for name in ("trajectories.png", "named_modes.png", "participation.png"):
+        assert (out / name).stat().st_size > 5000
+
+
+def test_json_is_all_that_is_printed(gfor, case, tmp_path):
+    arguments = ("--scenario", "two", "--vary", "a1.gain=3,6", "--vary", "b2.gain=-2,-1", "--range", "0.2:1.5")
+    code, out, err = gfor(case, *arguments, "--set", "b1.gain=5", "--workers", 1, "--json", "--out", tmp_path)
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    assert content["parameters"][1] == {"name": "b2.gain", "unit": "1/s", "values": [-2, -1]}
+    (scenario,) = content["scenarios"]
+    found = {
+        t["name"]: [(*p["values"].values(), p["frequency_hz"]) for p in t["points"]] for t in scenario["trajectories"]
+    }
+    a = {gain: np.sqrt(gain * FULL_TURN) / FULL_TURN for gain in (3, 6)}
+    b = {gain: np.sqrt(-5 * gain) / FULL_TURN for gain in (-2, -1)}
+    grid = [(x, y) for x in (3, 6) for y in (-2, -1)]
+    assert found["first"] == [(x, y, pytest.approx(a[x], rel=1e-5)) for x, y in grid]
+    assert found["mode 2"] == [(x, y, pytest.approx(b[y], rel=1e-5)) for x, y in grid]
+
+
+def test_a_point_that_fails_is_recorded_and_the_others_are_there(gfor, case, tmp_path):
+    out = tmp_path / "out"
+    arguments = (case, "--scenario", "one", "--vary", "slow.T=-10 ms:0.03:5", "--workers", 1, "--out", out)
+    code, _, err = gfor(*arguments)
+    assert code == 0
+    assert "2 points of 5 failed:" in err
+    assert "one, slow.T = -0.01 s: " in err
+    assert "T must exceed 0; raise it" in err
+    with xr.open_dataset(out / "sweep.nc") as data:
+        assert ["T must exceed 0" in str(text) for text in data["error"].values[0]] == [True, True, False, False, False]
+        assert np.isfinite(data["frequency"].values[0, :, 0]).tolist() == [False, False, True, True, True]
+    with (out / "sweep.csv").open(encoding="utf-8") as file:
+        assert sum("T must exceed 0" in row["error"] for row in csv.DictReader(file)) == 2
+
+
+def test_if_every_point_fails_so_does_the_sweep(gfor, case, tmp_path):
+    code, _, err = gfor(case, "--vary", "slow.T=-2,-1", "--workers", 1, "--out", tmp_path / "out")
+    assert code == 1
+    assert "4 points of 4 failed" in err
+
+
+# -- what cannot be used -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vary", "words"),
+    [
+        ("a1.gain", "is not of the form component.parameter=START:STOP:COUNT"),
+        ("gain=1:2:3", "is not of the form component.parameter=START:STOP:COUNT"),
+        ("a1.gain=1:2", "'1:2' is not of the form START:STOP:COUNT"),
+        ("a1.gain=log:1:2", "'log:1:2' is not of the form"),
+        ("a1.gain=1:2:1", "COUNT = '1'; it must be a whole number from 2 to"),
+        ("a1.gain=1:2:2.5", "COUNT = '2.5'; it must be a whole number"),
+        ("a1.gain=1,,2", "a value of the list is missing"),
+    ],
+)
+def test_text_of_another_form(vary, words):
+    with pytest.raises(ValueError, match=re.escape(words)):
+        parse_vary(vary)
+
+
+@pytest.mark.parametrize(
+    ("vary", "words"),
+    [
+        ("c1.gain=1:2:3", "--vary c1.gain: no component of the chosen scenarios is called 'c1'; they have: a1, a2, b1"),
+        ("a1.gian=1:2:3", "--vary a1.gian: component 'a1' has no variable 'gian'; did you mean gain?"),
+        ("a1.y=1:2:3", "--vary a1.y: y is of causality output; only parameters and inputs can be set"),
+        ("slow.T=1 MW:2 MW:3", "--vary slow.T: '1 MW' is in MW, but s is needed"),
+        ("a1.gain=2:2:3", "--vary a1.gain: the range begins and ends at 2; give two different limits"),
+        ("a1.gain=log:-1:2:3", "a logarithmic range from -1 to 2 passes zero"),
+        ("a1.gain=1,1.0", "--vary a1.gain: a value stands in the list twice"),
+    ],
+)
+def test_values_that_cannot_be_used(gfor, case, tmp_path, vary, words):
+    code, out, err = gfor(case, "--vary", vary, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert words in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_units_logarithms_and_patterns(case):
+    plan = plan_sweep(load_case(case), [parse_vary("slow.T=log:10 ms:1:3"), parse_vary("b?.gain=1,2")], ["one"])
+    assert [axis.values for axis in plan.axes] == [(0.01, 0.1, 1.0), (1.0, 2.0)]
+    assert plan.values((1, 1)) == {"slow.T": 0.1, "b?.gain": 2.0}
+    assert plan.values((1, 0.5)) == {"slow.T": 0.1, "b?.gain": 1.5}
+    assert plan.number_of_points == 6
+
+
+def test_workers_or_a_scheduler(gfor, case):
+    code, _, err = gfor(case, "--vary", "a1.gain=1,2", "--workers", 2, "--scheduler", "tcp://localhost:1")
+    assert code == 2
+    assert "--workers and --scheduler exclude each other" in err
+
+
+# -- following ---------------------------------------------------------------------------------------
+
+
+def test_points_in_between_resolve_what_one_step_cannot(gfor, case, tmp_path):
+    """From 0.28 to 1.95 Hz the ratio of the two amplitudes changes sevenfold: too much to be sure in one step."""
+    result = sweep(case, tmp_path / "out" / "points", "a1.gain=0.5,24", scenarios=["two"])
+    assert result.refined > 0
+    assert result.computed == 2 + result.refined
+    (first,) = [t for t in result.scenarios[0].trajectories if t.name == "first"]
+    assert [p.beginning.name for p in first.points.values()] == ["START", "REFINED"]
+    assert list(first.points) == [(0,), (1,)]  # results are those of the grid
+    arguments = (case, "--scenario", "two", "--vary", "a1.gain=0.5,24", "--workers", 1, "--out", tmp_path / "out")
+    code, out, err = gfor(*arguments)
+    assert code == 0
+    assert "between those of the grid served to recognise modes" in err
+    assert "0 points computed" in out
+
+
+def test_a_mode_beyond_the_range_is_not_followed_there(case, tmp_path):
+    result = sweep(case, tmp_path / "p", "a1.gain=6:60:19", scenarios=["two"], frequency_range=(0.5, 2.0))
+    frequencies = curve(result.scenarios[0], "first 1")
+    inside = [g for g in np.linspace(6, 60, 19) if np.sqrt(g * FULL_TURN) / FULL_TURN <= 2.0]
+    assert [place for (place,) in frequencies] == list(range(len(inside)))
+    assert len(curve(result.scenarios[0], "first 2")) == 19  # the only one that is left to have the name
+
+
+# -- keeping -----------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_sweep_continues(gfor, case, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    arguments = (case, "--vary", "a1.gain=3:12:4", "--workers", 1, "--out", out)
+    monkeypatch.setattr(sweep_module, "compute_point", interrupted_after(5, compute_point))
+    code, text, err = gfor(*arguments)
+    assert (code, text) == (130, "")
+    assert err == f"interrupted: 5 of 8 points are in {out}; the same command continues from there\n"
+    assert len(list((out / "points").glob("*.npz"))) == 5
+    half, *_ = (out / "points").glob("*.npz")
+    half.write_bytes(half.read_bytes()[:300])  # as a power cut may leave it
+    monkeypatch.setattr(sweep_module, "compute_point", compute_point)
+    code, text, _ = gfor(*arguments)
+    assert code == 0
+    assert "4 points computed, 4 were there already" in text
+    code, text, _ = gfor(*arguments)
+    assert "0 points computed, 8 were there already" in text
+
+
+def test_what_a_stored_point_depends_on(case, tmp_path):
+    folder = tmp_path / "p"
+    assert sweep(case, folder, "a1.gain=3:12:4").computed == 8
+    assert sweep(case, folder, "a1.gain=3:15:5").computed == 2  # a longer sweep takes over what is there
+    assert sweep(case, folder, "a1.gain=3:12:4", scenarios=["two"]).computed == 0
+    assert sweep(case, folder, "a1.gain=3:12:4", frequency_range=(0.2, 2.0)).computed == 8
+    assert sweep(case, folder, "a1.gain=3:12:4", step_size=2e-3).computed == 8
+    assert sweep(case, folder, "a1.gain=3:12:4", overrides={"b2.gain": -3.0}).computed == 8
+    case.write_text(case.read_text(encoding="utf-8").replace("gain = 6.28", "gain = 6.29"), encoding="utf-8")
+    assert sweep(case, folder, "a1.gain=3:12:4").computed == 8
+
+
+def test_a_worker_with_another_case_file_refuses(case):
+    plan = plan_sweep(load_case(case), [parse_vary("a1.gain=3:4:2")])
+    task = plan.task(plan.scenarios[0], (0,))
+    case.write_text(case.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+    with pytest.raises(InputError, match="a worker sees another text of this file"):
+        compute_point(task)
+
+
+# -- the same numbers everywhere ---------------------------------------------------------------------
+
+
+def numbers(result):
+    """All that is computed, to the last bit."""
+    return [
+        (sweep.prepared.name, place, *(getattr(record.modes, a).tobytes() for a in ("eigenvalues", "left", "right")))
+        for sweep in result.scenarios
+        for place, record in sorted(sweep.points.items())
+    ]
+
+
+def test_processes_compute_what_one_process_does(case, tmp_path):
+    alone = sweep(case, tmp_path / "alone", "a1.gain=3:12:4")
+    together = sweep(case, tmp_path / "together", "a1.gain=3:12:4", executor=Processes(2))
+    assert alone.computed == together.computed == 8
+    assert numbers(alone) == numbers(together)
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_computes_what_one_process_does(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    vary, scenarios = "grid.X_L=0.1,0.2", ["base", "pod_pq"]
+    alone = sweep("two_area", tmp_path / "alone", vary, scenarios=scenarios)
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        executor = DaskCluster(cluster.scheduler_address)
+        together = sweep("two_area", tmp_path / "together", vary, scenarios=scenarios, executor=executor)
+    assert alone.computed == together.computed == 4
+    assert numbers(alone) == numbers(together)
