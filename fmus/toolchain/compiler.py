@@ -1,6 +1,7 @@
 """A C compiler without a system compiler: ziglang from PyPI, its results kept between runs."""
 
 import hashlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,9 @@ FLAGS = (
 
 # Without a name of its own a Mac library would carry the path of the temporary folder.
 _MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
+
+
+_OWN_HEADER = re.compile(r'#include "(\w+\.h)"\s*$')
 
 
 @cache
@@ -77,8 +81,8 @@ def compile_library(source: str, platform: str) -> Path:
     return library
 
 
-def compile_here(file: Path) -> Path:
-    """Compile a file of C to a shared library for this machine; otherwise as `compile_library`.
+def compile_here(*files: Path) -> Path:
+    """Compile files of C, as one, to a shared library for this machine; see `joined_source`.
 
     Raises
     ------
@@ -88,7 +92,23 @@ def compile_here(file: Path) -> Path:
     platform = host_platform()
     if platform is None:
         raise RuntimeError("there is no compiler for this platform")
-    return compile_library(file.read_text(encoding="utf-8"), platform)
+    return compile_library(joined_source(*files), platform)
+
+
+def joined_source(*files: Path) -> str:
+    """Files of C as one text, with the toolchain's own headers written in; messages name each file and its lines."""
+
+    def header(match: re.Match[str]) -> str:
+        return (Path(__file__).parent / "c" / match[1]).read_text(encoding="utf-8")
+
+    parts = []
+    for file in files:
+        lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+        parts.append(f'#line 1 "{file.name}"\n')
+        for number, line in enumerate(lines, start=2):
+            match = _OWN_HEADER.match(line)
+            parts.append(f'{header(match)}#line {number} "{file.name}"\n' if match else line)
+    return "".join(parts)
 
 
 def compile_for(source: str, target: str, ending: str) -> Path:

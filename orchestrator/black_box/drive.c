@@ -1,15 +1,6 @@
 /* One FMU behind an ideal voltage: for every communication step set the inputs, step, read the outputs.
    `bench.py` calls it. Returns 0, or the status of the first call that is neither OK nor Warning. */
-#include <stddef.h>
-#include <stdint.h>
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
-typedef int (*get_set)(void *, const unsigned *, size_t, double *);
-typedef int (*do_step)(void *, double, double, int);
+#include "fmi.h"
 
 EXPORT int drive(void *component, get_set set_real, get_set get_real, do_step step, const unsigned *input_references,
                  int64_t n_inputs, const unsigned *output_references, int64_t n_outputs, double *inputs,

@@ -1,29 +1,9 @@
 /* The master's inner loop over FMI 2.0 function pointers: gather inputs, set, step, get, and note where outputs went.
    `loop.py` describes the same structures to Python. */
 #include <math.h>
-#include <stddef.h>
-#include <stdint.h>
-#ifdef _WIN32
-#include <windows.h>
-#define EXPORT __declspec(dllexport)
-static double seconds(void) {
-    LARGE_INTEGER ticks, frequency;
-    QueryPerformanceCounter(&ticks);
-    QueryPerformanceFrequency(&frequency);
-    return (double)ticks.QuadPart / (double)frequency.QuadPart;
-}
-#else
-#include <time.h>
-#define EXPORT __attribute__((visibility("default")))
-static double seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-#endif
 
-typedef int (*get_set)(void *, const unsigned *, size_t, double *);
-typedef int (*do_step)(void *, double, double, int);
+#include "clock.h"
+#include "fmi.h"
 
 /* Where one output went since somebody last looked: extremes, the last value and change, and how often it turned. */
 struct track {

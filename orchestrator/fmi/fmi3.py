@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.clocks import MOST_CLOCKS, Clock, start_of
 from orchestrator.fmi.description import FmuDescription
@@ -94,12 +94,8 @@ def adapter_path() -> Path:
     FmuFileError
         If it cannot be compiled here.
     """
-    platform = host_platform()
     try:
-        if platform is None:
-            raise RuntimeError("there is no compiler for this platform")
-        texts = [Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES]
-        return compile_library("\n".join(texts), platform)
+        return compile_here(*(Path(__file__).with_name(name) for name in _SOURCES))
     except (OSError, RuntimeError) as error:
         raise FmuFileError(f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0") from error
 

@@ -5,19 +5,12 @@
    last one: a communication step costs one exchange between the processes and not three. Many steps of one of several
    instances may be asked for at once (RUN). */
 #include <math.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
+#include "clock.h"
+#include "fmi.h"
+
 #ifdef _WIN32
-#include <windows.h>
-#define EXPORT __declspec(dllexport)
-static double seconds(void) {
-    LARGE_INTEGER ticks, frequency;
-    QueryPerformanceCounter(&ticks);
-    QueryPerformanceFrequency(&frequency);
-    return (double)ticks.QuadPart / (double)frequency.QuadPart;
-}
 static void rest(volatile int32_t *word, int32_t value) { Sleep(*word == value ? 1 : 0); }
 static void wake(volatile int32_t *word) {}
 static int is_gone(int64_t process) {
@@ -26,16 +19,9 @@ static int is_gone(int64_t process) {
 }
 static int is_orphan(int64_t parent) { return 0; } /* the parent ends what it started */
 #else
-#define EXPORT __attribute__((visibility("default")))
 #include <signal.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
-static double seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 #ifdef __linux__
 #include <linux/futex.h>
 #include <sys/syscall.h>
@@ -195,9 +181,6 @@ EXPORT int client_do_step(struct mailbox *box, double time, double step, int no_
     box->time = time, box->step = step;
     return exchange(box, STEP | GET);
 }
-
-typedef int (*get_set)(void *, const unsigned *, size_t, double *);
-typedef int (*do_step)(void *, double, double, int);
 
 static int serve(struct mailbox *box, void *component, get_set set_real, get_set get_real, do_step step) {
     int worst = OK, status;

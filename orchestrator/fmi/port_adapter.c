@@ -1,16 +1,8 @@
 /* FMI 2.0 functions that speak the port of this project to the outside, and a foreign FMU's own variables to the inside.
    `bound.py` describes the same structures to Python. A component without a binding never comes here. */
 #include <math.h>
-#include <stddef.h>
-#include <stdint.h>
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 
-typedef int (*get_set)(void *, const unsigned *, size_t, double *);
-typedef int (*do_step)(void *, double, double, int);
+#include "fmi.h"
 
 enum { RECTANGULAR, POLAR, ABC, POWER };
 enum { V_RE, V_IM, I_RE, I_IM, P, Q, FIRST_OTHER };

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.toolchain.compiler import compile_library
+from fmus.toolchain.compiler import compile_library, joined_source
 from orchestrator import fmi
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.coupling.loop import CompiledLoop, PythonLoop
@@ -219,5 +219,5 @@ def test_both_loops_step_it(box, monkeypatch):
 @pytest.mark.parametrize("source", ["mailbox.c", "port_adapter.c"])
 def test_what_is_compiled_can_be_compiled_for_every_platform(source, platform):
     """Only compiled: it runs on the platforms that the tests run on."""
-    text = Path(fmi.__file__).with_name(source).read_text(encoding="utf-8")
+    text = joined_source(Path(fmi.__file__).with_name(source))
     assert compile_library(text, platform).stat().st_size > 1000
