@@ -26,8 +26,12 @@ _WHY = (
     "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
     "integrator, or a limit or dead band close by",
     "it answers differently up and down: it stands at the edge of a limit or of a dead band",
+    "it is linear for small changes only ({narrow}), beyond which a limit or a dead band acts",
 )
 """What it means that a variant of `ComponentLinearization.variants` differs, in their order."""
+
+_SMALL_ONLY = 2
+"""The place of the last; there the linear model is right for what is small enough."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +44,16 @@ class Doubt:
         The one that it moves most.
     shift
         By how much, relative to |λ|.
+    turns
+        Whether a mode may be on the other side of the stability limit. Where the model is right for changes that are
+        small enough, none is.
     """
 
     component: str
     mode: Mode
     shift: float
     why: str
+    turns: bool = False
 
     def __str__(self) -> str:
         m = self.mode
@@ -68,21 +76,29 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
     """
     found = []
     for kind, why in enumerate(_WHY):
-        perturbed = [name for name, c in blocks.components.items() if c.variants]
-        if not perturbed or not modes or _largest(blocks, schedule, model, modes, perturbed, kind)[0] <= LARGEST_SHIFT:
+        perturbed = [name for name, c in blocks.components.items() if len(c.variants) > kind]
+        if not perturbed or not modes:
             continue
-        each = {name: _largest(blocks, schedule, model, modes, [name], kind) for name in perturbed}
-        most = max(each, key=lambda name: each[name][0])
+        together = _shifts(blocks, schedule, model, modes, perturbed, kind)
+        if together.max() <= LARGEST_SHIFT:
+            continue
+        turns = kind != _SMALL_ONLY and _may_turn(modes, together)
+        each = {name: _shifts(blocks, schedule, model, modes, [name], kind) for name in perturbed}
+        most = max(each, key=lambda name: float(each[name].max()))
         # One alone may do less than all together.
-        guilty = [name for name, (shift, _) in each.items() if shift > LARGEST_SHIFT] or [most]
-        found += [Doubt(name, modes[each[name][1]], each[name][0], why) for name in guilty]
+        guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
+        for name in guilty:
+            narrow = blocks.components[name].narrow
+            text = why.format(narrow=", ".join(f"{name}.{what} by {size:g}" for what, size in narrow.items()))
+            worst = int(each[name].argmax())
+            found.append(Doubt(name, modes[worst], float(each[name][worst]), text, turns))
     return found
 
 
-def _largest(
+def _shifts(
     blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode], names: Sequence[str], kind: int
-) -> tuple[float, int]:
-    """Largest relative shift of a mode when some components are as their variant has them, and of which mode."""
+) -> Vector:
+    """Relative shift of every mode when some components are as their variant has them."""
     other = copy.copy(blocks)
     other.components = dict(blocks.components)
     for name in names:
@@ -90,9 +106,14 @@ def _largest(
         other.components[name] = replace(component, **component.variants[kind]._asdict())
     varied = compose(other, schedule)
     if varied.names != model.names:  # even what depends on what directly is another
-        return np.inf, 0
-    shifts = [_shift(model, varied, mode) for mode in modes]
-    return max(shifts), int(np.argmax(shifts))
+        return np.full(len(modes), np.inf)
+    return np.array([_shift(model, varied, mode) for mode in modes])
+
+
+def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
+    """Whether a shift can carry a mode over the stability limit."""
+    sizes = np.array([max(abs(mode.eigenvalue), _SLOWEST) for mode in modes])
+    return bool(np.any(shifts * sizes >= np.abs([mode.eigenvalue.real for mode in modes])))
 
 
 def _shift(model: LinearModel, varied: LinearModel, mode: Mode) -> float:

@@ -240,7 +240,7 @@ def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearMo
         return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
     continuous = _look_at(system, whole_spectrum(system))
     rate = continuous.largest_growth_rate
-    if own.stable is False and continuous.stable and _only_slow(spectrum, own):
+    if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
         slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
         return replace(continuous, step_size=own.step_size, continuous_growth_rate=rate, reason=slow)
     if own.stable is False:

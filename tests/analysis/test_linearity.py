@@ -10,11 +10,13 @@ from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import find_modes
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.coupling.system import System
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.description import read_description
+from orchestrator.study.modes import compute_modes
 from tests.coupling.small_fmus import small_fmu
 
 H = 1e-3
@@ -24,6 +26,7 @@ SHAPES = {
     "smooth": lambda u: u + 3 * u**2 - 5 * u**3,
     "limit": lambda u: ca.fmin(u, 0.0),
     "dead_band": lambda u: u - ca.fmax(-1.5e-5, ca.fmin(1.5e-5, u)),
+    "saturated": lambda u: ca.fmax(-3e-7, ca.fmin(3e-7, u)),
     "rough": lambda u: u + 1e-7 * ca.sin(1e6 * u),
     "one_way_lead": lambda u: u + 0.02 * ca.fabs(u),
 }
@@ -67,8 +70,9 @@ def test_what_is_smooth_is_trusted(shape):
     [
         ("limit", "answers differently up and down"),
         ("one_way_lead", "answers differently up and down"),
-        ("dead_band", "twice the size"),
-        ("rough", "twice the size"),
+        ("dead_band", "linear for small changes only (shaped.u by 1e-06)"),
+        ("saturated", "linear for small changes only (shaped.u by 1e-07)"),
+        ("rough", "linear for small changes only (shaped.u by 1e-07)"),
     ],
 )
 def test_what_depends_on_the_perturbation_is_questioned_by_name(shape, why):
@@ -83,6 +87,27 @@ def test_a_shift_is_what_the_other_answer_makes_of_the_mode():
     (doubt,), modes = judged("limit")
     assert modes[0].eigenvalue == pytest.approx(3j / np.sqrt(2), abs=0.01)
     assert doubt.shift == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_limit_close_by_does_not_change_the_modes():
+    """The usual perturbation of 1e-5 would find a thirtieth of the slope."""
+    (doubt,), modes = judged("saturated")
+    assert modes[0].eigenvalue == pytest.approx(3j, abs=0.01)
+    assert not doubt.turns
+
+
+def test_a_mode_that_an_edge_may_turn_is_named_so():
+    found, _ = judged("limit")
+    assert all(doubt.turns for doubt in found)
+
+
+@pytest.mark.parametrize("limit", [0.01, 0.1])
+def test_the_limit_of_a_damping_controller_does_not_decide_its_stability(limit):
+    """Growth at 45.7 Hz, with its own directional derivatives as with a perturbation, whatever the output's limit."""
+    (prepared,) = load_case("two_area").prepare(["pod_q"], {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit})
+    stability = compute_modes(load_case("two_area"), prepared).stability
+    assert stability.stable is False
+    assert stability.largest_growth_rate == pytest.approx(2.773, abs=2e-3)
 
 
 def test_a_drift_counts_by_the_second_however_short_the_step():
