@@ -20,7 +20,6 @@ from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, InputError
@@ -115,7 +114,6 @@ def linearize_with_box(
 
 
 def modes_with_boxes(
-    case: Case,
     prepared: PreparedScenario,
     master: Master,
     frequency_range: tuple[float, float],
@@ -131,7 +129,7 @@ def modes_with_boxes(
     """
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
-        return modes_of(case, prepared, master, frequency_range, critical)
+        return modes_of(prepared, master, frequency_range, critical)
     residual = _check_still(master, boxes)
     known = {}
     for name in boxes:
@@ -139,7 +137,7 @@ def modes_with_boxes(
         known[name] = _as_component(name, fit(response))
         residual = max(residual, moved)
     point = OperatingPoint(residual, residual / master.clock.step_size, residual, 0, {})
-    return modes_from(case, prepared, master, point, Blocks(master, known=known), frequency_range, critical)
+    return modes_from(prepared, master, point, Blocks(master, known=known), frequency_range, critical)
 
 
 def _respond(

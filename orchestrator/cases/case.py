@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,11 @@ import tomli_w
 from pydantic import ValidationError
 
 from fmus.toolchain.cache import cache_directory
-from orchestrator.cases.locate import line_of
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario, Preparer
-from orchestrator.cases.schema import CaseTable, ScenarioTable, Value
+from orchestrator.cases.schema import CaseTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.ssp.reading import read_ssp
@@ -27,40 +27,8 @@ def built_in_cases() -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
 
 
-@dataclass(frozen=True)
-class Case:
-    """A case file, or what an SSP comes to as one.
-
-    Attributes
-    ----------
-    table
-        Its contents. Where the form was wrong, the wrong entries are left out and stand in
-        ``problems``, so that what the rest means can be checked as well.
-    text
-        Of the case file.
-    path
-        The file itself.
-    directory
-        Where relative paths in the tables start.
-    numbered
-        Whether the text is the file's own, so that its lines mean something to the user.
-    """
-
-    table: CaseTable
-    text: str
-    path: Path
-    problems: tuple[Problem, ...]
-    directory: Path
-    numbered: bool = True
-
-    @property
-    def name(self) -> str:
-        return self.table.name
-
-    @property
-    def scenarios(self) -> dict[str, ScenarioTable]:
-        """By name; a case without scenarios has one, named as the case."""
-        return self.table.scenarios or {self.table.name: ScenarioTable()}
+class Case(CaseDefinition):
+    """A case whose scenarios can be prepared."""
 
     def prepare(
         self,
@@ -126,12 +94,7 @@ class Case:
     def _preparer(
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
-        scenario = self.scenarios[name]
-        return Preparer(self.table, name, scenario, dict(overrides or {}), self.directory, self.place, parameters)
-
-    def place(self, *path: str | int) -> str:
-        """A key path as text, with its line in the file."""
-        return _place(self.text if self.numbered else "", path)
+        return Preparer(self, name, dict(overrides or {}), parameters)
 
 
 def load_case(name_or_path: str | Path) -> Case:
@@ -181,9 +144,9 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
             removed = False
             for detail in error.errors():
                 location = _location(raw, detail["loc"])
-                known = any(p.place == _place(text, location) for p in problems)
+                known = any(p.place == place_in(text, location) for p in problems)
                 if not (known and detail["type"] == "missing"):  # missing because it was wrong and taken out
-                    problem = Problem(_place(text, location), _schema_message(detail))
+                    problem = Problem(place_in(text, location), _schema_message(detail))
                     problems += [] if problem in problems else [problem]
                 removed |= _take_out(raw, location, detail["type"])
             if not removed:
@@ -239,9 +202,3 @@ def _schema_message(detail: Any) -> str:
             seen = detail.get("input")
             shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""
             return str(detail["msg"]).removeprefix("Value error, ") + shown
-
-
-def _place(text: str, path: Sequence[str | int]) -> str:
-    label = ".".join(f'"{p}"' if "." in str(p) else str(p) for p in path)
-    line = line_of(text, path)
-    return f"line {line}, {label}" if line and label else label

@@ -39,3 +39,10 @@ def _keys(text: str) -> tuple[tuple[int, tuple[str, ...]], ...]:
 
 def _parts(key: str) -> tuple[str, ...]:
     return tuple(next(part for part in match if part) for match in _PART.findall(key) if any(match))
+
+
+def place_in(text: str, path: Sequence[str | int]) -> str:
+    """A key path as text, with its line in the file."""
+    label = ".".join(f'"{p}"' if "." in str(p) else str(p) for p in path)
+    line = line_of(text, path)
+    return f"line {line}, {label}" if line and label else label

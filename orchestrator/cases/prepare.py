@@ -4,7 +4,6 @@ import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
@@ -12,7 +11,8 @@ from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.assignment import assign_values
-from orchestrator.cases.draft import Draft, Place
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.draft import Draft
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.layers import value_layers
 from orchestrator.cases.native import is_native
@@ -20,7 +20,7 @@ from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import check_plausibility
 from orchestrator.cases.power_flow import PowerFlow
-from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable, Value
+from orchestrator.cases.schema import ComponentTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
@@ -39,6 +39,8 @@ class PreparedScenario:
 
     Attributes
     ----------
+    case
+        The case that the scenario is of.
     record
         Names ``component.variable`` of what is recorded, every ``record_every`` communication steps.
     power_flow
@@ -49,6 +51,7 @@ class PreparedScenario:
         Data that are most unusual, each with its place: see `plausibility`.
     """
 
+    case: CaseDefinition
     name: str
     title: str
     system: System
@@ -81,18 +84,17 @@ class Preparer:
 
     def __init__(
         self,
-        case: CaseTable,
+        case: CaseDefinition,
         name: str,
-        scenario: ScenarioTable,
         overrides: dict[str, Value],
-        directory: Path,
-        place: Place,
         parameters: Sequence[ParameterFile] = (),
     ) -> None:
-        self.draft = draft = Draft(case, name, scenario, directory, place)
+        scenario = case.scenarios[name]
+        self._case = case
+        self.draft = draft = Draft(case.table, name, scenario, case.directory, case.place)
         draft.layers = value_layers(draft, parameters, overrides)
         self._read_network()
-        self._everything = dict(case.components) | unit_components(draft)
+        self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)
         draft.tables = {n: t for n, t in self._everything.items() if n not in scenario.remove}
 
@@ -129,6 +131,7 @@ class Preparer:
         if draft.problems or clock is None:
             return None
         return PreparedScenario(
+            case=self._case,
             name=draft.name,
             title=draft.scenario.title or draft.name,
             system=draft.system,

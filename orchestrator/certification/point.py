@@ -171,7 +171,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
             _keep_modes(result, boxed.model, None)
         else:
-            found = modes_of(case, prepared, master, COMPUTED)
+            found = modes_of(prepared, master, COMPUTED)
             result.residual, result.warnings = found.operating_point.residual, found.warnings
             _keep_modes(result, found.model, found.stability)
         f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)

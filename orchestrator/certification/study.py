@@ -7,7 +7,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.certification.acceptance import Acceptance
@@ -154,9 +153,9 @@ def certify(
     """
     request.check()
     controllers = damping_controllers(bound_fmu(request.fmu, request.binding), request)
-    case, prepared = _laid_case(request, controllers, folder)
+    prepared = _laid_case(request, controllers, folder)
     description = prepared[WITH].system.components[CONVERTER].description
-    tasks = tasks_of(case, prepared, request, controllers)
+    tasks = tasks_of(prepared, request, controllers)
     points: dict[tuple[str, float], PointResult] = {}
     stored = 0
     store = PointStore(folder / "points")
@@ -166,26 +165,31 @@ def certify(
     event = prepared[WITH].events[0].time
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
     values = prepared[WITH].values
-    return Certification(request, description, controllers, event, case.path, values, points, verdicts, stored)
+    return Certification(
+        request, description, controllers, event, prepared[WITH].case.path, values, points, verdicts, stored
+    )
 
 
 def _laid_case(
     request: CertificationRequest, controllers: DampingControllers, folder: Path
-) -> tuple[Case, dict[str, PreparedScenario]]:
-    """The study's case in the folder; what is there already stays as it is where the request is refused."""
+) -> dict[str, PreparedScenario]:
+    """Both scenarios of the study's case, which is written into the folder.
+
+    Where the request is refused, what is there already stays as it is.
+    """
     first = {"grid.X_L": request.reactances[0]}
 
-    def prepared(case: Case) -> dict[str, PreparedScenario]:
+    def prepared(place: Path) -> dict[str, PreparedScenario]:
+        case = write_case(request, controllers.settings, place)
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
         try:
-            prepared(write_case(request, controllers.settings, Path(trial)))
+            prepared(Path(trial))
         except CaseError as error:
             raise _refused(request, error, trial) from error
-    case = write_case(request, controllers.settings, folder)
-    return case, prepared(case)
+    return prepared(folder)
 
 
 def _refused(request: CertificationRequest, error: CaseError, trial: str) -> CaseError:
@@ -206,7 +210,6 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str) -> Cas
 
 
 def tasks_of(
-    case: Case,
     prepared: Mapping[str, PreparedScenario],
     request: CertificationRequest,
     controllers: DampingControllers,
@@ -217,13 +220,13 @@ def tasks_of(
         WITHOUT: dict(request.study_values),
         WITH: {**request.study_values, **own},
     }
-    without = _tasks(case, prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
-    having = _tasks(case, prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
+    without = _tasks(prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
+    having = _tasks(prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
     return [task for pair in zip(without, having, strict=True) for task in pair]
 
 
 def _tasks(
-    case: Case, prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
+    prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
 ) -> list[PointTask]:
     """One scenario at all reactances."""
     # The case file names the binding, if there is one: what that says is in the scenario's content, where it matters.
@@ -233,7 +236,7 @@ def _tasks(
         "overrides": sorted(values.items()),
         "black box": black_box,
     }
-    place, mark = reference_to(case), fingerprint(case)
+    place, mark = reference_to(prepared.case), fingerprint(prepared.case)
     return [
         PointTask(place, mark, prepared.name, X_L, key_of({**content, "X_L": X_L}), black_box) for X_L in reactances
     ]

@@ -38,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Modes of a case's scenarios with one component identified, beside those from its states where it shows them."""
-    case, scenarios = prepare(options)
+    scenarios = prepare(options)
     console = make_console(stderr=options.json)
-    folder = made_folder(options.out or Path("results") / f"{case.name}_black_box")
+    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_black_box")
     output = []
     verdicts: dict[str, Stability] = {}
     for prepared in scenarios:
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
             restore = False if options.no_state else None
             system = linearize_with_box(master, options.component, excitation_of(options), restore=restore)
             box = is_black_box(master.components[options.component])
-            white = [] if box else modes_of(case, prepared, master, (0.1, 2.0)).modes
+            white = [] if box else modes_of(prepared, master, (0.1, 2.0)).modes
         verdicts[prepared.title] = judge(system.model)
         passive = passivity(system.response)
         save_identification(system.response, system.identified, passive, folder / prepared.name)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import assignment, seconds
@@ -44,13 +44,13 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def prepare(options: argparse.Namespace) -> tuple[Case, list[PreparedScenario]]:
-    """The case with its scenarios, as the options have them."""
+def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
+    """The scenarios of a case, as the options have them."""
     case = load_case(options.case)
     stop = getattr(options, "stop", None)
     scenarios = case.prepare(options.scenario, dict(options.set), options.step, stop, parameters(options))
     print_questions(scenarios)
-    return case, scenarios
+    return scenarios
 
 
 def parameters(options: argparse.Namespace) -> list[ParameterFile]:

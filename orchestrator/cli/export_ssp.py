@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.archive import write_archive
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         If several scenarios are to go into one file, or it cannot be written.
     """
     out: Path | None = options.out
-    case, scenarios = prepare(options)
+    scenarios = prepare(options)
     single = out is not None and out.suffix.lower() == ".ssp"
     if single and len(scenarios) > 1:
         names = ", ".join(s.name for s in scenarios)
@@ -52,16 +51,17 @@ def run(options: argparse.Namespace) -> int:
             f"--out {out}: an SSP holds one scenario, not {names}; choose with --scenario, or give a folder"
         )
     for prepared in scenarios:
-        target = out if out is not None and single else (out or Path()) / f"{case.name}_{prepared.name}.ssp"
+        target = out if out is not None and single else (out or Path()) / f"{prepared.case.name}_{prepared.name}.ssp"
         try:
-            _write(case, prepared, target)
+            _write(prepared, target)
         except OSError as error:
             raise InputError(f"--out {target}: it cannot be written: {error.strerror}; choose another place") from error
         print(target)
     return 0
 
 
-def _write(case: Case, prepared: PreparedScenario, target: Path) -> None:
+def _write(prepared: PreparedScenario, target: Path) -> None:
+    case = prepared.case
     tables: dict[str, Any] = case.table.model_dump(
         mode="json", by_alias=True, exclude_none=True, exclude_unset=True, include=_TABLES
     )

@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.interop.masters import MASTERS, master_rules
@@ -34,12 +33,12 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
     return master_rules(options.like) if options.like else None
 
 
-def run(case: Case, scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace) -> int:
+def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace) -> int:
     """Run scenarios as another master would; their trajectories are all that is written."""
     order = options.order.split(",") if options.order else None
-    folder = options.out or Path("results") / f"{case.name}_like_{rules.name}"
+    folder = options.out or Path("results") / f"{scenarios[0].case.name}_like_{rules.name}"
     for prepared in scenarios:
-        dataset = run_like(case, prepared, rules, order)
+        dataset = run_like(prepared, rules, order)
         path = folder / prepared.name / "trajectory"
         save_dataset(dataset, path)
         print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")

@@ -45,7 +45,7 @@ def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, b
     scenario = _one("--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}")
     (prepared,) = case.prepare([scenario], {"*.native": True} if options.native else {})
     component = _component(options.component, models[0], prepared)
-    return linear_model_members(component_model(case.name, prepared, component))
+    return linear_model_members(component_model(prepared, component))
 
 
 def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> str:

@@ -34,17 +34,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Linearise every scenario and write its model."""
-    case, scenarios = prepare(options)
-    folder = made_folder(options.out or Path("results") / f"{case.name}_linear")
+    scenarios = prepare(options)
+    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_linear")
     verdicts: dict[str, Stability] = {}
     lines = []
     for prepared in scenarios:
         inputs = options.input or default_inputs(prepared)
-        outputs = options.output or default_outputs(case, prepared)
+        outputs = options.output or default_outputs(prepared)
         model, point, verdicts[prepared.title] = linear_model(
             prepared, inputs, outputs, as_continuous=options.continuous
         )
-        paths = save_linear_model(model, point, verdicts[prepared.title], case, prepared, folder / prepared.name)
+        paths = save_linear_model(model, point, verdicts[prepared.title], prepared, folder / prepared.name)
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         lines.append(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")

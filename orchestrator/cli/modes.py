@@ -4,7 +4,6 @@ import argparse
 import json
 from pathlib import Path
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
@@ -50,38 +49,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for."""
-    case, scenarios = prepare(options)
+    scenarios = prepare(options)
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = made_folder(options.out) if options.out else None
-    results = [_modes(case, prepared, options) for prepared in scenarios]
+    results = [_modes(prepared, options) for prepared in scenarios]
     written = []
     if folder:
         from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
 
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
-        written += [path.name for path in save_modes(case, results, folder)]
+        written += [path.name for path in save_modes(results, folder)]
     if options.json:
-        print(json.dumps(modes_json(case, scenarios[0].step_size, results), indent=1, ensure_ascii=False))
+        print(json.dumps(modes_json(results), indent=1, ensure_ascii=False))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_verdicts(console, results)
     print_warnings(results)
     for result in results:
         console.print(tables.all_modes(result), "")
-    print_named_modes(console, case, results)
+    print_named_modes(console, results)
     print_sources(console, results)
     if folder:
         console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
     return exit_code(options, [r.stability for r in results])
 
 
-def _modes(case: Case, prepared: PreparedScenario, options: argparse.Namespace) -> ModesResult:
+def _modes(prepared: PreparedScenario, options: argparse.Namespace) -> ModesResult:
     if not options.black_box:
-        return compute_modes(case, prepared, options.range, options.critical, directional=options.directional)
+        return compute_modes(prepared, options.range, options.critical, directional=options.directional)
     from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - fitting: a second to import
 
     if options.directional:
         raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
     with running(prepared) as master:
-        return modes_with_boxes(case, prepared, master, options.range, options.critical)
+        return modes_with_boxes(prepared, master, options.range, options.critical)

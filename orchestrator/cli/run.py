@@ -9,7 +9,6 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.cases.case import Case
 from orchestrator.cli import like
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
@@ -45,10 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the scenarios one after the other; each is written as soon as it is done."""
     rules = like.rules_of(options)
-    case, scenarios = prepare(options)
+    scenarios = prepare(options)
     if rules is not None:
-        return like.run(case, scenarios, rules, options)
-    folder = made_folder(options.out or Path("results") / case.name)
+        return like.run(scenarios, rules, options)
+    folder = made_folder(options.out or Path("results") / scenarios[0].case.name)
     console = make_console(stderr=options.json)
     results: list[RunResult] = []
     stopped: tuple[str, BaseException] | None = None
@@ -60,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
                 bar.update(task, completed=done, total=total)
 
             try:
-                result = run_scenario(case, prepared, observers=[Progress(report)], linear=options.linear)
+                result = run_scenario(prepared, observers=[Progress(report)], linear=options.linear)
             except (CosimError, KeyboardInterrupt) as error:
                 if not results:
                     raise
@@ -73,11 +72,11 @@ def run(options: argparse.Namespace) -> int:
             if result.failure:
                 stopped = (prepared.name, result.failure)
                 break
-    plots = save_study(case, results, folder)
+    plots = save_study(results, folder)
     if options.json:
         print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
     else:
-        _print(console, case, results)
+        _print(console, results)
         console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
                       f"step_size.csv, summary.json, "
                       f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
@@ -96,7 +95,7 @@ def _end(scenario: str, error: BaseException, folder: Path) -> int:
     return INTERRUPTED if interrupted else 1
 
 
-def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
+def _print(console: Console, results: Sequence[RunResult]) -> None:
     modes = [r.modes for r in results]
     for r in results:
         for finding in r.went_unstable:
@@ -104,12 +103,12 @@ def _print(console: Console, case: Case, results: Sequence[RunResult]) -> None:
             console.print(f"[bold red]UNSTABLE in the simulation[/]: {words}", soft_wrap=True, highlight=False)
     print_verdicts(console, modes)
     console.print(tables.steady_states(modes), "")
-    print_named_modes(console, case, modes)
+    print_named_modes(console, modes)
     print_sources(console, modes)
     if any(r.ring_down for r in results):
         console.print("", tables.ring_downs(results))
     if any(r.shifts for r in results):
         console.print("", tables.mode_shifts(results))
     if any(r.linear is not None for r in results):
-        console.print("", tables.linear_differences(case, results))
+        console.print("", tables.linear_differences(results))
     console.print("", tables.run_statistics(results), "")

@@ -8,7 +8,6 @@ from rich.markup import escape
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as ProgressBar
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.report.linearised import exceptions_in_words
@@ -39,13 +38,14 @@ def progress_bar(console: Console) -> ProgressBar:
     return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
 
 
-def print_named_modes(console: Console, case: Case, results: Sequence[ModesResult]) -> None:
+def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
+    reference = results[0].prepared.case.table.reference
     if any(r.electromechanical for r in results):
-        title = case.table.reference.title if case.table.reference else None
+        title = reference.title if reference else None
         console.print(tables.named_modes(results, title))
-        if case.table.reference and any(r.references for r in results):
-            console.print(f"{title}: {case.table.reference.source}", style="dim", soft_wrap=True)
+        if reference and any(r.references for r in results):
+            console.print(f"{title}: {reference.source}", style="dim", soft_wrap=True)
     if any(r.swing and (r.named or r.modes) for r in results):
         console.print("", tables.mode_shapes(results), "")
 

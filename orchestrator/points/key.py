@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import BUILT_IN, Case, load_case
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
@@ -37,12 +38,12 @@ def component_content(description: FmuDescription) -> list[str]:
     return [_file_hash(description.path, status.st_mtime_ns, status.st_size), port]
 
 
-def fingerprint(case: Case) -> str:
+def fingerprint(case: CaseDefinition) -> str:
     """Hash of a case file's text and of this package's code."""
     return hashlib.sha256(f"{_code()}\0{case.text}".encode()).hexdigest()[:32]
 
 
-def reference_to(case: Case) -> str:
+def reference_to(case: CaseDefinition) -> str:
     """Name by which any worker finds a case: of a built-in one, or the path of a file that all can read."""
     path = case.path.resolve()
     return path.parent.name if path.parent.parent == BUILT_IN.resolve() else str(path)

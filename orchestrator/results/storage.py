@@ -11,19 +11,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 
 
-def provenance(case: Case, prepared: PreparedScenario) -> dict[str, str | float]:
+def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     """What a result was made from: case text, values, versions, FMU guids, step and schedule."""
     packages = ("gfor-cosim", "casadi", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     return {
-        "case": case.name,
+        "case": prepared.case.name,
         "scenario": prepared.name,
         "title": prepared.title,
-        "case_file": case.text,
+        "case_file": prepared.case.text,
         "values": json.dumps(prepared.values),
         "events": "; ".join(map(str, prepared.events)),
         "step_size_s": prepared.step_size,
@@ -47,7 +46,7 @@ class Recorded(Protocol):
     def values(self) -> NDArray[np.float64]: ...
 
 
-def trajectory_dataset(recorder: Recorded, case: Case, prepared: PreparedScenario) -> xr.Dataset:
+def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:
     """Recorded variables as a labelled dataset over time [s]."""
     components = prepared.system.components
     data = {}
@@ -57,7 +56,7 @@ def trajectory_dataset(recorder: Recorded, case: Case, prepared: PreparedScenari
         attributes = {"units": info.unit, "long_name": f"{component}: {info.description}"}
         data[name] = ("time", recorder.values[:, column].copy(), attributes)
     time = ("time", recorder.times.copy(), {"units": "s", "long_name": "Time"})
-    return xr.Dataset(data, coords={"time": time}, attrs=provenance(case, prepared))
+    return xr.Dataset(data, coords={"time": time}, attrs=provenance(prepared))
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:

@@ -10,7 +10,7 @@ from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.study.modes import running
 
 
-def component_model(case: str, prepared: PreparedScenario, name: str) -> EmbeddedModel:
+def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
     """The continuous linear model of one component at the scenario's steady state.
 
     It is made of the FMU's own directional derivatives where it gives them, else by perturbation. Its inputs and
@@ -58,7 +58,7 @@ def component_model(case: str, prepared: PreparedScenario, name: str) -> Embedde
         parameters=parameters,
         units={v: info[v].unit for v in (*c.states, *inputs, *outputs, *parameters)},
         origin={
-            "case": case,
+            "case": prepared.case.name,
             "scenario": prepared.name,
             "component": name,
             "communication_step_s": prepared.step_size,

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.results.signals import relative_difference
 from orchestrator.results.storage import save_dataset, save_json, save_table
@@ -28,13 +27,13 @@ def save_run(result: RunResult, folder: Path) -> None:
     save_table(_mode_rows([result.modes]), scenario / "modes.csv")
 
 
-def save_modes(case: Case, results: Sequence[ModesResult], folder: Path) -> list[Path]:
+def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     """Write modes, participation and shapes of all scenarios; return the plots."""
     folder.mkdir(parents=True, exist_ok=True)
     save_table(_mode_rows(results), folder / "modes.csv")
     save_table(_participation_rows(results), folder / "participation.csv")
     save_table(_shape_rows(results), folder / "mode_shapes.csv")
-    reference = case.table.reference
+    reference = results[0].prepared.case.table.reference
     circles = f"; circles: {reference.title}" if reference and any(r.references for r in results) else ""
     plots = [folder / "eigenvalues.png"]
     plot_eigenvalues(results, f"Modes (large: electromechanical{circles})", plots[0])
@@ -44,18 +43,19 @@ def save_modes(case: Case, results: Sequence[ModesResult], folder: Path) -> list
     return plots
 
 
-def save_study(case: Case, results: Sequence[RunResult], folder: Path) -> list[Path]:
+def save_study(results: Sequence[RunResult], folder: Path) -> list[Path]:
     """Write what concerns all scenarios together; return the plots."""
+    case = results[0].modes.prepared.case
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "case.toml").write_text(case.text, encoding="utf-8")
     save_table(_shift_rows(results), folder / "step_size.csv")
-    save_json(_summary(case, results), folder / "summary.json")
+    save_json({"case": case.name, "scenarios": [summary_of(r) for r in results]}, folder / "summary.json")
     plots = []
     for table in case.table.plots:
         path = folder / f"{table.name}.png"
         if plot_signals(table, results, path):
             plots.append(path)
-    return [*plots, *save_modes(case, [r.modes for r in results], folder)]
+    return [*plots, *save_modes([r.modes for r in results], folder)]
 
 
 def _mode_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
@@ -131,10 +131,6 @@ def _shift_rows(results: Sequence[RunResult]) -> list[dict[str, Any]]:
         for r in results
         for s in r.shifts
     ]
-
-
-def _summary(case: Case, results: Sequence[RunResult]) -> dict[str, Any]:
-    return {"case": case.name, "scenarios": [summary_of(r) for r in results]}
 
 
 def summary_of(result: RunResult) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import xarray as xr
 
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.observers import Observer
 from orchestrator.interop.emulation import emulate
@@ -14,7 +13,6 @@ from orchestrator.results.storage import trajectory_dataset
 
 
 def run_like(
-    case: Case,
     prepared: PreparedScenario,
     rules: MasterRules,
     order: Sequence[str] | None = None,
@@ -34,7 +32,7 @@ def run_like(
         prepared.events, order, observers,
     )  # fmt: skip
     schedule = rules.schedule(tuple(prepared.system.components), order)
-    dataset = trajectory_dataset(emulation, case, replace(prepared, schedule=schedule))
+    dataset = trajectory_dataset(emulation, replace(prepared, schedule=schedule))
     return dataset.assign_attrs(
         like=f"{rules.title}: first inputs {rules.first_inputs}, rows {rules.early_label} steps ahead of their time, "
         f"{'after' if rules.after_exchange else 'before'} the exchange"

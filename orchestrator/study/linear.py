@@ -10,7 +10,6 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.told_step import as_if_told
@@ -31,8 +30,9 @@ def default_inputs(prepared: PreparedScenario) -> list[str]:
     return list(dict.fromkeys(changed))
 
 
-def default_outputs(case: Case, prepared: PreparedScenario) -> list[str]:
+def default_outputs(prepared: PreparedScenario) -> list[str]:
     """What the case plots or reads a ring-down from, as far as the scenario has it."""
+    case = prepared.case
     expressions = [panel.signal for plot in case.table.plots for panel in plot.panels]
     if case.table.analysis.ring_down:
         expressions.append(case.table.analysis.ring_down.signal)

@@ -10,7 +10,6 @@ import scipy.io
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.steady_state import OperatingPoint
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.results.storage import provenance, save_json, save_table
 
@@ -19,7 +18,6 @@ def save_linear_model(
     model: StateSpace,
     point: OperatingPoint,
     stability: Stability,
-    case: Case,
     prepared: PreparedScenario,
     folder: Path,
 ) -> list[Path]:
@@ -36,7 +34,7 @@ def save_linear_model(
             "step_size": model.step_size or 0.0,  # as MATLAB's ss: 0 is continuous
             "operating_point": np.array(operating_point).reshape(-1, 1),
             "stability": json.dumps(stability.as_json()),
-            "provenance": json.dumps({**provenance(case, prepared), "linearised": dict(model.sources)}),
+            "provenance": json.dumps({**provenance(prepared), "linearised": dict(model.sources)}),
         },
     )
     entries = {

@@ -19,7 +19,7 @@ from orchestrator.analysis.resolution import check_resolution
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.areas import areas_of
-from orchestrator.cases.case import Case
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
@@ -101,7 +101,6 @@ class ModesResult:
 
 
 def compute_modes(
-    case: Case,
     prepared: PreparedScenario,
     frequency_range: tuple[float, float] = (0.1, 2.0),
     critical: float | None = None,
@@ -121,7 +120,7 @@ def compute_modes(
         Linearise with the FMUs' own directional derivatives instead of by perturbation.
     """
     with running(prepared) as master:
-        return modes_of(case, prepared, master, frequency_range, critical, directional=directional)
+        return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
 
 def running(prepared: PreparedScenario) -> Master:
@@ -130,7 +129,6 @@ def running(prepared: PreparedScenario) -> Master:
 
 
 def modes_of(
-    case: Case,
     prepared: PreparedScenario,
     master: Master,
     frequency_range: tuple[float, float],
@@ -142,11 +140,10 @@ def modes_of(
     point = find_operating_point(master)
     step_aware = any(told_parameters(master, name) for name in master.components)
     blocks = Blocks(master, derivatives=not step_aware, directional=directional)
-    return modes_from(case, prepared, master, point, blocks, frequency_range, critical)
+    return modes_from(prepared, master, point, blocks, frequency_range, critical)
 
 
 def modes_from(
-    case: Case,
     prepared: PreparedScenario,
     master: Master,
     point: OperatingPoint,
@@ -165,7 +162,7 @@ def modes_from(
         spectrum: Spectrum | None = everything
         swinging = [mode for mode in everything.modes if mode.is_oscillation]
         shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
-        candidates = named_modes(case, model, swinging)
+        candidates = named_modes(prepared.case, model, swinging)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         spectrum = whole_spectrum(model)
@@ -173,14 +170,14 @@ def modes_from(
     stability = confirmed(master, blocks, model, judge(model, spectrum, system))
     unstable = stability.cause is Cause.COUPLING
     step = check_resolution(master, model, system, shown, frequency_range, coupling_unstable=unstable)
-    analysis = case.table.analysis
+    analysis = prepared.case.table.analysis
     return ModesResult(
         prepared=prepared,
         operating_point=point,
         model=model,
         modes=shown,
         named=named,
-        references=_references(case, prepared),
+        references=_references(prepared),
         warnings=(
             *map(str, prepared.questions),
             *_warnings(stability),
@@ -234,7 +231,7 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
     )
 
 
-def named_modes(case: Case, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
+def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
     """The modes whose shape the case describes."""
 
     def states(patterns: Sequence[str]) -> list[str]:
@@ -264,8 +261,8 @@ def _warnings(stability: Stability) -> tuple[str, ...]:
     )
 
 
-def _references(case: Case, prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:
-    table = case.table.reference
+def _references(prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:
+    table = prepared.case.table.reference
     if table is None or not all(_same(prepared.values.get(name), value) for name, value in table.when.items()):
         return {}
     return table.modes.get(prepared.name, {})
@@ -275,11 +272,12 @@ def _same(value: Any, wanted: Any) -> bool:
     return value is not None and bool(np.isclose(float(value), float(wanted)))
 
 
-def modes_json(case: Case, step_size: float, results: Sequence[ModesResult]) -> Mapping[str, Any]:
-    """The machine-readable form of `gfor modes`."""
+def modes_json(results: Sequence[ModesResult]) -> Mapping[str, Any]:
+    """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step."""
+    first = results[0].prepared
     return {
-        "case": case.name,
-        "step_size_s": step_size,
+        "case": first.case.name,
+        "step_size_s": first.step_size,
         "scenarios": [
             {
                 "name": r.prepared.name,

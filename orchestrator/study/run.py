@@ -9,7 +9,6 @@ from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.state_access import obstacle
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.observers import Observer
@@ -76,7 +75,6 @@ class RunResult:
 
 
 def run_scenario(
-    case: Case,
     prepared: PreparedScenario,
     frequency_range: tuple[float, float] = (0.1, 2.0),
     observers: Sequence[Observer] = (),
@@ -94,7 +92,7 @@ def run_scenario(
     failure: CosimError | None = None
     with running(prepared) as master:
         reasons = [text for component in master.components.values() if (text := obstacle(component))]
-        modes = unknown_modes(prepared, reasons) if reasons else modes_of(case, prepared, master, frequency_range)
+        modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
         try:
@@ -103,8 +101,8 @@ def run_scenario(
             failure = error
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"interrupted at t = {master.time:.6g} s")
-    dataset = trajectory_dataset(watch.recorder, case, prepared)
-    ring_down = None if failure else _ring_down(case, modes, dataset)
+    dataset = trajectory_dataset(watch.recorder, prepared)
+    ring_down = None if failure else _ring_down(modes, dataset)
     return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, watch.findings(failure))
 
 
@@ -128,8 +126,8 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
     return shifts
 
 
-def _ring_down(case: Case, modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
-    table, mode = case.table.analysis.ring_down, modes.electromechanical
+def _ring_down(modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
+    table, mode = modes.prepared.case.table.analysis.ring_down, modes.electromechanical
     if table is None or mode is None:
         return None
     recorded = signal(dataset, table.signal)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from orchestrator.cases.case import Case
 from orchestrator.report.tables import eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
 from orchestrator.study.modes import ModesResult
@@ -110,9 +109,10 @@ def ring_downs(results: Sequence[RunResult]) -> Table:
     return table
 
 
-def linear_differences(case: Case, results: Sequence[RunResult]) -> Table:
+def linear_differences(results: Sequence[RunResult]) -> Table:
     """Largest difference between the linear model's response and the simulated one, signal by signal."""
-    signals = dict.fromkeys(panel.signal for plot in case.table.plots for panel in plot.panels)
+    plots = results[0].modes.prepared.case.table.plots
+    signals = dict.fromkeys(panel.signal for plot in plots for panel in plot.panels)
     table = make_table("Linear model against the simulation: largest difference, of the largest deviation",
                    "Scenario", *signals)  # fmt: skip
     for r in results:

@@ -160,8 +160,8 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
 
 def _attributes(samples: Samples) -> dict[str, Any]:
     result = samples.result
-    origin = provenance(result.plan.case, result.plan.scenarios[0])
-    everyone = [provenance(result.plan.case, prepared) for prepared in result.plan.scenarios]
+    origin = provenance(result.plan.scenarios[0])
+    everyone = [provenance(prepared) for prepared in result.plan.scenarios]
     own = {
         key: json.dumps({p["scenario"]: p[key] for p in everyone}) for key in ("title", "values", "schedule", "fmus")
     }

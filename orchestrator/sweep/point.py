@@ -9,7 +9,6 @@ from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.threads import alone
-from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, CaseError, CosimError
@@ -106,7 +105,6 @@ class PointRecord:
 
 
 def make_task(
-    case: Case,
     prepared: PreparedScenario,
     fixed: Mapping[str, Value],
     varied: Mapping[str, Value],
@@ -124,13 +122,13 @@ def make_task(
     """
     overrides = {**fixed, **varied}
     content = {
-        "case": case.text,
+        "case": prepared.case.text,
         **scenario_content(prepared),
         "overrides": sorted(overrides.items()),
         "step": step_size,
         "range": list(frequency_range),
     }
-    reference, mark = reference_to(case), fingerprint(case)
+    reference, mark = reference_to(prepared.case), fingerprint(prepared.case)
     return PointTask(reference, mark, prepared.name, overrides, step_size, frequency_range, key_of(content))
 
 
@@ -149,7 +147,7 @@ def compute_point(task: PointTask) -> PointRecord:
     with alone():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size)
-            return _record(compute_modes(case, prepared, task.frequency_range))
+            return _record(compute_modes(prepared, task.frequency_range))
         except CaseError as error:
             return PointRecord(error="; ".join(str(problem) for problem in error.problems))
         except CosimError as error:

@@ -57,7 +57,7 @@ class SweepPlan:
     def task(self, prepared: PreparedScenario, place: Place) -> PointTask:
         """The task of one point."""
         varied = self.values(place)
-        return make_task(self.case, prepared, self.overrides, varied, self.step_size, self.frequency_range)
+        return make_task(prepared, self.overrides, varied, self.step_size, self.frequency_range)
 
 
 def _value_at(axis: Axis, position: float) -> Value:

@@ -83,12 +83,12 @@ to = "device.u"
 [scenarios.base]
 title = "Base"
 """, encoding="utf-8")  # fmt: skip
-    case = load_case(str(path))
-    return case, *case.prepare()
+    (prepared,) = load_case(str(path)).prepare()
+    return prepared
 
 
 def modes(folder, fmu, K=-0.5):
-    return compute_modes(*loop(folder, fmu, K))
+    return compute_modes(loop(folder, fmu, K))
 
 
 def test_an_honest_foreign_fmu_stays_stable_without_a_remark(tmp_path):
@@ -119,7 +119,7 @@ def test_sampled_control_that_also_declares_no_derivative_is_seen_in_its_respons
 
 
 def test_the_system_is_left_as_it_was(tmp_path):
-    _, prepared = loop(tmp_path, device(tmp_path, "hiding", HIDDEN=1), -0.5)
+    prepared = loop(tmp_path, device(tmp_path, "hiding", HIDDEN=1), -0.5)
     with running(prepared) as master:
         blocks = Blocks(master)
         model = compose(blocks, master.schedule)
@@ -143,7 +143,7 @@ def test_our_own_fmus_are_not_run_for_it(monkeypatch):
     monkeypatch.setattr(coupled_response, "worst_disagreement", refuse)
     case = load_case("two_area")
     (prepared,) = case.prepare(["gfor"], {"*.native": True})
-    assert compute_modes(case, prepared).stability.stable is True
+    assert compute_modes(prepared).stability.stable is True
 
 
 def test_a_copy_of_our_converter_that_counts_as_foreign_agrees_to_a_hundredth(tmp_path, monkeypatch):
@@ -162,7 +162,7 @@ def test_a_copy_of_our_converter_that_counts_as_foreign_agrees_to_a_hundredth(tm
         return found[-1]
 
     monkeypatch.setattr(coupled_response, "worst_disagreement", watched)
-    result = compute_modes(case, prepared)
+    result = compute_modes(prepared)
     assert result.stability.stable is True
     assert len(found) == 1
     assert 0 < found[0].error < 1e-2

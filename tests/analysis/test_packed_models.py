@@ -173,7 +173,7 @@ def test_matrices_of_another_point_under_the_right_names(master, with_model, cha
     """What the file says of its operating point is right, the matrices are of another one."""
     honest = read_embedded_model(master.components["gfor"].description.path)
     (prepared,) = load_case("two_area").prepare(["pod_pq"], {"*.native": True, **change})
-    other = component_model("two_area", prepared, "gfor")
+    other = component_model(prepared, "gfor")
     matrices = {key: getattr(other, key) for key in "ABCD"}
     with pytest.raises(AnalysisError, match="is not what the FMU does"):
         with_model(dataclasses.replace(honest, **matrices))
@@ -182,7 +182,7 @@ def test_matrices_of_another_point_under_the_right_names(master, with_model, cha
 def test_the_honest_model_is_used_and_said_to_be_packed(system_with, folder, capsys):
     case = load_case(system_with())
     (prepared,) = case.prepare(["pod_pq"])
-    result = compute_modes(case, prepared)
+    result = compute_modes(prepared)
     others = dict.fromkeys(("sg1", "sg2", "grid"), "perturbed")
     assert result.linearised == {"gfor": "packed", **others}
     assert result.electromechanical.damping_percent == pytest.approx(23.91, abs=0.01)

@@ -13,7 +13,7 @@ from orchestrator.study.modes import compute_modes
 def modes_at(step, case="two_area", scenario="gfor", frequency_range=(0.1, 2.0)):
     loaded = load_case(case)
     (prepared,) = loaded.prepare([scenario], {}, step)
-    return compute_modes(loaded, prepared, frequency_range)
+    return compute_modes(prepared, frequency_range)
 
 
 def advised(text):

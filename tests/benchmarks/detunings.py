@@ -171,7 +171,7 @@ def ask(detuning: Detuning) -> Answers:
     with alone():
         case, ready = detuning.prepared()
         system, coupled = exact_growth(case, ready, detuning)
-        program = compute_modes(case, ready).stability
+        program = compute_modes(ready).stability
         simulated, ending = simulated_growth(ready)
     return Answers(program, simulated, system, coupled, ending)
 

@@ -213,7 +213,7 @@ def brute_force(prepared: PreparedScenario, model: LinearModel) -> tuple[float, 
 
 def print_linearisation(case: Case, prepared: PreparedScenario) -> None:
     begun = time.perf_counter()
-    compute_modes(case, prepared)
+    compute_modes(prepared)
     whole = time.perf_counter() - begun
     parts = linearise(prepared)
     ours = parts.blocks + parts.compose

@@ -34,7 +34,7 @@ def modes_seconds() -> float:
     start = time.perf_counter()
     case = load_case("two_area")
     for ready in case.prepare():
-        compute_modes(case, ready)
+        compute_modes(ready)
     return time.perf_counter() - start
 
 

@@ -4,7 +4,6 @@ import pytest
 
 from orchestrator.black_box.coupled_modes import component_participation, is_black_box, linearize_with_box
 from orchestrator.black_box.frequency_response import Excitation
-from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.study.modes import modes_of, running
 from tests.black_box import boxes
@@ -12,8 +11,8 @@ from tests.black_box import boxes
 SHORT = Excitation(lowest_hz=0.5, lines=80, settled=1e-3)
 
 
-def compare(master, case, prepared, excitation, restore, hertz, points):
-    white = modes_of(case, prepared, master, (0.1, 2.0))
+def compare(master, prepared, excitation, restore, hertz, points):
+    white = modes_of(prepared, master, (0.1, 2.0))
     boxed = linearize_with_box(master, "gfor", excitation, restore=restore)
     assert boxed.residual < 1e-9
     found = boxed.modes()
@@ -27,19 +26,19 @@ def compare(master, case, prepared, excitation, restore, hertz, points):
 
 
 def test_without_its_slow_part_measured_the_mode_is_still_there():
-    case, prepared = load_case("two_area"), boxes.prepared("gfor")
+    prepared = boxes.prepared("gfor")
     with running(prepared) as master:
-        compare(master, case, prepared, SHORT, True, 0.01, 0.3)
+        compare(master, prepared, SHORT, True, 0.01, 0.3)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["gfor", "pod_p", "pod_q", "pod_pq"])
 def test_all_scenarios_with_and_without_saved_states(scenario):
-    case, prepared = load_case("two_area"), boxes.prepared(scenario)
+    prepared = boxes.prepared(scenario)
     with running(prepared) as master:
         before = master.y.copy()
-        compare(master, case, prepared, Excitation(), True, 0.001, 0.01)
-        compare(master, case, prepared, Excitation("pulse"), False, 0.001, 0.01)
+        compare(master, prepared, Excitation(), True, 0.001, 0.01)
+        compare(master, prepared, Excitation("pulse"), False, 0.001, 0.01)
         assert (master.y == before).all()
         assert master.index == 0
 

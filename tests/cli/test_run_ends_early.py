@@ -46,10 +46,10 @@ def test_in_the_middle_of_a_scenario(gfor, monkeypatch, tmp_path, output):
     ],
 )
 def test_between_two_scenarios(gfor, monkeypatch, tmp_path, error, code, said):
-    def only_one(case, prepared, **options):
+    def only_one(prepared, **options):
         if prepared.name == "gfor":
             raise error
-        return run_scenario(case, prepared, **options)
+        return run_scenario(prepared, **options)
 
     monkeypatch.setattr(command, "run_scenario", only_one)
     ended, _, text = gfor(*WORDS, "--out", tmp_path)

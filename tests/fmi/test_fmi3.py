@@ -130,7 +130,7 @@ def test_the_two_area_system_of_fmi_3(ours, tmp_path, directional):
         case = load_case(str(path))
         (ready,) = case.prepare(["pod_pq"], {"grid.native": True})
         with running(ready) as master:
-            modes = modes_of(case, ready, master, (0.1, 2.0), directional=directional).modes
+            modes = modes_of(ready, master, (0.1, 2.0), directional=directional).modes
             blocks = Blocks(master, directional=directional).components
         found.append((blocks, np.array([mode.eigenvalue for mode in modes])))
     (blocks, modes), (others, other_modes) = found

@@ -253,7 +253,7 @@ def test_modes_of_an_fmu_that_cannot_be_perturbed(foreign):
     results = []
     for case in (load_case(foreign), load_case("two_area")):
         (prepared,) = case.prepare(["pod_pq"])
-        results.append(compute_modes(case, prepared))
+        results.append(compute_modes(prepared))
     inside, perturbed = results
     assert inside.operating_point.residual < 1e-12
     assert inside.model.names == perturbed.model.names

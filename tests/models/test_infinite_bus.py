@@ -70,6 +70,6 @@ def test_the_dip_ends_after_its_duration():
 def test_without_its_clock_it_has_a_steady_state():
     case = load_case("infinite_bus")
     (prepared,) = case.prepare(["dip"])
-    result = compute_modes(case, prepared, (0.1, 10.0))
+    result = compute_modes(prepared, (0.1, 10.0))
     assert result.operating_point.residual < 1e-12
     assert [mode.damping_ratio > 0.2 for mode in result.modes] == [True]  # the droop's

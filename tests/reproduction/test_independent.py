@@ -193,7 +193,7 @@ def check_grid_code(converter, X_L):
     gain = {"converter.pod_q.K": 2000.0} if converter == "pod_q, K × 10" else {}
     case = load_case("norm631")
     (prepared,) = case.prepare([scenario], pods | gain | {"grid.X_L": X_L})
-    spectrum = find_spectrum(compute_modes(case, prepared).model, 0.08, 1.6)
+    spectrum = find_spectrum(compute_modes(prepared).model, 0.08, 1.6)
     modes, ours = np.array([m.eigenvalue for m in spectrum.modes]), continuous_eigenvalues(prepared)
     for real, imag in row["eigenvalues"]:
         value = complex(real, imag)

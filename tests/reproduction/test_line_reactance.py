@@ -22,7 +22,7 @@ def swings():
 
     def least(scenario, reactance):
         (ready,) = case.prepare([scenario], {"grid.X_L": reactance, "*.native": True})
-        modes = compute_modes(case, ready).modes
+        modes = compute_modes(ready).modes
         return min((m for m in modes if sum(speeds(m)) > 0.1), key=lambda m: m.damping_percent)
 
     return {s: {x: least(s, x) for x in REACTANCES} for s in SCENARIOS}
@@ -90,7 +90,7 @@ def test_the_trajectory_splits_in_two(swings, scenario):
     """Claimed, and so it is: a fast path on which SG1 swings alone, a slow one on which SG2 does."""
     case = load_case("two_area")
     (ready,) = case.prepare([scenario], {"grid.X_L": 0.4, "*.native": True})
-    modes = [m for m in compute_modes(case, ready).modes if sum(speeds(m)) > 0.2]
+    modes = [m for m in compute_modes(ready).modes if sum(speeds(m)) > 0.2]
     slow, fast = sorted(modes, key=lambda m: m.frequency_hz)
     assert (fast.frequency_hz > 0.7, slow.frequency_hz < 0.2) == (True, True)
     assert speeds(fast)[0] > 20 * speeds(fast)[1]

@@ -30,7 +30,7 @@ def closed_loop(d, overrides=None):
     (ready,) = case.prepare(
         [d.target.scenario], dict(overrides or {}) | {f"gfor.{d.request.controller}.{k}": v for k, v in values.items()}
     )
-    return compute_modes(case, ready).electromechanical
+    return compute_modes(ready).electromechanical
 
 
 @pytest.mark.parametrize("controller", PAPER)
@@ -80,7 +80,7 @@ def test_refined_designs_keep_what_they_promise_on_a_system_set_up_anew(controll
     d = design(controller, overrides=overrides, refine=True, gain_bounds=(0, 400))
     assert d.met
     assert d.achieved_damping == pytest.approx(d.required_damping, abs=1e-3)
-    found = compute_modes(load_case("two_area"), d.prepared)  # without the controller: where the design began
+    found = compute_modes(d.prepared)  # without the controller: where the design began
     assert found.electromechanical.eigenvalue == pytest.approx(d.initial, abs=1e-6)
     assert closed_loop(d, overrides).damping_ratio >= d.required_damping - 1e-3
 
@@ -152,7 +152,7 @@ def test_margins_say_where_a_mode_is_lost():
     for factor, stable in ((1.0, True), (1.06, False)):
         gain = {"gfor.pod_q.K": d.gain * d.margins.up * factor}
         (ready,) = case.prepare(["gfor"], overrides | gain)
-        modes = compute_modes(case, ready, (0.1, 100.0)).modes
+        modes = compute_modes(ready, (0.1, 100.0)).modes
         assert all(m.eigenvalue.real < 0 for m in modes) == stable
 
 
@@ -190,7 +190,7 @@ def test_a_second_controller_is_designed_with_the_first_in_place():
     d = design("pod_q", scenario="pod_p")
     case = load_case("two_area")
     (ready,) = case.prepare(["pod_p"])
-    assert d.initial == pytest.approx(compute_modes(case, ready).electromechanical.eigenvalue, abs=1e-6)
+    assert d.initial == pytest.approx(compute_modes(ready).electromechanical.eigenvalue, abs=1e-6)
 
 
 def test_a_requirement_that_is_none():

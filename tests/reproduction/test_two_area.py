@@ -22,12 +22,12 @@ SATURATED = {"sg1.machine.saturation": True, "sg2.machine.saturation": True}
 def prepare(scenario, overrides=None, **arguments):
     case = load_case("two_area")
     (ready,) = case.prepare([scenario], overrides, **arguments)
-    return case, ready
+    return ready
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_electromechanical_mode_is_the_papers(scenario):
-    mode = compute_modes(*prepare(scenario)).electromechanical
+    mode = compute_modes(prepare(scenario)).electromechanical
     _, _, frequency, damping = FIGURES["paper"][scenario]
     assert mode.frequency_hz == pytest.approx(frequency, abs=0.02)
     assert mode.damping_percent == pytest.approx(damping, abs=1.0)
@@ -35,7 +35,7 @@ def test_electromechanical_mode_is_the_papers(scenario):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_with_saturation_the_damping_is_the_papers_within_a_tenth_of_a_point(scenario):
-    mode = compute_modes(*prepare(scenario, SATURATED)).electromechanical
+    mode = compute_modes(prepare(scenario, SATURATED)).electromechanical
     _, _, frequency, damping = FIGURES["paper"][scenario]
     assert mode.frequency_hz == pytest.approx(frequency, abs=0.01)
     assert mode.damping_percent == pytest.approx(damping, abs=0.15)
@@ -49,7 +49,7 @@ def test_with_saturation_the_damping_is_the_papers_within_a_tenth_of_a_point(sce
 def test_every_mode_of_the_independent_linearisation_is_found(row):
     overrides = {"grid.X_L": row["X_L"], "sg1.governor.enabled": row["governor_on_sg1"]}
     overrides |= SATURATED if row["saturation"] else {}
-    modes = compute_modes(*prepare(row["scenario"], overrides)).modes
+    modes = compute_modes(prepare(row["scenario"], overrides)).modes
     for value in (complex(*parts) for parts in row["eigenvalues"]):
         error = min(abs(m.eigenvalue - value) for m in modes)
         assert error < (0.002 if value.real > -5 else 0.02)  # the step moves fast control modes more
@@ -64,8 +64,8 @@ def test_every_mode_of_the_independent_linearisation_is_found(row):
     ],
 )
 def test_elsewhere_the_modes_are_those_of_the_exact_jacobians(overrides):
-    case, ready = prepare("pod_pq", overrides)
-    result = compute_modes(case, ready)
+    ready = prepare("pod_pq", overrides)
+    result = compute_modes(ready)
     exact = np.linalg.eigvals(exact_continuous(ready)[0])
     slow = [mode for mode in result.modes if mode.eigenvalue.real > -5]  # the step moves fast control modes more
     assert len(slow) >= 3
@@ -76,21 +76,21 @@ def test_elsewhere_the_modes_are_those_of_the_exact_jacobians(overrides):
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_steady_state_residual(scenario):
-    assert compute_modes(*prepare(scenario)).operating_point.residual < 1e-9
+    assert compute_modes(prepare(scenario)).operating_point.residual < 1e-9
 
 
 @pytest.mark.parametrize("step_size", [50e-6, 100e-6, 200e-6, 500e-6])
 def test_communication_step_moves_the_mode_by_less_than_three_thousandths(step_size):
     for scenario in ("base", "pod_pq"):
-        case, ready = prepare(scenario, step_size=step_size)
-        mode = compute_modes(case, ready).electromechanical
+        ready = prepare(scenario, step_size=step_size)
+        mode = compute_modes(ready).electromechanical
         exact = np.linalg.eigvals(exact_continuous(ready)[0])
         assert np.abs(exact - mode.eigenvalue).min() < 0.004
 
 
 def test_an_undisturbed_run_stays_where_it_is():
-    case, ready = prepare("pod_pq", stop_time=1.0)
-    result = run_scenario(case, ready)
+    ready = prepare("pod_pq", stop_time=1.0)
+    result = run_scenario(ready)
     drift = max(float(np.ptp(result.dataset[name].values)) for name in result.dataset.data_vars)
     assert len(ready.events) == 0
     assert drift < 1e-9
@@ -99,7 +99,7 @@ def test_an_undisturbed_run_stays_where_it_is():
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_simulated_ring_down_agrees_with_the_eigenvalue(scenario):
-    result = run_scenario(*prepare(scenario))
+    result = run_scenario(prepare(scenario))
     mode, seen = result.modes.electromechanical, result.ring_down
     assert seen.frequency_hz == pytest.approx(mode.frequency_hz, abs=0.01)
     assert seen.damping_percent == pytest.approx(mode.damping_percent, abs=0.5)
@@ -108,5 +108,5 @@ def test_simulated_ring_down_agrees_with_the_eigenvalue(scenario):
 
 
 def test_the_base_case_is_unstable_and_the_converter_stabilises_it():
-    dampings = {s: find_modes(compute_modes(*prepare(s)).model)[0].damping_percent for s in ("base", "gfor")}
+    dampings = {s: find_modes(compute_modes(prepare(s)).model)[0].damping_percent for s in ("base", "gfor")}
     assert dampings["base"] < 0 < dampings["gfor"]

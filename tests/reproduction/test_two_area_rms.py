@@ -25,19 +25,19 @@ HERTZ, POINTS = 0.01, 0.3
 def prepare(case, scenario, overrides=None, **arguments):
     loaded = load_case(case)
     (ready,) = loaded.prepare([scenario], overrides, **arguments)
-    return loaded, ready
+    return ready
 
 
 @cache
 def emt_mode(scenario, X_L):
     """The electromechanical mode of the EMT FMUs at 100 µs."""
-    return compute_modes(*prepare("two_area", scenario, {"grid.X_L": X_L})).electromechanical
+    return compute_modes(prepare("two_area", scenario, {"grid.X_L": X_L})).electromechanical
 
 
 @cache
 def rms_mode(scenario, X_L=0.1, step_size=5e-3, overrides=()):
     values = {"grid.X_L": X_L} | dict(overrides)
-    return compute_modes(*prepare("two_area_rms", scenario, values, step_size=step_size)).electromechanical
+    return compute_modes(prepare("two_area_rms", scenario, values, step_size=step_size)).electromechanical
 
 
 @pytest.mark.parametrize("X_L", [0.05, 0.1])
@@ -60,7 +60,7 @@ def test_the_communication_step_hardly_moves_it(scenario, step_size, points):
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_at_short_steps_it_is_the_continuous_models(scenario):
     devices = ("sg1", "sg2") if scenario == "base" else ("sg1", "sg2", "gfor")
-    _, ready = prepare("two_area_rms", scenario, {f"{d}.communication_step": 0.0 for d in devices})
+    ready = prepare("two_area_rms", scenario, {f"{d}.communication_step": 0.0 for d in devices})
     exact = np.linalg.eigvals(exact_continuous(ready)[0])
     for step_size, most in ((1e-3, 1e-4), (2e-3, 2e-4), (5e-3, 1e-3), (10e-3, 6e-3)):
         assert np.abs(exact - rms_mode(scenario, step_size=step_size).eigenvalue).min() < most  # [rad/s]
@@ -79,13 +79,13 @@ def test_a_jacobi_master_needs_the_emf_a_step_further_ahead(scenario):
     wanted = emt_mode(scenario, 0.1)
     found = []
     for late in (1, 0):
-        case, ready = prepare("two_area_rms", scenario, {f"{d}.steps_late": late for d in devices})
+        ready = prepare("two_area_rms", scenario, {f"{d}.steps_late": late for d in devices})
         side_by_side = replace(ready, schedule=jacobi(tuple(ready.system.components)))
         if scenario == "base" and not late:  # the held voltage damps what grows
             with pytest.raises(InputError, match=r"does not resolve a mode: .* damping"):
-                compute_modes(case, side_by_side)
+                compute_modes(side_by_side)
             return
-        found.append(compute_modes(case, side_by_side).electromechanical)
+        found.append(compute_modes(side_by_side).electromechanical)
         if late:
             assert found[0].frequency_hz == pytest.approx(wanted.frequency_hz, abs=HERTZ)
             assert found[0].damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
@@ -94,13 +94,13 @@ def test_a_jacobi_master_needs_the_emf_a_step_further_ahead(scenario):
 
 def test_a_shift_is_that_of_devices_which_know_the_step():
     """The table of a run takes other steps than the run's own; the devices are told those, and the run's again."""
-    case, ready = prepare("two_area_rms", "gfor", stop_time=0.01)
-    shifts = {s.step_size: s.shift for s in run_scenario(case, ready).shifts if s.schedule == "gauss-seidel"}
+    ready = prepare("two_area_rms", "gfor", stop_time=0.01)
+    shifts = {s.step_size: s.shift for s in run_scenario(ready).shifts if s.schedule == "gauss-seidel"}
     assert list(shifts) == [2.5e-3, 5e-3, 10e-3, 25e-3]
     assert shifts[2.5e-3] < shifts[5e-3] < 1e-3
     at_ten = rms_mode("gfor", step_size=10e-3).eigenvalue
     continuous = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}
-    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", continuous)[1])[0])
+    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", continuous))[0])
     assert shifts[10e-3] == pytest.approx(np.abs(exact - at_ten).min(), rel=1e-3)
     with running(ready) as master:
         with as_if_told(master, 1e-3):
@@ -110,33 +110,33 @@ def test_a_shift_is_that_of_devices_which_know_the_step():
 
 def test_a_continuous_model_is_that_of_emfs_without_a_lead():
     model, _, _ = linear_model(
-        prepare("two_area_rms", "gfor")[1], ["grid.load_2.scale"], ["sg1.omega"], as_continuous=True
+        prepare("two_area_rms", "gfor"), ["grid.load_2.scale"], ["sg1.omega"], as_continuous=True
     )
     devices = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}
-    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", devices)[1])[0])
+    exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", devices))[0])
     mode = rms_mode("gfor").eigenvalue
     found, wanted = (values[np.argmin(np.abs(values - mode))] for values in (np.linalg.eigvals(model.A), exact))
     assert abs(found - wanted) < 1e-6
-    embedded = component_model("two_area_rms", prepare("two_area_rms", "gfor")[1], "gfor")
+    embedded = component_model(prepare("two_area_rms", "gfor"), "gfor")
     assert "communication_step" not in embedded.parameters
     assert embedded.D[list(embedded.outputs).index("e_re")] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_the_master_tells_the_devices_the_step_it_takes():
-    _, ready = prepare("two_area_rms", "gfor")
+    ready = prepare("two_area_rms", "gfor")
     assert {ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")} == {5e-3}
-    _, ready = prepare("two_area_rms", "gfor", {"sg1.communication_step": 0.0}, step_size=2e-3)
+    ready = prepare("two_area_rms", "gfor", {"sg1.communication_step": 0.0}, step_size=2e-3)
     assert [ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")] == [0.0, 2e-3, 2e-3]
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_steady_state(scenario):
-    case, ready = prepare("two_area_rms", scenario)
-    assert compute_modes(case, ready).operating_point.residual < 1e-12
+    ready = prepare("two_area_rms", scenario)
+    assert compute_modes(ready).operating_point.residual < 1e-12
 
 
 def response(case, scenario):
-    data = run_scenario(*prepare(case, scenario, stop_time=5.0)).dataset
+    data = run_scenario(prepare(case, scenario, stop_time=5.0)).dataset
     return (data["sg1.omega"] - data["sg2.omega"]).values
 
 

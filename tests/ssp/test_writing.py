@@ -122,7 +122,7 @@ def test_the_two_area_system_comes_back_to_the_last_bit(two_area, name):
     assert names == names_again
     assert np.ptp(values[:, 1 + names.index("sg1.omega")]) > 1e-5
     assert np.array_equal(values, values_again)
-    modes, modes_again = compute_modes(case, before), compute_modes(again, after)
+    modes, modes_again = compute_modes(before), compute_modes(after)
     assert np.array_equal(modes.model.A, modes_again.model.A)
     assert modes.electromechanical.eigenvalue == modes_again.electromechanical.eigenvalue
     assert modes_again.references == modes.references

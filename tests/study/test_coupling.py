@@ -47,7 +47,7 @@ title = "One"
 def judged(folder, gains, schedule="jacobi"):
     case = case_of(folder, gains, schedule)
     (prepared,) = case.prepare(["one"], {})
-    return compute_modes(case, prepared, (0.0, 100.0))
+    return compute_modes(prepared, (0.0, 100.0))
 
 
 @pytest.mark.parametrize("w", [5.0, 40.0, 90.0])

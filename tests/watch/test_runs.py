@@ -56,7 +56,7 @@ panels = [{ signal = "gfor.p", label = "P [pu]" }]
 def findings(case, scenario, stop=None, **overrides):
     loaded = load_case(case)
     (ready,) = loaded.prepare([scenario], {k.replace("__", "."): v for k, v in overrides.items()}, stop_time=stop)
-    return run_scenario(loaded, ready).findings
+    return run_scenario(ready).findings
 
 
 @pytest.mark.parametrize("scenario", ["gfor", "pod_p", "pod_q", "pod_pq"])
@@ -146,7 +146,7 @@ def test_watching_changes_no_number(tmp_path):
     """What is recorded with the watch is what a master gives that only records."""
     case = load_case("two_area_rms")
     (ready,) = case.prepare(["pod_pq"], stop_time=3.0)
-    watched = run_scenario(case, ready).dataset
+    watched = run_scenario(ready).dataset
     plain = Recorder(ready.record, ready.record_every)
     with running(ready) as master:
         find_operating_point(master)
