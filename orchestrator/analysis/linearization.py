@@ -5,7 +5,7 @@ travel one step late, that output as well: an output with direct feed-through fr
 older than itself is memory that the exchange adds. Everything else follows from the states.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +19,7 @@ from orchestrator.analysis.component_linearization import (
 from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.step_awareness import knows_step, other_step
 from orchestrator.errors import AnalysisError, InputError
 
 Indices = NDArray[np.int64]
@@ -32,12 +33,16 @@ class Blocks:
     master
         A running system at its operating point. It is left as it was.
     step_size
-        Communication step to linearise over [s]; by default the master's own.
+        Communication step to linearise over [s]; by default the master's own. Components that know the step are
+        given this one meanwhile.
     inputs, outputs
         Names ``component.variable`` that the system is driven by and observed at, for `state_space`: tunable
         parameters or open inputs, and any outputs.
     derivatives
-        Whether `continuous` will be asked for as well.
+        Difference the FMUs' own derivatives as well, so that the same blocks serve `continuous_model`. Where a
+        component knows the step it is not done, as blocks for a step map cannot serve there.
+    without_step
+        For `continuous`: components that know the step are given 0 meanwhile.
     directional
         Take the FMUs' own directional derivatives instead of perturbing them.
     known
@@ -57,30 +62,24 @@ class Blocks:
         outputs: Sequence[str] = (),
         *,
         derivatives: bool = False,
+        without_step: bool = False,
         directional: bool = False,
         known: Mapping[str, ComponentLinearization] | None = None,
     ) -> None:
         known = known or {}
+        self._step_aware = [name for name in master.components if knows_step(master, name)]
+        self._without_step, self._directional = without_step, directional
+        self._derivatives = without_step or (derivatives and not self._step_aware)
         self.step_size = step_size or master.clock.step_size
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
-        driven, observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
-        _check_driven(master, driven)
-        self.components = {
-            name: known.get(name)
-            or (
-                linearize_by_derivatives(exchange, master.time, self.step_size, driven[name], observed[name])
-                if directional
-                else linearize_component(
-                    exchange, master.time, self.step_size, driven[name], observed[name], derivatives=derivatives
-                )
-            )
-            for name, exchange in master.exchanges.items()
-        }
+        self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
+        _check_driven(master, self._driven)
+        self.components = {name: known.get(name) or self._linearize(master, name) for name in master.exchanges}
         # External inputs stand behind the coupled outputs, as if a further component gave them.
         first_external = len(master.output_names)
         self.sources = {
             name: np.concatenate(
-                [exchange.sources, [first_external + self.inputs.index(f"{name}.{v}") for v in driven[name]]]
+                [exchange.sources, [first_external + self.inputs.index(f"{name}.{v}") for v in self._driven[name]]]
             ).astype(np.int64)
             for name, exchange in master.exchanges.items()
         }
@@ -91,6 +90,29 @@ class Blocks:
         for name, exchange in master.exchanges.items():
             self.window[name] = slice(first, first + len(exchange.outputs.names))
             first += len(exchange.outputs.names)
+
+    def renew(self, master: Master, names: Iterable[str]) -> None:
+        """Linearise some components again, whose parameters were changed."""
+        self.components.update({name: self._linearize(master, name) for name in names})
+
+    def _linearize(self, master: Master, name: str) -> ComponentLinearization:
+        return linearize_within(
+            master, name, self.step_size, self._driven[name], self._observed[name],
+            derivatives=self._derivatives, without_step=self._without_step, directional=self._directional,
+        )  # fmt: skip
+
+    def check_made_for(self, *, step_map: bool) -> None:
+        """Refuse blocks of components that believed in another communication step."""
+        if self._step_aware and step_map == self._without_step:
+            raise ValueError(
+                f"components {', '.join(self._step_aware)} know the communication step; linearise them with "
+                f"without_step={not step_map} for a {'step map' if step_map else 'continuous model'}"
+            )
+
+    @property
+    def serves_continuous(self) -> bool:
+        """Whether no component believed in a communication step."""
+        return self._without_step or not self._step_aware
 
     @property
     def how(self) -> dict[str, str]:
@@ -110,6 +132,33 @@ class Blocks:
             windows[name] = slice(first, first + len(c.states))
             first += len(c.states)
         return windows
+
+
+def linearize_within(
+    master: Master,
+    name: str,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
+    *,
+    derivatives: bool = False,
+    without_step: bool = False,
+    directional: bool = False,
+) -> ComponentLinearization:
+    """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
+
+    Parameters
+    ----------
+    inputs, observed, derivatives
+        As `linearize_component`.
+    without_step, directional
+        As `Blocks`.
+    """
+    exchange, time = master.exchanges[name], master.time
+    with other_step(master, name, 0.0 if without_step else step_size):
+        if directional:
+            return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
+        return linearize_component(exchange, time, step_size, inputs, observed, derivatives=derivatives)
 
 
 def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
@@ -138,6 +187,7 @@ def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
     AnalysisError
         If direct feed-through closes a loop.
     """
+    blocks.check_made_for(step_map=True)
     windows, names = blocks.state_windows(), blocks.state_names()
     held = _held_outputs(blocks, schedule)
     memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
@@ -172,6 +222,7 @@ def continuous(blocks: Blocks) -> LinearModel:
     AnalysisError
         If a component does not give its derivatives, or direct feed-through closes a loop.
     """
+    blocks.check_made_for(step_map=False)
     silent = [name for name, c in blocks.components.items() if c.A_c is None]
     if silent:
         raise AnalysisError(
@@ -186,6 +237,27 @@ def continuous(blocks: Blocks) -> LinearModel:
         own = np.arange(len(blocks.output_names))[blocks.window[name]]
         equations.output(own, windows[name], c.C, blocks.sources[name], c.D)
     return equations.model(blocks, names, None)
+
+
+def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
+    """The system without any communication step; None where a component gives no derivatives.
+
+    Parameters
+    ----------
+    blocks
+        With derivatives, where there are such already; they are taken where no component knows the step.
+    """
+    if blocks is None or not blocks.serves_continuous:
+        return where_given(lambda: continuous(Blocks(master, without_step=True)))
+    return where_given(lambda: continuous(blocks))
+
+
+def where_given(make: Callable[[], LinearModel]) -> LinearModel | None:
+    """A continuous model, or None where a component gives no derivatives; a verdict then rests on the step map."""
+    try:
+        return make()
+    except AnalysisError:
+        return None
 
 
 def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:

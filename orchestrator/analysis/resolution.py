@@ -17,7 +17,6 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, eigenvalues
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import CosimError, InputError
 
 MOVED, LOST = 0.01, 0.1
@@ -181,8 +180,7 @@ def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> f
     shorter = [step for step in _ADVISED if step <= 0.51 * master.clock.step_size]
     for step in shorter[:_TRIALS]:
         try:
-            with as_if_told(master, step):
-                model = compose(Blocks(master, step), master.schedule)
+            model = compose(Blocks(master, step), master.schedule)
         except CosimError:  # an FMU may refuse a step; others are left to try
             continue
         nearest = _nearest(model)

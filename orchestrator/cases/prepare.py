@@ -27,8 +27,8 @@ from orchestrator.cases.wiring import check_inputs, connect
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
+from orchestrator.coupling.step_awareness import tell_step
 from orchestrator.coupling.system import System
-from orchestrator.coupling.told_step import tell_step
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
 

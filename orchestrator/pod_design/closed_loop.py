@@ -8,14 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from orchestrator.analysis.component_linearization import linearize_component
 from orchestrator.analysis.continuation import Eigenpair, follow
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.told_step import as_if_told
-from orchestrator.errors import AnalysisError, InputError
+from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.pod_design.lead_lag import LeadLag, damping_ratio
 
@@ -82,11 +80,7 @@ class PodLoop:
 
     def stability(self, setting: PodSetting) -> Stability:
         """The verdict on the whole system with this setting, at any frequency."""
-        model = self.model(setting)
-        try:
-            return judge(model, system=self._continuous_model(setting))
-        except AnalysisError:
-            return judge(model)
+        return judge(self.model(setting), system=where_given(lambda: self._continuous_model(setting)))
 
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
         """The same without any communication step, with half the gain and with the gain; it is linear in the gain.
@@ -100,22 +94,16 @@ class PodLoop:
         return half, full
 
     def _continuous_model(self, setting: PodSetting) -> LinearModel:
-        with as_if_told(self._master, 0.0):
-            self._linearize_converters(self._continuous_blocks, setting, derivatives=True)
+        self._linearize_converters(self._continuous_blocks, setting)
         return continuous(self._continuous_blocks)
 
     @cached_property
     def _continuous_blocks(self) -> Blocks:
-        """Made within `as_if_told`."""
-        return Blocks(self._master, derivatives=True)
+        return Blocks(self._master, without_step=True)
 
-    def _linearize_converters(self, blocks: Blocks, setting: PodSetting, *, derivatives: bool = False) -> None:
+    def _linearize_converters(self, blocks: Blocks, setting: PodSetting) -> None:
         self._apply(setting)
-        for name in self._components:
-            exchange = self._master.exchanges[name]
-            blocks.components[name] = linearize_component(
-                exchange, self._master.time, blocks.step_size, derivatives=derivatives
-            )
+        blocks.renew(self._master, self._components)
 
     def place(self, start: Placed, gain: float, filters: LeadLag | None = None) -> Placed:
         """Follow the target mode to another gain.

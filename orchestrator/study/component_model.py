@@ -1,9 +1,10 @@
 """The linear model of one component at the steady state of a scenario, to be packed into its FMU."""
 
-from orchestrator.analysis.component_linearization import PERTURBATIONS, linearize_by_derivatives, linearize_component
+from orchestrator.analysis.component_linearization import PERTURBATIONS
+from orchestrator.analysis.linearization import linearize_within
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.told_step import as_if_told, told_parameters
+from orchestrator.coupling.step_awareness import STEP_PARAMETER, knows_step
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.fmi.linear_model import EmbeddedModel
@@ -28,25 +29,20 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
     )
     with running(prepared) as master:
         point = find_operating_point(master)
-        exchange = master.exchanges[name]
-        open_inputs = [v for v in inputs if v not in exchange.inputs.names]
+        open_inputs = [v for v in inputs if v not in master.exchanges[name].inputs.names]
         exact = plan.description.gives_directional_derivatives
-        with as_if_told(master, 0.0):
-            c = (
-                linearize_by_derivatives(exchange, master.time, prepared.step_size, open_inputs, outputs)
-                if exact
-                else linearize_component(
-                    exchange, master.time, prepared.step_size, open_inputs, outputs, derivatives=True
-                )
-            )
+        c = linearize_within(
+            master, name, prepared.step_size, open_inputs, outputs,
+            derivatives=True, without_step=True, directional=exact,
+        )  # fmt: skip
         if c.A_c is None or c.B_c is None:
             raise AnalysisError(
                 f"component {name!r}: its FMU does not give its derivatives, so no continuous model can be made"
             )
         values = master.components[name].get([*c.states, *inputs, *outputs])
-        told = told_parameters(master, name)
+        given = {STEP_PARAMETER} if knows_step(master, name) else set()
     columns = [c.inputs.index(v) for v in inputs]
-    parameters = {v: x for v, x in plan.parameters.items() if x != _start(info[v]) and v not in told}
+    parameters = {v: x for v, x in plan.parameters.items() if x != _start(info[v]) and v not in given}
     return EmbeddedModel(
         A=c.A_c,
         B=c.B_c[:, columns],

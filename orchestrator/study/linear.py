@@ -6,16 +6,15 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.analysis.linear_model import LinearModel, Matrix
-from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import InputError
 from orchestrator.results.signals import variables_of
-from orchestrator.study.modes import continuous_model, running
+from orchestrator.study.modes import running
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:
@@ -60,8 +59,7 @@ def linear_model(
     """
     with running(prepared) as master:
         point = find_operating_point(master)
-        with as_if_told(master, 0.0 if as_continuous else prepared.step_size):
-            blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=as_continuous)
+        blocks = Blocks(master, inputs=inputs, outputs=outputs, without_step=as_continuous)
         space = state_space(blocks, None if as_continuous else master.schedule)
         model = LinearModel.from_matrix(space.A, space.states, space.step_size)
         return space, point, judge(model, system=None if as_continuous else continuous_model(master))

@@ -13,7 +13,7 @@ from orchestrator.analysis.coupled_response import confirmed
 from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
-from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.analysis.linearization import Blocks, compose, continuous_model
 from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed
 from orchestrator.analysis.resolution import check_resolution
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
@@ -23,8 +23,6 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
-from orchestrator.coupling.told_step import as_if_told, told_parameters
-from orchestrator.errors import AnalysisError
 
 _NAMING_RANGE = (0.1, 2.0)
 """Frequencies [Hz] among which the modes with names are looked for."""
@@ -138,8 +136,7 @@ def modes_of(
 ) -> ModesResult:
     """Steady state and modes of a running system; see `compute_modes`."""
     point = find_operating_point(master)
-    step_aware = any(told_parameters(master, name) for name in master.components)
-    blocks = Blocks(master, derivatives=not step_aware, directional=directional)
+    blocks = Blocks(master, derivatives=True, directional=directional)
     return modes_from(prepared, master, point, blocks, frequency_range, critical)
 
 
@@ -153,8 +150,7 @@ def modes_from(
 ) -> ModesResult:
     """The modes of components that were linearised at an operating point."""
     model = compose(blocks, master.schedule)
-    step_aware = any(told_parameters(master, name) for name in master.components)
-    system = continuous_model(master, None if step_aware else blocks)
+    system = continuous_model(master, blocks)
     low, high = frequency_range
     if critical is None:
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
@@ -191,23 +187,6 @@ def modes_from(
         system=system,
         fit_errors={name: c.disagreement for name, c in blocks.components.items() if c.source == IDENTIFIED},
     )
-
-
-def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
-    """The system without any communication step; None where a component gives no derivatives.
-
-    Parameters
-    ----------
-    blocks
-        With derivatives and of components that do not know the step, where there are such already.
-    """
-    try:
-        if blocks is not None:
-            return continuous(blocks)
-        with as_if_told(master, 0.0):
-            return continuous(Blocks(master, derivatives=True))
-    except AnalysisError:
-        return None
 
 
 def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:

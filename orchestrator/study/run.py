@@ -14,7 +14,6 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
-from orchestrator.coupling.told_step import as_if_told
 from orchestrator.errors import AnalysisError, CosimError, RunInterruptedError
 from orchestrator.results.signals import signal
 from orchestrator.results.storage import trajectory_dataset
@@ -118,8 +117,7 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
     shifts = []
     for part in STEPS:
         step_size = part * master.clock.step_size
-        with as_if_told(master, step_size):
-            at_step = Blocks(master, step_size)
+        at_step = Blocks(master, step_size)
         for name, schedule in sorted(schedules.items()):
             value = nearest_eigenvalue(compose(at_step, schedule), exact)
             shifts.append(ModeShift(name, step_size, exact, value))

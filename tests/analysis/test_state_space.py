@@ -26,7 +26,7 @@ def test_the_response_to_a_small_load_step_is_that_of_the_system(kind):
     schedule = jacobi(("sg1", "sg2", "gfor", "grid")) if kind == "jacobi" else None
     recorder = Recorder(OUTPUTS, 50)
     with running(schedule) as master:
-        blocks = Blocks(master, inputs=INPUTS, outputs=OUTPUTS, derivatives=kind == "continuous")
+        blocks = Blocks(master, inputs=INPUTS, outputs=OUTPUTS, without_step=kind == "continuous")
         model = state_space(blocks, None if kind == "continuous" else master.schedule)
         master.run(2.0, [LoadChange(0.0, "grid", "load_2", 1 + 1e-5)], [recorder])
     assert (model.B.shape[1], model.C.shape[0], model.D.shape) == (2, 4, (4, 2))

@@ -6,9 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.schedule import jacobi
-from orchestrator.coupling.told_step import as_if_told
+from orchestrator.coupling.step_awareness import other_step
 from orchestrator.errors import InputError
 from orchestrator.study.component_model import component_model
 from orchestrator.study.linear import linear_model
@@ -103,9 +104,18 @@ def test_a_shift_is_that_of_devices_which_know_the_step():
     exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", continuous))[0])
     assert shifts[10e-3] == pytest.approx(np.abs(exact - at_ten).min(), rel=1e-3)
     with running(ready) as master:
-        with as_if_told(master, 1e-3):
+        with other_step(master, "sg1", 1e-3):
             assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 1e-3}
         assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 5e-3}
+
+
+def test_blocks_that_believe_in_a_step_serve_no_continuous_model():
+    """Nor the other way round: both would give numbers, and wrong ones."""
+    with running(prepare("two_area_rms", "gfor")) as master:
+        with pytest.raises(ValueError, match=r"gfor, sg1, sg2 know the communication step; .* without_step=True"):
+            continuous(Blocks(master, derivatives=True))
+        with pytest.raises(ValueError, match="without_step=False for a step map"):
+            compose(Blocks(master, without_step=True), master.schedule)
 
 
 def test_a_continuous_model_is_that_of_emfs_without_a_lead():

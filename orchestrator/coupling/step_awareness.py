@@ -1,0 +1,43 @@
+"""Components that know the communication step, because their outputs are for the middle of the next one."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.system import System
+
+STEP_PARAMETER = "communication_step"
+"""A component with a parameter of this name is given the communication step [s], unless the parameter is set."""
+
+
+def tell_step(system: System, step_size: float) -> None:
+    """Give the communication step [s] to the components that have the parameter and no value for it."""
+    for plan in system.components.values():
+        info = plan.description.variables.get(STEP_PARAMETER)
+        if info is not None and info.causality == "parameter":
+            plan.parameters.setdefault(STEP_PARAMETER, step_size)
+
+
+def knows_step(master: Master, name: str) -> bool:
+    """Whether a component was given the master's step, and takes another one while it runs."""
+    plan = master.system.components[name]
+    if plan.parameters.get(STEP_PARAMETER) != master.clock.step_size:
+        return False
+    return plan.description.variables[STEP_PARAMETER].variability == "tunable"
+
+
+@contextmanager
+def other_step(master: Master, name: str, step_size: float) -> Iterator[None]:
+    """Inside, a component that knows the master's step is given another one [s]; 0 is the continuous system's.
+
+    A component whose parameter was set to something else, or that takes no other value any more, keeps what it has.
+    """
+    component = master.components[name]
+    if step_size == master.clock.step_size or not knows_step(master, name):
+        yield
+        return
+    try:
+        component.set({STEP_PARAMETER: step_size})
+        yield
+    finally:
+        component.set({STEP_PARAMETER: master.clock.step_size})
