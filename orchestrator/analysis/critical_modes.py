@@ -14,7 +14,15 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel, Vector
-from orchestrator.analysis.modes import Mode, find_modes, least_damped_first, make_mode, to_continuous
+from orchestrator.analysis.modes import (
+    ELECTROMECHANICAL_HZ,
+    Mode,
+    damping_ratio,
+    find_modes,
+    least_damped_first,
+    make_mode,
+    to_continuous,
+)
 from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
@@ -36,7 +44,10 @@ _UNSTABLE_MARGIN = 0.1
 
 
 def find_critical_modes(
-    model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0, damping_ratio: float = 0.2
+    model: LinearModel,
+    lowest_hz: float = ELECTROMECHANICAL_HZ[0],
+    highest_hz: float = ELECTROMECHANICAL_HZ[1],
+    damping: float = 0.2,
 ) -> list[Mode]:
     """Modes of a frequency range with less than a given damping, least damped first.
 
@@ -46,7 +57,7 @@ def find_critical_modes(
         Step map or continuous matrix, of any size.
     lowest_hz, highest_hz
         Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
-    damping_ratio
+    damping
         Modes with less than this are found, all of them; between 0 and 0.9. Negative damping is searched to −0.1.
 
     Raises
@@ -54,18 +65,18 @@ def find_critical_modes(
     AnalysisError
         If the range is not one, or Arnoldi's method does not converge.
     """
-    if not (0 < lowest_hz < highest_hz and 0 < damping_ratio <= 0.9):
+    if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
-            f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping_ratio:g} is none; "
+            f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping:g} is none; "
             "the frequencies must rise from above 0, and the damping ratio lie between 0 and 0.9"
         )
     if len(model.names) <= DENSE:
         found = find_modes(model, lowest_hz, highest_hz)
     else:
         beyond = 1 + _SMALLEST  # a cell does not own its upper edges
-        found = _search(model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping_ratio * beyond)
+        found = _search(model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping * beyond)
     wanted = (m for m in found if lowest_hz <= m.frequency_hz <= highest_hz)
-    return least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping_ratio)
+    return least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping)
 
 
 def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
@@ -123,7 +134,7 @@ class _Cell:
 
     def holds(self, value: complex) -> bool:
         """A cell owns its lower edges, and not the upper ones."""
-        return self.low <= value.imag < self.high and self.least <= -value.real / abs(value) < self.most
+        return self.low <= value.imag < self.high and self.least <= damping_ratio(value) < self.most
 
     def halves(self) -> tuple["_Cell", "_Cell"]:
         """Cut across the longer side."""
@@ -134,11 +145,11 @@ class _Cell:
         return replace(self, most=between), replace(self, least=between)
 
 
-def _search(model: LinearModel, lowest: float, highest: float, damping_ratio: float) -> list[Mode]:
+def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[Mode]:
     """Cover the region with discs: more eigenvalues around a point where few do not reach, else smaller cells."""
     modes: list[Mode] = []
     edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()
-    waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping_ratio) for low, high in pairwise(edges)]
+    waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
     while waiting:
         cell = waiting.pop()
         if cell.radius < _SMALLEST * abs(cell.centre):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.analysis.modes import damping_percent
 from orchestrator.errors import AnalysisError
 
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
@@ -29,7 +30,7 @@ class IdentifiedMode:
 
     @property
     def damping_percent(self) -> float:
-        return -100 * self.eigenvalue.real / abs(self.eigenvalue) if self.eigenvalue else 0.0
+        return damping_percent(self.eigenvalue)
 
 
 def identify_modes(

@@ -14,11 +14,25 @@ ZERO = 1e-3
 """An eigenvalue of at most this size [rad/s] is a zero: the free angle of a system without an infinite bus, in the
 accuracy of a perturbation. A double one, where nothing restores the frequency either, is split by up to as much."""
 
+ELECTROMECHANICAL_HZ = (0.1, 2.0)
+"""Frequencies [Hz] of electromechanical modes: where modes are looked for, named and guarded unless asked otherwise."""
+
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this belongs to what decays within one step, not to a mode."""
 
 _REAL = 1e-2
 """A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
+
+
+def damping_ratio(eigenvalue: complex) -> float:
+    """ζ = −Re λ/|λ|; 0 for λ = 0."""
+    size = abs(eigenvalue)
+    return -eigenvalue.real / size if size else 0.0
+
+
+def damping_percent(eigenvalue: complex) -> float:
+    """The same in percent, rounded once; 100·ζ may differ from it in the last digit."""
+    return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
 @dataclass(frozen=True)
@@ -48,8 +62,7 @@ class Mode:
     @property
     def damping_ratio(self) -> float:
         """−Re λ/|λ|; 0 for λ = 0."""
-        size = abs(self.eigenvalue)
-        return -self.eigenvalue.real / size if size else 0.0
+        return damping_ratio(self.eigenvalue)
 
     @property
     def damping_percent(self) -> float:
@@ -121,12 +134,16 @@ def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
     return to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)[0]
 
 
-def find_modes(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
+def find_modes(
+    model: LinearModel, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+) -> list[Mode]:
     """Modes with a frequency in a range; see `find_spectrum`."""
     return find_spectrum(model, lowest_hz, highest_hz).modes
 
 
-def find_spectrum(model: LinearModel, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> Spectrum:
+def find_spectrum(
+    model: LinearModel, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+) -> Spectrum:
     """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
     Parameters

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from orchestrator.analysis.critical_modes import DENSE, nearest_eigenvalue
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
-from orchestrator.analysis.modes import Mode, eigenvalues
+from orchestrator.analysis.modes import Mode, damping_percent, eigenvalues
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError, InputError
 
@@ -131,7 +131,7 @@ def _take(step: float) -> str:
 
 
 def _in_words(value: complex) -> str:
-    return f"{abs(value.imag) / (2 * np.pi):.4g} Hz with {-100 * value.real / abs(value):.3g} % damping"
+    return f"{abs(value.imag) / (2 * np.pi):.4g} Hz with {damping_percent(value):.3g} % damping"
 
 
 def _is_slow(pair: Pair) -> bool:

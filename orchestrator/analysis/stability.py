@@ -18,6 +18,8 @@ from orchestrator.analysis.modes import (
     ZERO,
     Mode,
     Spectrum,
+    damping_percent,
+    damping_ratio,
     eigenvalues,
     find_spectrum,
     index_of_rightmost,
@@ -82,7 +84,7 @@ class Hidden:
 
     @property
     def _percent(self) -> float:
-        return 0.0 if self.least_damped is None else -100 * self.least_damped.real / abs(self.least_damped)
+        return 0.0 if self.least_damped is None else damping_percent(self.least_damped)
 
 
 @dataclass(frozen=True)
@@ -218,7 +220,7 @@ def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) 
     swinging = values[oscillations(values)]
     hertz = swinging.imag / (2 * np.pi)
     outside = swinging[(hertz < lowest_hz) | (hertz > highest_hz)]
-    least = min(outside.tolist(), key=lambda v: -v.real / abs(v), default=None)
+    least = min(outside.tolist(), key=damping_ratio, default=None)
     return Hidden((lowest_hz, highest_hz), len(outside), least)
 
 

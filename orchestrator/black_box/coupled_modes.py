@@ -14,7 +14,7 @@ from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
-from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, find_spectrum
 from orchestrator.analysis.state_access import StateAccess, obstacle
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.black_box.bench import Bench
@@ -55,7 +55,9 @@ class BoxedSystem:
     residual: float
     warnings: tuple[str, ...] = ()
 
-    def modes(self, lowest_hz: float = 0.1, highest_hz: float = 2.0) -> list[Mode]:
+    def modes(
+        self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+    ) -> list[Mode]:
         """Modes of a range of frequencies, least damped first."""
         return find_spectrum(self.model, lowest_hz, highest_hz).modes
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarity
+from orchestrator.analysis.modes import ZERO, damping_ratio
 from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
@@ -21,9 +22,6 @@ LEAST_DAMPING = 0.05
 
 LEAST_AMPLITUDE = 0.01
 """Components of a signal smaller than this part of its largest oscillating one are taken for what fits the rest."""
-
-_STABLE = 1e-3
-"""Real parts up to this [1/s] are the free angle's zero eigenvalue, in its numerical accuracy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +69,6 @@ class ModalTest:
     modes: tuple[IdentifiedMode, ...]
     accepted: bool
     reason: str
-
-
-def damping_ratio(eigenvalue: complex) -> float:
-    """−Re λ/|λ|."""
-    return -eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
 def is_judged(frequency_hz: float) -> bool:
@@ -162,7 +155,7 @@ def stability_fault(
     """
     if not np.isfinite(growth_with):
         return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"
-    if growth_with > _STABLE >= growth_without:
+    if growth_with > ZERO >= growth_without:
         return f"the converter makes the system unstable: an eigenvalue has a real part of {growth_with:+.3g} 1/s"
     if with_converter and with_converter["stable"] is None:
         return f"nothing shows that the system with the converter is stable: {with_converter['sentence']}"

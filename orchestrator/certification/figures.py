@@ -5,8 +5,9 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
-from orchestrator.certification.criteria import ModeVerdict, damping_ratio
+from orchestrator.certification.criteria import ModeVerdict
 from orchestrator.certification.environment import environment
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.parameters import parameter_rows

@@ -6,8 +6,9 @@ from typing import Any
 
 import xarray as xr
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
-from orchestrator.certification.criteria import damping_ratio, is_judged, judge_mode, stability_fault
+from orchestrator.certification.criteria import is_judged, judge_mode, stability_fault
 from orchestrator.certification.judgement import RATED_POWER, judge_response, watched
 from orchestrator.certification.motion import motion_faults
 from orchestrator.certification.request import missing_reactances

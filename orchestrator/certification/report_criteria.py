@@ -5,8 +5,9 @@ from html import escape
 
 import numpy as np
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
-from orchestrator.certification.criteria import damping_ratio, is_judged
+from orchestrator.certification.criteria import is_judged
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.point import COMPUTED, FREQUENCY
 from orchestrator.certification.study import Certification

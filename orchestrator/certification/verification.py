@@ -11,9 +11,9 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.acceptance.runner import file_hash
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
-from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of

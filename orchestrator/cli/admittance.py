@@ -13,6 +13,7 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.analysis.modes import damping_percent
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification
@@ -102,8 +103,8 @@ def _summary(content: dict[str, Any]) -> Group:
     for column in ("Pole [rad/s]", "f [Hz]", "Damping [%]"):
         table.add_column(escape(column), justify="right")
     for pole in content["model"]["poles"]:
-        size = math.hypot(pole["real"], pole["imag"])
+        eigenvalue = complex(pole["real"], pole["imag"])
         value = f"{pole['real']:.4g}" + (f" ± j{pole['imag']:.4g}" if pole["imag"] else "")
-        damping = f"{-100 * pole['real'] / size:.2f}" if size else "–"
+        damping = f"{damping_percent(eigenvalue):.2f}" if eigenvalue else "–"
         table.add_row(value, f"{pole['imag'] / (2 * math.pi):.4g}", damping)
     return Group(heading, table)

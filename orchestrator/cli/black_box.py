@@ -8,7 +8,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.black_box.coupled_modes import (
     BoxedSystem,
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
             restore = False if options.no_state else None
             system = linearize_with_box(master, options.component, excitation_of(options), restore=restore)
             box = is_black_box(master.components[options.component])
-            white = [] if box else modes_of(prepared, master, (0.1, 2.0)).modes
+            white = [] if box else modes_of(prepared, master, ELECTROMECHANICAL_HZ).modes
         verdicts[prepared.title] = judge(system.model)
         passive = passivity(system.response)
         save_identification(system.response, system.identified, passive, folder / prepared.name)

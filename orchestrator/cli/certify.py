@@ -7,8 +7,8 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.acceptance import read_checks, run_checks
-from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.details import TEMPLATE, Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest

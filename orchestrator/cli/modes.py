@@ -4,6 +4,7 @@ import argparse
 import json
 from pathlib import Path
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--range",
         type=frequency_range,
-        default=(0.1, 2.0),
+        default=ELECTROMECHANICAL_HZ,
         metavar="LO:HI",
         help="frequencies shown [Hz] (default: 0.1:2)",
     )

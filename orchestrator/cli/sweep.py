@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "last one)",
     )
     parser.add_argument(
-        "--range", type=frequency_range, default=(0.1, 2.0), metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
+        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
     )
     add_executor_arguments(parser)
     parser.add_argument(

@@ -11,11 +11,12 @@ from functools import cached_property
 from orchestrator.analysis.continuation import Eigenpair, follow
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.pod_design.lead_lag import LeadLag, damping_ratio
+from orchestrator.pod_design.lead_lag import LeadLag
 
 _TUNED = ("enabled", "K", "T_S1", "T_S2")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from orchestrator.analysis.continuation import pair_at
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import Case
@@ -17,13 +17,12 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
-from orchestrator.pod_design.guard import GUARDED, Naming, Surroundings, breach, surroundings
+from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
 from orchestrator.pod_design.lead_lag import (
     NO_COMPENSATION,
     LeadLag,
     angle_deg,
     bounded,
-    damping_ratio,
     lead_lag,
     predicted_mode,
     required_gain,
@@ -206,8 +205,9 @@ def design_pod(case: Case, request: DesignRequest, report: Report = lambda text:
         model = loop.model(_OFF)
         before = surroundings(model, None, naming)
         if before.named is None:
+            low, high = ELECTROMECHANICAL_HZ
             raise InputError(
-                f"scenario {target.scenario!r} shows no mode {name!r} between {GUARDED[0]:g} and {GUARDED[1]:g} Hz; "
+                f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
                 f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
             )
         off = Placed(_OFF, pair_at(model, before.named.eigenvalue))

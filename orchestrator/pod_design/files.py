@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import Mode, damping_ratio
 from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
-from orchestrator.pod_design.lead_lag import LeadLag, angle_deg, damping_ratio
+from orchestrator.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.sheet import LABELS, mode_text, percent, verdict
 

@@ -6,14 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.analysis.linear_model import LinearModel, Vector
-from orchestrator.analysis.modes import Mode, find_spectrum, to_continuous
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio, find_spectrum, to_continuous
 from orchestrator.analysis.stability import fastest_growth
-from orchestrator.pod_design.lead_lag import damping_ratio
 
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
-
-GUARDED = (0.1, 2.0)
-"""Frequencies [Hz] of the modes whose damping is guarded; what is unstable is seen at any frequency."""
 
 _SAME = 1e-5
 """Eigenvalues nearer to each other, relative to their size, are the same one, computed in two ways."""
@@ -72,7 +68,7 @@ class Surroundings:
 
 def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
     """Everything but the mode at ``target`` [rad/s]; ``naming`` finds the mode that bears the target's name."""
-    spectrum = find_spectrum(model, *GUARDED)
+    spectrum = find_spectrum(model, *ELECTROMECHANICAL_HZ)
     others = tuple(spectrum.modes)
     if target is not None:
         others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
@@ -106,4 +102,5 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
 def guarded(values: Vector) -> Vector:
     """Those of some eigenvalues [rad/s] that are in the guarded range."""
     hertz = values.imag / (2 * np.pi)
-    return np.asarray(values[(hertz >= GUARDED[0]) & (hertz <= GUARDED[1])])
+    low, high = ELECTROMECHANICAL_HZ
+    return np.asarray(values[(hertz >= low) & (hertz <= high)])

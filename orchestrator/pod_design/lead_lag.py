@@ -55,12 +55,6 @@ class LeadLag:
 NO_COMPENSATION = LeadLag(0.0, 0.0, 0)
 
 
-def damping_ratio(eigenvalue: complex) -> float:
-    """ζ = −Re λ/|λ|; 0 for λ = 0."""
-    size = abs(eigenvalue)
-    return -eigenvalue.real / size if size else 0.0
-
-
 def predicted_mode(required_damping: float, initial: complex) -> complex:
     """λ_d = −ζ_d·ω_0 + jω_0: the mode that is aimed at, its frequency unchanged."""
     return complex(-required_damping * initial.imag, initial.imag)

@@ -14,13 +14,12 @@ import numpy as np
 import scipy.optimize
 
 from orchestrator.analysis.linear_model import LinearModel, Matrix, Vector
+from orchestrator.analysis.modes import ZERO
 from orchestrator.errors import AnalysisError
 
 _FREQUENCIES = (0.01, 500.0)
 """Where the loop is looked at [Hz]."""
 _POINTS_PER_DECADE = 150
-_STABLE = 1e-3
-"""Largest real part of a stable system [1/s]: that of the common angle of all units is 0 but for rounding."""
 _NEGLIGIBLE = 1e-8
 """Singular values of A(K₂) − A(K₁) below this, relative to the largest, are rounding of the linearisation."""
 
@@ -68,7 +67,7 @@ def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
     """
     if full.step_size is not None or full.names != half.names:
         raise ValueError("the margins of a loop need two continuous models with the same states")
-    if np.linalg.eigvals(full.A).real.max() > _STABLE:
+    if np.linalg.eigvals(full.A).real.max() > ZERO:
         raise AnalysisError("the system is unstable with this gain, so there are no margins")
     around = _Loop(full, *_places(2 * (full.A - half.A)))
     low, high = (2 * math.pi * f for f in _FREQUENCIES)

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import extremes
-from orchestrator.pod_design.lead_lag import LeadLag, damping_ratio
+from orchestrator.pod_design.lead_lag import LeadLag
 from orchestrator.pod_design.loop_margins import LoopMargins, loop_margins
 
 _STRIDE = 2**0.5

@@ -6,15 +6,10 @@ from collections.abc import Iterable, Sequence
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import Mode, damping_ratio
 from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
-from orchestrator.pod_design.lead_lag import (
-    LARGEST_STAGE_ANGLE,
-    angle_deg,
-    compensation_deg,
-    damping_ratio,
-)
+from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, angle_deg, compensation_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.refinement import Refinement
 from orchestrator.report.tables import eigenvalue_text

@@ -13,11 +13,12 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.analysis.stability import grows
 from orchestrator.errors import AnalysisError
 from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.pod_design.guard import guarded
-from orchestrator.pod_design.lead_lag import LARGEST_TURN, LeadLag, damping_ratio, lead_lag_turning
+from orchestrator.pod_design.lead_lag import LARGEST_TURN, LeadLag, lead_lag_turning
 
 MOST_STATES = 500
 """In larger systems a survey would take longer than anybody waits."""

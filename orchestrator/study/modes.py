@@ -14,7 +14,14 @@ from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose, continuous_model
-from orchestrator.analysis.modes import Mode, Spectrum, find_spectrum, most_associated, most_opposed
+from orchestrator.analysis.modes import (
+    ELECTROMECHANICAL_HZ,
+    Mode,
+    Spectrum,
+    find_spectrum,
+    most_associated,
+    most_opposed,
+)
 from orchestrator.analysis.resolution import check_resolution
 from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
@@ -23,9 +30,6 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
-
-_NAMING_RANGE = (0.1, 2.0)
-"""Frequencies [Hz] among which the modes with names are looked for."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,7 @@ class ModesResult:
 
 def compute_modes(
     prepared: PreparedScenario,
-    frequency_range: tuple[float, float] = (0.1, 2.0),
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     critical: float | None = None,
     *,
     directional: bool = False,
@@ -154,7 +158,7 @@ def modes_from(
     low, high = frequency_range
     if critical is None:
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
-        everything = find_spectrum(model, min(low, _NAMING_RANGE[0]), max(high, _NAMING_RANGE[1]))
+        everything = find_spectrum(model, min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1]))
         spectrum: Spectrum | None = everything
         swinging = [mode for mode in everything.modes if mode.is_oscillation]
         shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]

@@ -8,6 +8,7 @@ import xarray as xr
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
 from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.state_access import obstacle
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -75,7 +76,7 @@ class RunResult:
 
 def run_scenario(
     prepared: PreparedScenario,
-    frequency_range: tuple[float, float] = (0.1, 2.0),
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     observers: Sequence[Observer] = (),
     *,
     linear: bool = False,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from orchestrator.analysis.modes import damping_percent
 from orchestrator.results.storage import provenance, save_table
 from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
@@ -74,7 +75,7 @@ class Samples:
                     "real": value.real,
                     "imag": value.imag,
                     "frequency": value.imag / (2 * np.pi),
-                    "damping": -100 * value.real / abs(value) if value else 0.0,
+                    "damping": damping_percent(value),
                     "similarity": point.similarity,
                     "named": point.named,
                     "beginning": point.beginning,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -133,7 +134,7 @@ def plan_sweep(
     scenarios: Sequence[str] = (),
     overrides: Mapping[str, Value] | None = None,
     step_size: float | None = None,
-    frequency_range: tuple[float, float] = (0.1, 2.0),
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs.
 

@@ -53,7 +53,7 @@ def test_a_crowd_that_is_too_large_for_one_disc_is_cut(monkeypatch):
 
 
 def test_only_modes_below_the_damping_asked_for():
-    found = find_critical_modes(model(), 0.1, 2.0, damping_ratio=0.06)
+    found = find_critical_modes(model(), 0.1, 2.0, damping=0.06)
     assert [round(m.frequency_hz, 2) for m in found] == [0.31, 0.72]
 
 

@@ -16,11 +16,11 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.native_fmu import cached_native
 from fmus.toolchain.python_fmu import cached
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
 from orchestrator.certification import point as point_module
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
-from orchestrator.certification.criteria import damping_ratio
 from orchestrator.certification.figures import certification_json
 from orchestrator.certification.files import save
 from orchestrator.certification.judgement import judge, watched

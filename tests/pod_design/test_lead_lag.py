@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from orchestrator.analysis.continuation import follow, pair_at, pairs_near
 from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
 from orchestrator.pod_design.lead_lag import (
     LeadLag,
     angle_deg,
     bounded,
     compensation_deg,
-    damping_ratio,
     lead_lag,
     local_non_compensated,
     predicted_mode,

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.pod_design.design import DesignRequest, design_pod
-from orchestrator.pod_design.lead_lag import angle_deg, damping_ratio
+from orchestrator.pod_design.lead_lag import angle_deg
 from orchestrator.study.modes import compute_modes, running
 
 pytestmark = pytest.mark.reproduction
