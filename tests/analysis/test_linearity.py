@@ -105,7 +105,7 @@ def test_a_mode_that_an_edge_may_turn_is_named_so():
 def test_the_limit_of_a_damping_controller_does_not_decide_its_stability(limit):
     """Growth at 45.7 Hz, with its own directional derivatives as with a perturbation, whatever the output's limit."""
     (prepared,) = load_case("two_area").prepare(["pod_q"], {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit})
-    stability = compute_modes(load_case("two_area"), prepared).stability
+    stability = compute_modes(prepared).stability
     assert stability.stable is False
     assert stability.largest_growth_rate == pytest.approx(2.773, abs=2e-3)
 
