@@ -69,8 +69,8 @@ class ComponentLinearization:
         perturbed.
     narrow
         The perturbation, relative to max(1, |value|), of states and inputs that took a smaller one than usual.
-    rough
-        States and inputs for which no two sizes agreed.
+    doubtful
+        States and inputs for which no two sizes agreed, or that are answered differently up and down.
     """
 
     name: str
@@ -90,7 +90,7 @@ class ComponentLinearization:
     source: str = PERTURBED
     variants: tuple[StepMap, ...] = ()
     narrow: Mapping[str, float] = field(default_factory=dict)
-    rough: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
 
 
 def linearize_component(
@@ -122,7 +122,7 @@ def linearize_component(
     n, p = len(names), len(exchange.outputs.names)
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
-    small, large, usual, narrow, rough = _two_sizes(component, entries, exits, time, step_size, rates)
+    small, large, usual, narrow, doubtful = _two_sizes(component, entries, exits, time, step_size, rates)
 
     def step_map(after: Matrix, outputs: Matrix) -> StepMap:
         return StepMap(after[:, :n], after[:, n:], outputs[:p, :n], outputs[:p, n:])
@@ -146,7 +146,7 @@ def linearize_component(
             *([step_map(usual.after, usual.outputs)] if narrow else []),
         ),
         narrow=narrow,
-        rough=rough,
+        doubtful=doubtful,
     )
 
 
@@ -270,7 +270,7 @@ def _two_sizes(
     rates: Sequence[str],
 ) -> tuple[_Differences, _Differences, _Differences, dict[str, float], tuple[str, ...]]:
     """Differences of one size, of twice that size, and of twice the usual size, which is smaller for few; with these
-    few's sizes by name, and the names of what agreed with no size.
+    few's sizes by name, and the names of what is doubtful.
 
     What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
     """
@@ -307,7 +307,7 @@ def _two_sizes(
         if not columns:
             break
     assert found is not None
-    return *found, usual, narrow, tuple(names[k] for k in columns)
+    return *found, usual, narrow, tuple(name for k, name in enumerate(names) if k in columns or one_sided[k])
 
 
 def _apart(one: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix], share: float, *floors: float) -> NDArray[np.bool_]:

@@ -31,7 +31,7 @@ _FLOOR = 0.01
 """A window's response counts as no smaller than this part of the state's largest, and of the disturbance itself: below
 it are the integrators' tolerances."""
 
-_SECONDS, _WALL, _LEAST, _SHORT = 5.0, 2.5, 0.1, 1.0
+_SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
 """A response is followed for so long [s], but for no more than so much of the computer's time [s], and at least for so
 many simulated seconds; where they are fewer than the last figure, the verdict says so."""
 

@@ -30,8 +30,12 @@ _WHY = (
 )
 """What it means that a variant of `ComponentLinearization.variants` differs, in their order."""
 
-_SMALL_ONLY = 2
-"""The place of the last; there the linear model is right for what is small enough."""
+_EDGE, _SMALL_ONLY = 1, 2
+"""Their places: at an edge there is no linear model at all; the last is right for what is small enough."""
+
+_EDGE_SHIFT = 1e-2
+"""Of |λ|: from here on an edge leaves open whether the system is stable, as the shift is that of a perturbation of 1e-5
+and beyond the limit it is larger."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,8 @@ class Doubt:
     shift
         By how much, relative to |λ|.
     turns
-        Whether a mode may be on the other side of the stability limit. Where the model is right for changes that are
-        small enough, none is.
+        Whether this leaves open on which side of the stability limit a mode is. Where the model is right for changes
+        that are small enough, it does not.
     """
 
     component: str
@@ -83,6 +87,7 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
         if together.max() <= LARGEST_SHIFT:
             continue
         turns = kind != _SMALL_ONLY and _may_turn(modes, together)
+        turns = turns or (kind == _EDGE and bool(together.max() > _EDGE_SHIFT))
         each = {name: _shifts(blocks, schedule, model, modes, [name], kind) for name in perturbed}
         most = max(each, key=lambda name: float(each[name].max()))
         # One alone may do less than all together.

@@ -10,7 +10,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.cli.arguments import positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
-from orchestrator.cli.terminal import make_console, print_questions
+from orchestrator.cli.terminal import make_console, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, design_pod
@@ -104,6 +104,7 @@ def run(options: argparse.Namespace) -> int:
     with console.status("starting") as status:
         design = design_pod(case, request, status.update)
     print_questions([design.prepared])
+    warn(design.prepared.name, design.warnings)
     text = parameter_file_text(parameters_of(design), provenance(design, _command_line(options)))
     path.write_text(text, encoding="utf-8")
     content = json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.terminal import made_folder, make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.study.linear import default_inputs, default_outputs, linear_model
@@ -41,9 +41,9 @@ def run(options: argparse.Namespace) -> int:
     for prepared in scenarios:
         inputs = options.input or default_inputs(prepared)
         outputs = options.output or default_outputs(prepared)
-        model, point, verdicts[prepared.title] = linear_model(
-            prepared, inputs, outputs, as_continuous=options.continuous
-        )
+        model, point, examined = linear_model(prepared, inputs, outputs, as_continuous=options.continuous)
+        verdicts[prepared.title] = examined.stability
+        warn(prepared.name, examined.warnings)
         paths = save_linear_model(model, point, verdicts[prepared.title], prepared, folder / prepared.name)
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"

@@ -68,11 +68,16 @@ def print_questions(scenarios: Iterable[PreparedScenario]) -> None:
 
 def print_warnings(results: Sequence[ModesResult]) -> None:
     """Say on standard error what is to be borne in mind of results."""
-    console = make_errors()
     for result in results:
         asked = {str(question) for question in result.prepared.questions}
-        for text in (t for t in result.warnings if t not in asked):
-            console.print(f"[bold yellow]warning:[/bold yellow] scenario {result.prepared.name!r}: {escape(text)}")
+        warn(result.prepared.name, [text for text in result.warnings if text not in asked])
+
+
+def warn(scenario: str, texts: Iterable[str]) -> None:
+    """Say on standard error what is to be borne in mind of a scenario."""
+    console = make_errors()
+    for text in texts:
+        console.print(f"[bold yellow]warning:[/bold yellow] scenario {scenario!r}: {escape(text)}")
 
 
 def print_findings(results: Sequence[RunResult]) -> None:

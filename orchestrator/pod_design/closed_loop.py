@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from orchestrator.analysis.continuation import Eigenpair, follow
+from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
 from orchestrator.analysis.modes import damping_ratio
-from orchestrator.analysis.stability import Stability, judge
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
@@ -79,9 +79,18 @@ class PodLoop:
         self._linearize_converters(self._blocks, setting)
         return compose(self._blocks, self._master.schedule)
 
-    def stability(self, setting: PodSetting) -> Stability:
-        """The verdict on the whole system with this setting, at any frequency."""
-        return judge(self.model(setting), system=where_given(lambda: self._continuous_model(setting)))
+    def examine(self, setting: PodSetting) -> Examination:
+        """The verdict on the whole system with this setting, at any frequency, and what is to be said beside it.
+
+        Raises
+        ------
+        InputError
+            If the communication step is so long that a slow mode is lost.
+        """
+        system = where_given(lambda: self._continuous_model(setting))
+        self._linearize_converters(self._blocks, setting)
+        model = compose(self._blocks, self._master.schedule)
+        return examine(self._master, self._blocks, model, system)
 
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
         """The same without any communication step, with half the gain and with the gain; it is linear in the gain.

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from orchestrator.analysis.continuation import pair_at
+from orchestrator.analysis.examination import Examination
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio
 from orchestrator.analysis.stability import Stability
@@ -102,8 +103,8 @@ class PodDesign:
         The other modes without the controller, and with the final setting.
     broken
         What the final setting does to other modes that it must not.
-    stability_before, stability
-        The verdict over the whole spectrum without the controller, and with the final setting.
+    examined_before, examined
+        The verdict over the whole spectrum without the controller and with the final setting, and what it rests on.
     """
 
     request: DesignRequest
@@ -126,13 +127,28 @@ class PodDesign:
     after: Surroundings
     broken: str | None
     margins: Margins | None
-    stability_before: Stability
-    stability: Stability
+    examined_before: Examination
+    examined: Examination
 
     @property
     def unbounded_gain(self) -> float:
         """The gain before the bounds [pu]."""
         return self.gain_compensated if self.request.compensated_gain else self.gain_non_compensated
+
+    @property
+    def stability_before(self) -> Stability:
+        """The verdict without the controller."""
+        return self.examined_before.stability
+
+    @property
+    def stability(self) -> Stability:
+        """The verdict with the final setting."""
+        return self.examined.stability
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be said beside the verdicts, each once."""
+        return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
 
     @property
     def met(self) -> bool:
@@ -203,6 +219,7 @@ def design_pod(case: Case, request: DesignRequest, report: Report = lambda text:
         loop = PodLoop(master, target.components, request.controller)
         report("modes without the controller")
         model = loop.model(_OFF)
+        examined = loop.examine(_OFF)
         before = surroundings(model, None, naming)
         if before.named is None:
             low, high = ELECTROMECHANICAL_HZ
@@ -211,7 +228,7 @@ def design_pod(case: Case, request: DesignRequest, report: Report = lambda text:
                 f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
             )
         off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
-        start = _Start(case.name, request, target, prepared, name, off, before.without(before.named), naming)
+        start = _Start(case.name, request, target, prepared, name, off, before.without(before.named), naming, examined)
         return _design(start, loop, report)
 
 
@@ -227,6 +244,7 @@ class _Start:
     off: Placed
     before: Surroundings
     naming: Naming
+    examined: Examination
 
 
 def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
@@ -261,9 +279,9 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
             loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others]
         )
         final = refinement.chosen or designed
-    after, stability = around(final), loop.stability(final.setting)
+    after, examined = around(final), loop.examine(final.setting)
     margins = None
-    if request.margins and final.setting.gain and stability.stable is not False:
+    if request.margins and final.setting.gain and examined.stability.stable is not False:
         report("margins")
         margins = compute_margins(loop, off, final, request.least_damping)
     return PodDesign(
@@ -285,16 +303,19 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
         final=final,
         before=before,
         after=after,
-        broken=breach(before, after, request.least_damping) or _unstable(stability),
+        broken=breach(before, after, request.least_damping) or _unstable(examined.stability),
         margins=margins,
-        stability_before=loop.stability(_OFF),
-        stability=stability,
+        examined_before=start.examined,
+        examined=examined,
     )
 
 
 def _unstable(stability: Stability) -> str | None:
-    """What is wrong with a design that leaves the system unstable, at whatever frequency."""
-    return f"the system is {stability.sentence()}" if stability.stable is False else None
+    """What is wrong with a design after which the system is not known to be stable, at whatever frequency."""
+    if stability.stable:
+        return None
+    subject = "the system is" if stability.stable is False else "whether the system is stable is"
+    return f"{subject} {stability.sentence()}"
 
 
 def _required(request: DesignRequest, initial: complex) -> float:

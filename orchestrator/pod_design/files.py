@@ -45,6 +45,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "stable": d.stability.stable,
         "largest_growth_rate": d.stability.largest_growth_rate,
         "stability": {"before": d.stability_before.as_json(), "after": d.stability.as_json()},
+        "warnings": list(d.warnings),
         "largest_real_part": {"before": d.before.growth, "after": d.after.growth},
         "margins": _margins_json(d.margins) if d.margins else None,
         "refinement": _refinement_json(d) if d.refinement else None,

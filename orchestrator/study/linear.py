@@ -1,13 +1,15 @@
 """The linear model of a scenario: exported for other tools, and laid over the simulated response."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
+from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel, Matrix
-from orchestrator.analysis.linearization import Blocks, continuous_model
-from orchestrator.analysis.stability import Stability, judge
+from orchestrator.analysis.linearization import Blocks, compose, continuous_model
+from orchestrator.analysis.stability import judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
@@ -47,8 +49,10 @@ def _is_output(prepared: PreparedScenario, name: str) -> bool:
 
 def linear_model(
     prepared: PreparedScenario, inputs: Sequence[str], outputs: Sequence[str], *, as_continuous: bool = False
-) -> tuple[StateSpace, OperatingPoint, Stability]:
+) -> tuple[StateSpace, OperatingPoint, Examination]:
     """The scenario's linear model around its steady state, as step map or continuous, with the verdict on it.
+
+    The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
     Raises
     ------
@@ -59,10 +63,18 @@ def linear_model(
     """
     with running(prepared) as master:
         point = find_operating_point(master)
-        blocks = Blocks(master, inputs=inputs, outputs=outputs, without_step=as_continuous)
-        space = state_space(blocks, None if as_continuous else master.schedule)
-        model = LinearModel.from_matrix(space.A, space.states, space.step_size)
-        return space, point, judge(model, system=None if as_continuous else continuous_model(master))
+        blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
+        examined = examine(master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks))
+        if not as_continuous:
+            return state_space(blocks, master.schedule), point, examined
+        space = state_space(Blocks(master, inputs=inputs, outputs=outputs, without_step=True), None)
+        own = judge(LinearModel.from_matrix(space.A, space.states, None))
+        warnings = examined.warnings
+        if examined.stability.stable is None:
+            own = replace(own, stable=None, reason=examined.stability.reason)
+        elif examined.stability.stable is not own.stable:
+            warnings = (f"with the communication step the system is {examined.stability.sentence()}", *warnings)
+        return space, point, Examination(own, warnings)
 
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:

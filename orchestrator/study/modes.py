@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.coupled_response import confirmed
 from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.examination import examine
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
-from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose, continuous_model
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
@@ -22,8 +21,7 @@ from orchestrator.analysis.modes import (
     most_associated,
     most_opposed,
 )
-from orchestrator.analysis.resolution import check_resolution
-from orchestrator.analysis.stability import Cause, Hidden, Stability, hidden, judge, whole_spectrum
+from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
@@ -166,10 +164,12 @@ def modes_from(
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         spectrum = whole_spectrum(model)
-        shown, named = find_critical_modes(model, low, high, critical), {}
-    stability = confirmed(master, blocks, model, judge(model, spectrum, system))
-    unstable = stability.cause is Cause.COUPLING
-    step = check_resolution(master, model, system, shown, frequency_range, coupling_unstable=unstable)
+        swinging = shown = find_critical_modes(model, low, high, critical)
+        named = {}
+    examined = examine(
+        master, blocks, model, system, spectrum=spectrum, modes=swinging, shown=shown, frequency_range=frequency_range
+    )
+    stability = examined.stability
     analysis = prepared.case.table.analysis
     return ModesResult(
         prepared=prepared,
@@ -180,9 +180,8 @@ def modes_from(
         references=_references(prepared),
         warnings=(
             *map(str, prepared.questions),
-            *_warnings(stability),
-            *step,
-            *map(str, doubts(blocks, master.schedule, model, shown)),
+            *_unknown(stability),
+            *examined.warnings,
         ),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
@@ -231,17 +230,11 @@ def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> 
     return found
 
 
-def _warnings(stability: Stability) -> tuple[str, ...]:
-    """Say before a run that the coupling itself is unstable, or that the FMUs do not confirm the verdict."""
+def _unknown(stability: Stability) -> tuple[str, ...]:
+    """Say that a verdict is missing, and why."""
     if stability.stable is None and stability.reason:
         return (f"whether the system is stable is not known: {stability.reason}",)
-    rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
-    if stability.cause is not Cause.COUPLING or growth is None:
-        return ()
-    return (
-        f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
-        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
-    )
+    return ()
 
 
 def _references(prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:

@@ -121,11 +121,37 @@ def test_a_drift_counts_by_the_second_however_short_the_step():
         find_operating_point(master)
 
 
+EDGE = ("--set", "gfor.voltage_control.i_q_max=0.89677")
+"""The power flow asks for 0.896769 of this current."""
+
+
 def test_modes_at_a_limit_s_edge_are_shown_with_a_warning(gfor):
-    """The power flow asks for 0.896769 of a current that may be 0.896770: 12.6 % of damping, where 10.6 % are right."""
-    code, shown, said = gfor("modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.89677")
+    """12.6 % of damping, where 10.6 % are right."""
+    code, shown, said = gfor("modes", "two_area", "--scenario", "gfor", *EDGE)
     assert code == 0
     assert "electromechanical" in shown
     assert "component 'gfor' is not linear at the operating point" in " ".join(said.split())
     _, _, said = gfor("modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.9")
     assert said == ""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("modes",),
+        ("modes", "--range", "2:5"),
+        ("modes", "--critical", "5"),
+        ("linearize",),
+        ("linearize", "--continuous"),
+        ("design", "--controller", "pod_p", "--no-margins"),
+    ],
+    ids=" ".join,
+)
+def test_no_command_calls_stable_what_stands_at_a_limit_s_edge(gfor, tmp_path, command):
+    """A disturbance of 1e-5 of the load ends there in lost synchronism."""
+    name, *options = command
+    out = () if name == "modes" else ("--out", str(tmp_path / ("x.toml" if name == "design" else "x")))
+    code, shown, _ = gfor(name, "two_area", "--scenario", "gfor", *EDGE, *options, *out, "--fail-unstable")
+    assert code == 1
+    assert "not known" in shown.splitlines()[0]
+    assert "answers differently up and down" in " ".join(shown.split())

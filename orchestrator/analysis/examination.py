@@ -1,0 +1,108 @@
+"""Whether the verdict of a linear model may be believed: held against the FMUs, their perturbation and the step.
+
+Every command that linearises asks here, so that none of them knows less than another.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from orchestrator.analysis.coupled_response import confirmed
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearity import Doubt, doubts
+from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, Spectrum, find_spectrum
+from orchestrator.analysis.resolution import check_resolution
+from orchestrator.analysis.stability import WHOLE, Cause, Stability, judge, whole_spectrum
+from orchestrator.coupling.master import Master
+
+
+@dataclass(frozen=True)
+class Examination:
+    """The verdict on a linearised system, and what is to be said beside it."""
+
+    stability: Stability
+    warnings: tuple[str, ...]
+
+
+def examine(
+    master: Master,
+    blocks: Blocks,
+    model: LinearModel,
+    system: LinearModel | None,
+    *,
+    spectrum: Spectrum | None = None,
+    modes: Sequence[Mode] | None = None,
+    shown: Sequence[Mode] | None = None,
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+) -> Examination:
+    """Judge a step map, and look for what would make the verdict wrong.
+
+    Parameters
+    ----------
+    master
+        At the operating point at which the blocks were linearised; it is left as it was.
+    model, system
+        The step map composed of the blocks, and the continuous model; None where a component gives no derivatives.
+    spectrum
+        All eigenvalues of the step map, where they are known already.
+    modes
+        Oscillations that must not depend on the perturbation; by default those of the range. Where a component is
+        doubtful, all from 0.1 to 2 Hz are added.
+    shown
+        Modes that must not depend on the communication step; by default the same.
+    frequency_range
+        [Hz]
+
+    Raises
+    ------
+    InputError
+        If the communication step is so long that a slow mode is lost.
+    """
+    if spectrum is None:
+        small = len(model.names) <= WHOLE
+        spectrum = find_spectrum(model, *frequency_range) if small and modes is None else whole_spectrum(model)
+    if modes is None:
+        modes = [] if spectrum is None else [mode for mode in spectrum.modes if mode.is_oscillation]
+    elif any(component.doubtful for component in blocks.components.values()) and len(model.names) <= WHOLE:
+        modes = [*modes, *(mode for mode in find_spectrum(model).modes if mode.is_oscillation)]
+    rightmost = [spectrum.rightmost] if spectrum is not None and spectrum.rightmost is not None else []
+    stability = confirmed(master, blocks, model, judge(model, spectrum, system))
+    found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
+    if turning := _turning(blocks, master, model, stability, found, rightmost):
+        return Examination(
+            replace(stability, stable=None, reason="; ".join(map(str, turning))),
+            tuple(str(doubt) for doubt in found if doubt not in turning),
+        )
+    unstable = stability.cause is Cause.COUPLING
+    step = check_resolution(
+        master, model, system, modes if shown is None else shown, frequency_range, coupling_unstable=unstable
+    )
+    return Examination(stability, (*_coupling(stability), *step, *map(str, found)))
+
+
+def _turning(
+    blocks: Blocks,
+    master: Master,
+    model: LinearModel,
+    stability: Stability,
+    found: list[Doubt],
+    rightmost: list[Mode],
+) -> list[Doubt]:
+    """Doubts that leave the verdict open; what grows must be in doubt itself."""
+    turning = [doubt for doubt in found if doubt.turns]
+    if not turning or stability.stable is None:
+        return []
+    if stability.stable is False:
+        return [doubt for doubt in doubts(blocks, master.schedule, model, rightmost) if doubt.turns]
+    return turning
+
+
+def _coupling(stability: Stability) -> tuple[str, ...]:
+    """Say before a run that the coupling itself is unstable."""
+    rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
+    if stability.cause is not Cause.COUPLING or growth is None:
+        return ()
+    return (
+        f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
+        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
+    )
