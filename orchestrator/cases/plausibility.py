@@ -212,15 +212,8 @@ def _place(draft: Draft, name: str, *variables: str) -> str:
 
 def _value(plan: ComponentPlan, variable: str) -> float | None:
     """The number in effect: what is set, else the FMU's default; None where there is neither."""
-    if variable in plan.parameters:
-        return float(plan.parameters[variable])
-    info = plan.description.variables.get(variable)
-    if info is None or info.type == "Boolean" or info.start is None:
-        return None
-    try:
-        return float(info.start)
-    except ValueError:
-        return None
+    value = plan.value(variable) if variable in plan.description.variables else None
+    return None if value is None or isinstance(value, bool | str) else float(value)
 
 
 def _unit(plan: ComponentPlan, variable: str) -> str:

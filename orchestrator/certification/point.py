@@ -174,7 +174,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             found = modes_of(prepared, master, COMPUTED)
             result.residual, result.warnings = found.operating_point.residual, found.warnings
             _keep_modes(result, found.model, found.stability)
-        f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
+        f_n = prepared.system.components["sg1"].number("f_n")
         try:
             master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:

@@ -83,7 +83,7 @@ def _values(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, 
 
 def _start(description: FmuDescription, name: str) -> float:
     info = description.variables.get(name)
-    return float(info.start) if info is not None and info.start else (1.0 if name == "v_0" else 0.0)
+    return info.start_number if info is not None and info.start is not None else float(name == "v_0")
 
 
 def _check_port(description: FmuDescription, bench: Bench) -> None:

@@ -78,7 +78,7 @@ class BoundComponent(Component):
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._natives = description.port, description.natives
         self._start: dict[str, float] = {
-            name: float(description.variables[name].start or 0.0) for name in START if name in description.variables
+            name: description.variables[name].start_number for name in START if name in description.variables
         }
         self._start_is_new = True
         self._adapter = _Adapter()

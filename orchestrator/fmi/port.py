@@ -179,17 +179,17 @@ def _passed(native: FmuDescription, port: PortMap, name: str, own: str, referenc
 
 def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
     texts = {
-        "v_re": ("input", "pu", "1.0", "Bus voltage, real part, network frame [pu, bus]"),
-        "v_im": ("input", "pu", "0.0", "Bus voltage, imaginary part, network frame [pu, bus]"),
+        "v_re": ("input", "pu", 1.0, "Bus voltage, real part, network frame [pu, bus]"),
+        "v_im": ("input", "pu", 0.0, "Bus voltage, imaginary part, network frame [pu, bus]"),
         "i_re": ("output", "pu", None, "Injected current, real part, network frame [pu, 100 MVA]"),
         "i_im": ("output", "pu", None, "Injected current, imaginary part, network frame [pu, 100 MVA]"),
         "p": ("output", "pu", None, "Active power into the bus [pu, S_n]"),
         "q": ("output", "pu", None, "Reactive power into the bus [pu, S_n]"),
-        "S_n": ("parameter", "MVA", repr(port.rating), "Rated apparent power, the device's base"),
-        "P_0": ("parameter", "pu", "0.0", "Power flow: active power into the bus [pu, S_n]"),
-        "Q_0": ("parameter", "pu", "0.0", "Power flow: reactive power into the bus [pu, S_n]"),
-        "v_0": ("parameter", "pu", "1.0", "Power flow: voltage magnitude at the bus [pu, bus]"),
-        "theta_0": ("parameter", "rad", "0.0", "Power flow: voltage angle at the bus"),
+        "S_n": ("parameter", "MVA", port.rating, "Rated apparent power, the device's base"),
+        "P_0": ("parameter", "pu", 0.0, "Power flow: active power into the bus [pu, S_n]"),
+        "Q_0": ("parameter", "pu", 0.0, "Power flow: reactive power into the bus [pu, S_n]"),
+        "v_0": ("parameter", "pu", 1.0, "Power flow: voltage magnitude at the bus [pu, bus]"),
+        "theta_0": ("parameter", "rad", 0.0, "Power flow: voltage angle at the bus"),
     }
     limits = {"S_n": (1e-3, None), "P_0": (-2.0, 2.0), "Q_0": (-2.0, 2.0), "v_0": (0.1, 2.0)}
     return {
