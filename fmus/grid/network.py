@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-SYSTEM_BASE_MVA = 100.0
 SMALLEST_REACTANCE = 1e-5
 """Of a line [pu, 100 MVA]."""
 

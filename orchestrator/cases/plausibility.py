@@ -85,15 +85,14 @@ def _outside(
     if wanted.fits(value):
         return
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
-    usual = f"{wanted.low:g} to {wanted.high:g}{unit}" if wanted.low < wanted.high else f"{wanted.low:g}{unit}"
     slip = ""
     for factor, text, far in (
         (1e-3, "too large", value > _FAR * wanted.high),
         (1e3, "too small", value < wanted.low / _FAR),
     ):
-        if wanted.low <= value * factor <= wanted.high and (far or wanted.low == wanted.high):
-            slip = f"; it looks {'1000' if wanted.low < wanted.high else ''} times {text}: check its unit and base"
-    text = f"{variable} = {value:g}{unit} is outside of {usual} ({wanted.why}){slip}"
+        if far and wanted.low <= value * factor <= wanted.high:
+            slip = f"; it looks 1000 times {text}: check its unit and base"
+    text = f"{variable} = {value:g}{unit} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
 
 

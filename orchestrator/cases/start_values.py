@@ -3,7 +3,8 @@
 import cmath
 from collections.abc import Mapping
 
-from fmus.grid.network import SYSTEM_BASE_MVA, Network
+from fmus.grid.network import Network
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.compiler import compile_here
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.interrupts import calls
-from orchestrator.fmi.port import PORT, START, SYSTEM_BASE_MVA, BoundDescription, PhasorMap
+from orchestrator.fmi.port import PORT, START, BoundDescription, PhasorMap
 
 _SOURCE = Path(__file__).with_name("port_adapter.c")
 

@@ -126,6 +126,26 @@ def vendor_fmu(breaker=None):
     return cached(m.build())
 
 
+OTHER_BASE = (
+    "S_base = 90 MVA; currents at the port and all networks are in pu of the system base, which is 100 MVA: leave "
+    "S_base away, and give the device's own rating with S_n"
+)
+
+
+def test_another_system_base_is_refused_where_it_is_set(prepared):
+    base = RING.replace("P_0 = 0.6,", "P_0 = 0.6, S_base = 90,")
+    line = 1 + next(k for k, text in enumerate(base.splitlines()) if "S_base" in text)
+    with pytest.raises(CaseError, match="S_base") as caught:
+        prepared("", None, base)
+    assert f"line {line}, components.vsc.parameters.S_base: component 'vsc': {OTHER_BASE}" in str(caught.value)
+    assert the_problem(prepared, "", {"sg.S_base": "90 MVA"}) == f"--set sg.S_base: component 'sg': {OTHER_BASE}"
+
+
+def test_the_system_base_itself_may_be_set(prepared):
+    plain, given = prepared(), prepared("", {"vsc.S_base": "100 MVA"})
+    assert given.power_flow.powers == plain.power_flow.powers
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_a_breaker_that_another_tool_declares_as_1_or_0(prepared, tmp_path, closed):
     path = tmp_path / "vendor.fmu"

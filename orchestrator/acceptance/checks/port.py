@@ -7,12 +7,13 @@ from math import isinf, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Point, Running, Subject, Vector
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.port import SYSTEM_BASE_MVA, BoundDescription
+from orchestrator.fmi.port import BoundDescription
 
 Complexes = NDArray[np.complex128]
 
