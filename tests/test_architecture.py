@@ -28,7 +28,7 @@ FLOORS = (
 )
 """Lowest first; those on one floor do not know each other."""
 
-PLAIN_DATA = {"fmus.toolchain.port_variables", "fmus.toolchain.variables"}
+PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}
 """Modules of the FMUs that the whole orchestrator may read."""
 
 

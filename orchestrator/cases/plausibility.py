@@ -8,6 +8,7 @@ import fnmatch
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmus.grid.names import line_variable
 from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import (
@@ -174,16 +175,17 @@ def _lines(draft: Draft) -> Iterator[_Doubt]:
         return
     wanted = {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}
     for line in draft.network.lines:
-        found = {q: _value(grid, f"{q}_{line.name}") for q in ("X", "R", "B", "tap")}
+        found = {q: _value(grid, line.variable(q)) for q in ("X", "R", "B", "tap")}
         for quantity, usual in wanted.items():
             value = found[quantity]
             if value is not None:
                 where = _line_place(draft, line.name, quantity)
-                yield from _outside(draft, draft.grid, f"{quantity}_{line.name}", value, usual, where)
+                yield from _outside(draft, draft.grid, line.variable(quantity), value, usual, where)
         R, X = found["R"], found["X"]
         if R is not None and X is not None and R > MOST_R_OVER_X * X:
-            text = f"R_{line.name} = {R:g} pu is {R / X:.3g} times X_{line.name} = {X:g} pu; are the two swapped?"
-            yield _Doubt(f"{draft.grid}.R_{line.name}", _line_place(draft, line.name, "R"), text)
+            names = line.variable("R"), line.variable("X")
+            text = f"{names[0]} = {R:g} pu is {R / X:.3g} times {names[1]} = {X:g} pu; are the two swapped?"
+            yield _Doubt(f"{draft.grid}.{names[0]}", _line_place(draft, line.name, "R"), text)
     if (stray := _value(grid, "stray_B")) is not None:
         yield from _outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
 
@@ -191,7 +193,7 @@ def _lines(draft: Draft) -> Iterator[_Doubt]:
 def _line_place(draft: Draft, line: str, quantity: str) -> str:
     """Where a line's value was set, else where the line is."""
     table = draft.case.network
-    if set_at := draft.places.get(f"{draft.grid}.{quantity}_{line}"):
+    if set_at := draft.places.get(f"{draft.grid}.{line_variable(line, quantity)}"):
         return set_at
     if table is not None and line in table.lines:
         return draft.place("network", "lines", line, quantity)

@@ -66,12 +66,12 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             line.name,
             line.from_bus,
             line.to_bus,
-            R=grid.number(f"R_{line.name}"),
-            X=grid.number(f"X_{line.name}"),
-            B=grid.number(f"B_{line.name}") if line.B else 0.0,
-            tap=grid.number(f"tap_{line.name}") if line.has_ratio else 1.0,
-            shift=grid.number(f"shift_{line.name}") if line.has_ratio else 0.0,
-            closed=_is_connected(grid, f"{line.name}."),
+            R=grid.number(line.variable("R")),
+            X=grid.number(line.variable("X")),
+            B=grid.number(line.variable("B")) if line.B else 0.0,
+            tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
+            shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
+            closed=_is_connected(grid, line.variable("connected")),
         )
         for line in network.lines
     ]
@@ -102,14 +102,13 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
 
 
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
-    connected = _is_connected(plan) and _is_connected(grid, f"{name}.")
+    connected = _is_connected(plan, "connected") and _is_connected(grid, f"{name}.connected")
     return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected)
 
 
-def _is_connected(plan: ComponentPlan, element: str = "") -> bool:
+def _is_connected(plan: ComponentPlan, switch: str) -> bool:
     """Whether a breaker is closed; an FMU without one has it closed."""
-    name = f"{element}connected"
-    state = plan.value(name) if name in plan.description.variables else None
+    state = plan.value(switch) if switch in plan.description.variables else None
     return state is None or bool(state)
 
 
