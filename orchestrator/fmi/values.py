@@ -12,7 +12,7 @@ _RULES = {
 
 
 def typed(text: str, fmi_type: str) -> Scalar:
-    """A value from its text; that of a type which is none of Real, Integer, Enumeration and Boolean stays text.
+    """Read a value's text: a Real, Integer, Enumeration or Boolean is converted, any other type stays text.
 
     Raises
     ------
