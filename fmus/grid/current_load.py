@@ -17,7 +17,7 @@ from fmus.grid.elements import Bus, DeclaredLoad
 from fmus.grid.network import Load
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import SYSTEM_BASE
+from fmus.toolchain.port_variables import SYSTEM_BASE
 
 RECOVERY_TIME = 1e-3
 """Default of τ [s]: its pole lies far above all electromechanical modes and well below the communication rate."""

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.grid.network import SMALLEST_REACTANCE, SYSTEM_BASE_MVA, Line, Load, Network, Port, Shunt
+from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
-from fmus.toolchain.port import BREAKER_TIME, SYSTEM_BASE
+from fmus.toolchain.port import BREAKER_TIME
+from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
 
 OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays, so that a bus which only this line supports keeps a defined voltage."""
@@ -101,15 +102,14 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
     def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> ca.SX:
         base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
         return m.parameter(
-            f"{name}_{line.name}", value, unit, f"{text} of line {line.name}", base=base, minimum=minimum,
+            line.variable(name), value, unit, f"{text} of line {line.name}", base=base, minimum=minimum,
             maximum=maximum, tunable=name != "B",
         )  # fmt: skip
 
     start, end = buses[line.from_bus], buses[line.to_bus]
     X = parameter("X", line.X, "pu", "Reactance", SMALLEST_REACTANCE, 100)
     R = parameter("R", line.R, "pu", "Resistance", 0, None)
-    with m.scope(line.name):
-        connected = m.switch("connected", True, f"Line {line.name} is closed at both ends", tunable=True)
+    connected = m.switch(line.variable("connected"), True, f"Line {line.name} is closed at both ends", tunable=True)
     ratio, turns = None, ca.SX(1)
     if line.has_ratio:
         turns = parameter("tap", line.tap, "1", "Magnitude of the ratio at the from side", 0.1, 10)

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-SYSTEM_BASE_MVA = 100.0
+from fmus.grid.names import line_variable
+
 SMALLEST_REACTANCE = 1e-5
 """Of a line [pu, 100 MVA]."""
 
@@ -32,6 +33,10 @@ class Line:
     @property
     def has_ratio(self) -> bool:
         return self.tap != 1.0 or self.shift != 0.0
+
+    def variable(self, quantity: str) -> str:
+        """Name of one of its variables in the grid's FMU, such as ``X`` or ``connected``."""
+        return line_variable(self.name, quantity)
 
 
 @dataclass(frozen=True, slots=True)

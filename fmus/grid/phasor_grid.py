@@ -25,7 +25,7 @@ from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.phasor_port import phasor_builder
-from fmus.toolchain.port import SYSTEM_BASE
+from fmus.toolchain.port_variables import SYSTEM_BASE
 
 
 def phasor_grid(network: Network) -> Model:

@@ -10,9 +10,8 @@ import casadi as ca
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import SYSTEM_BASE
+from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
 
-SYSTEM_BASE_MVA = 100.0
 TOLERANCE = 1e-9
 """How much before its time [s] something happens: far more than the clock's rounding, far less than an internal step.
 

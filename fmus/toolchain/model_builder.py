@@ -5,6 +5,7 @@ A quantity is declared where it is used, and the equations read like the block d
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import casadi as ca
 
@@ -78,6 +79,14 @@ class ModelBuilder:
         return symbol
 
     # -- declarations ------------------------------------------------------------------------
+
+    def declare(self, variable: Parameter | Input) -> ca.SX:
+        """Declare a parameter or an input that is described elsewhere, such as one of the port's."""
+        return self._declare(replace(variable, name=self._full(variable.name)))
+
+    def declare_output(self, variable: Output, value: Scalar) -> None:
+        """Declare an output that is described elsewhere as a function of states, inputs and parameters."""
+        self.output(variable.name, value, variable.unit, variable.description, variable.base)
 
     def parameter(
         self,

@@ -11,7 +11,8 @@ import casadi as ca
 
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import SYSTEM_BASE, DevicePort, declare_port_outputs
+from fmus.toolchain.port import DevicePort, declare_port_outputs
+from fmus.toolchain.port_variables import SYSTEM_BASE
 
 INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
 """Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs

@@ -7,14 +7,14 @@ A breaker at the port is open where ``connected`` is false. Its phases interrupt
 of its current; here the current fades with `BREAKER_TIME`, di/dt = −i/τ, whatever the voltages are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
+from fmus.toolchain import port_variables
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
 from fmus.toolchain.model_builder import ModelBuilder
 
-SYSTEM_BASE = "100 MVA"
 BREAKER_TIME = 1e-3
 """Time constant τ [s] with which the current of an open breaker fades."""
 
@@ -52,30 +52,21 @@ class DevicePort:
 def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     """Declare rating, power-flow start values and the voltage input of a device."""
     rating = declare_rating(m, S_n)
-    system = m.parameter("S_base", 100.0, "MVA", "Base power of the network", minimum=1e-3)
-    v = Phasor(
-        m.input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0),
-        m.input("v_im", "pu", "Bus voltage, imaginary part, network frame", base="bus"),
-    )
+    system = m.declare(port_variables.S_BASE)
+    v = Phasor(m.declare(port_variables.V_RE), m.declare(port_variables.V_IM))
     return port_at(m, v, P_0, rating / system)
 
 
 def declare_rating(m: ModelBuilder, S_n: float) -> ca.SX:
     """Declare the rating [MVA]."""
-    return m.parameter("S_n", S_n, "MVA", "Rated apparent power, the device's base", minimum=1e-3)
+    return m.declare(replace(port_variables.S_N, start=float(S_n)))
 
 
 def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> DevicePort:
     """Declare the power-flow start values of a device at a bus voltage, network frame [pu]."""
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
-    v_0 = m.parameter(
-        "v_0", 1.0, "pu", "Power flow: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0
-    )
-    theta_0 = m.parameter("theta_0", 0.0, "rad", "Power flow: voltage angle at the bus")
-    p_0 = m.parameter("P_0", P_0, "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
-    q_0 = m.parameter(
-        "Q_0", 0.0, "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0
-    )
+    v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
+    p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)
     connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     bus = polar(v_0, theta_0)
     return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, current_scale, connected)
@@ -85,7 +76,7 @@ def declare_port_outputs(m: ModelBuilder, port: DevicePort, current: Phasor) -> 
     """Declare i_re, i_im on the system base, and p, q at the bus on the rating."""
     injected = current * port.current_scale
     s = power(port.v, current)
-    m.output("i_re", injected.re, "pu", "Injected current, real part, network frame", base=SYSTEM_BASE)
-    m.output("i_im", injected.im, "pu", "Injected current, imaginary part, network frame", base=SYSTEM_BASE)
-    m.output("p", s.re, "pu", "Active power into the bus", base="S_n")
-    m.output("q", s.im, "pu", "Reactive power into the bus", base="S_n")
+    m.declare_output(port_variables.I_RE, injected.re)
+    m.declare_output(port_variables.I_IM, injected.im)
+    m.declare_output(port_variables.P, s.re)
+    m.declare_output(port_variables.Q, s.im)

@@ -51,8 +51,8 @@ def _parameters(component: Component, model: EmbeddedModel) -> dict[str, float |
     """What every parameter of the FMU must be: the model's value, else its start."""
     variables = component.description.variables
     starts = {
-        name: variables[name].start in ("true", "1") if variables[name].type == "Boolean" else float(start)
+        name: start
         for name in component.description.parameters
-        if variables[name].type != "String" and (start := variables[name].start) is not None
+        if (start := variables[name].start) is not None and not isinstance(start, str)
     }
     return starts | model.parameters

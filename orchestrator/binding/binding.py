@@ -10,13 +10,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.binding.scales import PER_UNIT, Bases, amount, unit_of
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
 from orchestrator.errors import BindingError, InputError, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 from orchestrator.fmi.port import (
     START,
-    SYSTEM_BASE_MVA,
     BoundDescription,
     Form,
     Matrix2,

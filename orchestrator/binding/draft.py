@@ -162,12 +162,12 @@ def _rating(S_n: VariableInfo | None, native: FmuDescription) -> list[str]:
     lines = ["[rating]"]
     if S_n is not None and S_n.start is not None:
         unit = S_n.unit if S_n.unit in ("MVA", "kVA", "VA", "GVA") else "MVA"
-        lines.append(f'S_n = "{float(S_n.start):g} {unit}"  # GUESS: start value of {S_n.name}')
+        lines.append(f'S_n = "{S_n.start_number:g} {unit}"  # GUESS: start value of {S_n.name}')
     else:
         lines.append(f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"')
     lines.append('# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A')
-    f_n = next((v for v in native.variables.values() if v.name == "f_n" and v.start), None)
-    lines.append(f'f_n = "{float(f_n.start or 50) if f_n else 50:g} Hz"  # GUESS')
+    f_n = native.variables.get("f_n")
+    lines.append(f'f_n = "{50 if f_n is None or f_n.start is None else f_n.start_number:g} Hz"  # GUESS')
     return lines
 
 

@@ -8,7 +8,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.native import sets_native
 from orchestrator.cases.schema import Value
 from orchestrator.cases.unit_tables import sets_alpha
-from orchestrator.cases.values import convert, flatten
+from orchestrator.cases.values import check_system_base, convert, flatten
 from orchestrator.fmi.description import VariableInfo
 
 
@@ -71,7 +71,13 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         draft.note(where, f"{variable} is of causality {info.causality}; only parameters and inputs can be set")
         return
     converted = convert_value(draft, info, value, where)
-    if converted is not None:
+    if converted is None:
+        return
+    try:
+        check_system_base(plan.description, variable, converted)
+    except ValueError as error:
+        draft.note(where, f"component {name!r}: {error}")
+    else:
         target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
         target[variable] = converted
         draft.places[f"{name}.{variable}"] = where

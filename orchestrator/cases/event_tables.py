@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+from fmus.grid.names import lines_among
 from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
@@ -153,11 +154,11 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     wanted, kind, known = "", "", list[str]()
     match event:
         case LineSwitching() | BranchChange():
-            wanted, kind, known = event.line, "line", _ending(names, "X_", "")
+            wanted, kind, known = event.line, "line", lines_among(names)
         case LoadChange() | LoadSwitching():
-            wanted, kind, known = event.load, "load", _ending(names, "", ".scale")
+            wanted, kind, known = event.load, "load", _elements(names, "scale")
         case UnitSwitching():
-            wanted, kind, known = event.unit, "unit", _ending(names, "", ".i_re", inputs=plan.description.inputs)
+            wanted, kind, known = event.unit, "unit", _elements(plan.description.inputs, "i_re")
     if kind and wanted not in known:
         some = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
         hint = close_names(wanted, known, f"it has: {some}" if known else f"it has no {kind}s")
@@ -165,6 +166,6 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     return f"component {component!r} has no variable {variable!r} for this event to set"
 
 
-def _ending(names: Iterable[str], prefix: str, suffix: str, inputs: Iterable[str] | None = None) -> list[str]:
-    chosen = names if inputs is None else inputs
-    return [n.removeprefix(prefix).removesuffix(suffix) for n in chosen if n.startswith(prefix) and n.endswith(suffix)]
+def _elements(names: Iterable[str], variable: str) -> list[str]:
+    """Names of the elements that have a variable."""
+    return [name.removesuffix(f".{variable}") for name in names if name.endswith(f".{variable}")]

@@ -9,9 +9,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from fmus.grid.elements import OPEN_CHARGING
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
-
-BASE_MVA = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +75,7 @@ def nodal_powers(
             needed[line.from_bus] += complex(behind * current.conjugate())
             needed[line.to_bus] -= complex(v_to * current.conjugate())
     for load in loads:
-        needed[load.bus] += complex(load.p_mw, load.q_mvar) / BASE_MVA
+        needed[load.bus] += complex(load.p_mw, load.q_mvar) / SYSTEM_BASE_MVA
     for shunt in shunts:
         needed[shunt.bus] += complex(shunt.g, -shunt.b) * abs(voltages[shunt.bus]) ** 2
     return needed
@@ -122,7 +121,7 @@ def widest_angle(
     position = {bus: k for k, bus in enumerate(buses)}
     power = np.array([injected.get(bus, 0.0) for bus in buses])
     for load in loads:
-        power[position[load.bus]] -= load.p_mw / BASE_MVA
+        power[position[load.bus]] -= load.p_mw / SYSTEM_BASE_MVA
     start = np.array([position[line.from_bus] for line in closed])
     end = np.array([position[line.to_bus] for line in closed])
     b = np.array([1 / (line.X * line.tap) for line in closed])
@@ -138,7 +137,8 @@ def widest_angle(
     worst = int(np.argmax(np.abs(across)))
     line, degrees = closed[worst], math.degrees(across[worst])
     ends = (f"{bus!r} ({math.degrees(angle[position[bus]]):.1f} deg)" for bus in (line.from_bus, line.to_bus))
+    carried = across[worst] * b[worst] * SYSTEM_BASE_MVA
     return (
         f"In the DC solution the largest angle, {abs(degrees):.1f} deg, is across {line.name!r} between "
-        f"{' and '.join(ends)}, X = {line.X:g} pu, which would carry {across[worst] * b[worst] * BASE_MVA:.0f} MW. "
+        f"{' and '.join(ends)}, X = {line.X:g} pu, which would carry {carried:.0f} MW. "
     )

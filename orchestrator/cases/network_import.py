@@ -4,7 +4,8 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 
-from fmus.grid.network import SYSTEM_BASE_MVA, Line, Load, Shunt
+from fmus.grid.network import Line, Load, Shunt
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import Matrix, SourceTables
 from orchestrator.errors import InputError
 

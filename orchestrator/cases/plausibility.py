@@ -8,6 +8,7 @@ import fnmatch
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmus.grid.names import line_variable
 from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import (
@@ -85,15 +86,14 @@ def _outside(
     if wanted.fits(value):
         return
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
-    usual = f"{wanted.low:g} to {wanted.high:g}{unit}" if wanted.low < wanted.high else f"{wanted.low:g}{unit}"
     slip = ""
     for factor, text, far in (
         (1e-3, "too large", value > _FAR * wanted.high),
         (1e3, "too small", value < wanted.low / _FAR),
     ):
-        if wanted.low <= value * factor <= wanted.high and (far or wanted.low == wanted.high):
-            slip = f"; it looks {'1000' if wanted.low < wanted.high else ''} times {text}: check its unit and base"
-    text = f"{variable} = {value:g}{unit} is outside of {usual} ({wanted.why}){slip}"
+        if far and wanted.low <= value * factor <= wanted.high:
+            slip = f"; it looks 1000 times {text}: check its unit and base"
+    text = f"{variable} = {value:g}{unit} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
 
 
@@ -175,16 +175,17 @@ def _lines(draft: Draft) -> Iterator[_Doubt]:
         return
     wanted = {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}
     for line in draft.network.lines:
-        found = {q: _value(grid, f"{q}_{line.name}") for q in ("X", "R", "B", "tap")}
+        found = {q: _value(grid, line.variable(q)) for q in ("X", "R", "B", "tap")}
         for quantity, usual in wanted.items():
             value = found[quantity]
             if value is not None:
                 where = _line_place(draft, line.name, quantity)
-                yield from _outside(draft, draft.grid, f"{quantity}_{line.name}", value, usual, where)
+                yield from _outside(draft, draft.grid, line.variable(quantity), value, usual, where)
         R, X = found["R"], found["X"]
         if R is not None and X is not None and R > MOST_R_OVER_X * X:
-            text = f"R_{line.name} = {R:g} pu is {R / X:.3g} times X_{line.name} = {X:g} pu; are the two swapped?"
-            yield _Doubt(f"{draft.grid}.R_{line.name}", _line_place(draft, line.name, "R"), text)
+            names = line.variable("R"), line.variable("X")
+            text = f"{names[0]} = {R:g} pu is {R / X:.3g} times {names[1]} = {X:g} pu; are the two swapped?"
+            yield _Doubt(f"{draft.grid}.{names[0]}", _line_place(draft, line.name, "R"), text)
     if (stray := _value(grid, "stray_B")) is not None:
         yield from _outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
 
@@ -192,7 +193,7 @@ def _lines(draft: Draft) -> Iterator[_Doubt]:
 def _line_place(draft: Draft, line: str, quantity: str) -> str:
     """Where a line's value was set, else where the line is."""
     table = draft.case.network
-    if set_at := draft.places.get(f"{draft.grid}.{quantity}_{line}"):
+    if set_at := draft.places.get(f"{draft.grid}.{line_variable(line, quantity)}"):
         return set_at
     if table is not None and line in table.lines:
         return draft.place("network", "lines", line, quantity)
@@ -212,15 +213,8 @@ def _place(draft: Draft, name: str, *variables: str) -> str:
 
 def _value(plan: ComponentPlan, variable: str) -> float | None:
     """The number in effect: what is set, else the FMU's default; None where there is neither."""
-    if variable in plan.parameters:
-        return float(plan.parameters[variable])
-    info = plan.description.variables.get(variable)
-    if info is None or info.type == "Boolean" or info.start is None:
-        return None
-    try:
-        return float(info.start)
-    except ValueError:
-        return None
+    value = plan.value(variable) if variable in plan.description.variables else None
+    return None if value is None or isinstance(value, bool | str) else float(value)
 
 
 def _unit(plan: ComponentPlan, variable: str) -> str:

@@ -96,7 +96,6 @@ _POD = {
 
 _PORT = {
     "S_n": Plausible(0.05, 20_000, "MVA", "from a distribution converter to a whole area"),
-    "S_base": Plausible(100, 100, "MVA", "the networks here are per unit on 100 MVA"),
     "V_n": Plausible(0.1, 1500, "kV", "from low voltage to 1500 kV"),
     "f_n": Plausible(45, 65, "Hz", "grids have 50 or 60 Hz"),
     "v_0": Plausible(0.8, 1.2, "pu", "operation within 20 % of the rated voltage"),

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers, widest_angle
 from orchestrator.errors import InputError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
-BASE_MVA = 100.0
 _TOLERANCE = 1e-9
 """Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
 _KV = 230.0
@@ -117,7 +117,7 @@ def _pandapower_voltages(
     for load in loads:
         pp.create_load(net, index[load.bus], p_mw=load.p_mw, q_mvar=load.q_mvar)
     for shunt in shunts:
-        pp.create_shunt(net, index[shunt.bus], p_mw=shunt.g * BASE_MVA, q_mvar=-shunt.b * BASE_MVA)
+        pp.create_shunt(net, index[shunt.bus], p_mw=shunt.g * SYSTEM_BASE_MVA, q_mvar=-shunt.b * SYSTEM_BASE_MVA)
     for bus, members in at_bus.items():
         if bus == slack_bus:
             pp.create_ext_grid(net, index[bus], vm_pu=members[0].v_0)
@@ -129,7 +129,7 @@ def _pandapower_voltages(
             trafo_model="pi",
         )  # fmt: skip
     except pp.LoadflowNotConverged as error:
-        injected = {bus: sum(u.P_0 * u.S_n for u in members) / BASE_MVA for bus, members in at_bus.items()}
+        injected = {bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA for bus, members in at_bus.items()}
         raise InputError(
             "power flow: no solution found; the lines cannot carry the power asked of them. "
             f"{widest_angle(buses, lines, loads, injected, slack_bus)}Lower P_0 or the loads, or the line reactances"
@@ -146,12 +146,12 @@ def empty_network() -> Any:
     """
     import pandapower as pp  # noqa: PLC0415 - as above
 
-    return pp.create_empty_network(f_hz=50.0, sn_mva=BASE_MVA)
+    return pp.create_empty_network(f_hz=50.0, sn_mva=SYSTEM_BASE_MVA)
 
 
 def _add_line(pp: Any, net: Any, line: FlowLine, index: Mapping[str, int]) -> None:
     """A line, or a transformer where it has a ratio; shunts alone where it is open."""
-    impedance = _KV**2 / BASE_MVA
+    impedance = _KV**2 / SYSTEM_BASE_MVA
     ends = index[line.from_bus], index[line.to_bus]
     if line.closed and not line.has_ratio:
         pp.create_line_from_parameters(
@@ -167,12 +167,12 @@ def _add_line(pp: Any, net: Any, line: FlowLine, index: Mapping[str, int]) -> No
         return
     for end, b in zip(ends, line.charging, strict=True):
         if b:
-            pp.create_shunt(net, end, p_mw=0.0, q_mvar=-b * BASE_MVA)
+            pp.create_shunt(net, end, p_mw=0.0, q_mvar=-b * SYSTEM_BASE_MVA)
     if line.closed:
         pp.create_transformer_from_parameters(
             net,
             *ends,
-            sn_mva=BASE_MVA,
+            sn_mva=SYSTEM_BASE_MVA,
             vn_hv_kv=line.tap * _KV,
             vn_lv_kv=_KV,
             vkr_percent=100 * line.R,
@@ -199,10 +199,10 @@ def _shares(
             residual = max(residual, abs(power))
             continue
         rating = sum(u.S_n for u in members)
-        fed = power.real if bus == slack_bus else sum(u.P_0 * u.S_n for u in members) / BASE_MVA
+        fed = power.real if bus == slack_bus else sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA
         residual = max(residual, abs(power.real - fed))
-        q = power.imag * BASE_MVA / rating
+        q = power.imag * SYSTEM_BASE_MVA / rating
         for unit in members:
-            p = power.real * BASE_MVA / rating if bus == slack_bus else unit.P_0
+            p = power.real * SYSTEM_BASE_MVA / rating if bus == slack_bus else unit.P_0
             powers[unit.name] = complex(p, q)
     return PowerFlow(voltages, powers, residual)

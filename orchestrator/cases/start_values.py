@@ -3,7 +3,8 @@
 import cmath
 from collections.abc import Mapping
 
-from fmus.grid.network import SYSTEM_BASE_MVA, Network
+from fmus.grid.network import Network
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
@@ -65,12 +66,12 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             line.name,
             line.from_bus,
             line.to_bus,
-            R=_value(grid, f"R_{line.name}"),
-            X=_value(grid, f"X_{line.name}"),
-            B=_value(grid, f"B_{line.name}") if line.B else 0.0,
-            tap=_value(grid, f"tap_{line.name}") if line.has_ratio else 1.0,
-            shift=_value(grid, f"shift_{line.name}") if line.has_ratio else 0.0,
-            closed=_is_connected(grid, f"{line.name}."),
+            R=grid.number(line.variable("R")),
+            X=grid.number(line.variable("X")),
+            B=grid.number(line.variable("B")) if line.B else 0.0,
+            tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
+            shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
+            closed=_is_connected(grid, line.variable("connected")),
         )
         for line in network.lines
     ]
@@ -80,8 +81,8 @@ def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
     return [
         FlowLoad(
             load.bus,
-            p_mw=_value(grid, f"{load.name}.scale") * _value(grid, f"{load.name}.P"),
-            q_mvar=_value(grid, f"{load.name}.scale") * _value(grid, f"{load.name}.Q") if load.q_mvar else 0.0,
+            p_mw=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.P"),
+            q_mvar=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.Q") if load.q_mvar else 0.0,
         )
         for load in network.loads
     ]
@@ -91,24 +92,24 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
     shunts = [
         FlowShunt(
             shunt.bus,
-            g=_value(grid, f"{shunt.name}.G") / SYSTEM_BASE_MVA if shunt.g_mw else 0.0,
-            b=_value(grid, f"{shunt.name}.B") / SYSTEM_BASE_MVA if shunt.b_mvar else 0.0,
+            g=grid.number(f"{shunt.name}.G") / SYSTEM_BASE_MVA if shunt.g_mw else 0.0,
+            b=grid.number(f"{shunt.name}.B") / SYSTEM_BASE_MVA if shunt.b_mvar else 0.0,
         )
         for shunt in network.shunts
     ]
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
-    return shunts + [FlowShunt(bus, g=0.0, b=_value(grid, "stray_B")) for bus in stray]
+    return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B")) for bus in stray]
 
 
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
-    connected = _is_connected(plan) and _is_connected(grid, f"{name}.")
-    return FlowUnit(name, bus, _value(plan, "S_n"), _value(plan, "P_0"), _value(plan, "v_0"), connected)
+    connected = _is_connected(plan, "connected") and _is_connected(grid, f"{name}.connected")
+    return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected)
 
 
-def _is_connected(plan: ComponentPlan, element: str = "") -> bool:
+def _is_connected(plan: ComponentPlan, switch: str) -> bool:
     """Whether a breaker is closed; an FMU without one has it closed."""
-    info = plan.description.variables.get(f"{element}connected")
-    return info is None or bool(plan.parameters.get(info.name, info.start != "false"))
+    state = plan.value(switch) if switch in plan.description.variables else None
+    return state is None or bool(state)
 
 
 def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:
@@ -121,10 +122,3 @@ def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex
                 "raise its S_n, or move load and generation"
             )
     plan.parameters |= start
-
-
-def _value(plan: ComponentPlan, variable: str) -> float:
-    """The value that is set, else the FMU's default."""
-    if variable in plan.parameters:
-        return float(plan.parameters[variable])
-    return float(plan.description.variables[variable].start or 0.0)

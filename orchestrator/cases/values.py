@@ -4,8 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from fmus.toolchain.port_variables import I_RE, S_BASE, S_N, SYSTEM_BASE, SYSTEM_BASE_MVA
 from orchestrator.cases.schema import Value
-from orchestrator.fmi.description import VariableInfo
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.port import BoundDescription
 from orchestrator.units import to_unit
 
 
@@ -37,6 +39,22 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
     if info.maximum is not None and number > info.maximum:
         raise ValueError(f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}")
     return number
+
+
+def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
+    """Refuse another system base for a device with our port; behind a binding the name means something else.
+
+    Raises
+    ------
+    ValueError
+        If the variable is the system base and the value another one.
+    """
+    own = not isinstance(description, BoundDescription) and I_RE.name in description.variables
+    if own and variable == S_BASE.name and value != SYSTEM_BASE_MVA:
+        raise ValueError(
+            f"{variable} = {value:g} MVA; currents at the port and all networks are in pu of the system base, which is "
+            f"{SYSTEM_BASE}: leave {variable} away, and give the device's own rating with {S_N.name}"
+        )
 
 
 def flatten(table: Mapping[str, Any]) -> list[tuple[tuple[str, ...], Any]]:

@@ -116,7 +116,7 @@ def _state(description: FmuDescription, request: CertificationRequest, letter: s
     if not _is_switch(info):
         return None
     given = request.values.get(name)
-    return bool(given) if given is not None else info is not None and info.start in ("true", "1")
+    return bool(given) if given is not None else info is not None and info.start is True
 
 
 def _is_switch(info: VariableInfo | None) -> bool:

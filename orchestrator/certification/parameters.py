@@ -7,11 +7,10 @@ from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import START, BoundDescription
+from orchestrator.fmi.values import Scalar
 
 _FLOW = ("Q_0", "theta_0")
 _STUDY = ("S_n", "P_0", "v_0")
-
-Scalar = float | bool | str
 
 
 @dataclass(frozen=True)
@@ -48,14 +47,10 @@ def parameter_rows(c: Certification) -> list[ParameterRow]:
 
 
 def _start(info: VariableInfo) -> Scalar | None:
-    if info.start is None or info.type in ("String", "Enumeration"):
+    """As reports have it: all numbers as floats, items of an enumeration as text."""
+    if info.start is None or isinstance(info.start, bool | str):
         return info.start
-    if info.type == "Boolean":
-        return info.start in ("true", "1")
-    try:
-        return float(info.start)
-    except ValueError:
-        return info.start
+    return str(info.start) if info.type == "Enumeration" else float(info.start)
 
 
 def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str, Scalar, str]]:
@@ -67,7 +62,7 @@ def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str
             yield own, value, "the binding"
         rating = float(given.get("S_n", bound.port.rating)) / bound.port.rating
         for name, maps in bound.port.start.items():
-            value = float(given.get(name, bound.variables[name].start or 0.0))
+            value = float(given.get(name, bound.variables[name].start_number))
             for m in maps:
                 scale = rating if m.per_rating else 1.0
                 yield m.variable, scale * m.factor * value + m.offset, f"{_by(c, name)}, {name} of the binding"

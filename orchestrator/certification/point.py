@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
@@ -16,7 +17,6 @@ from orchestrator.cases.case import Case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError
-from orchestrator.fmi.port import SYSTEM_BASE_MVA
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.key import same_case
 from orchestrator.points.store import Arrays
@@ -174,7 +174,7 @@ def _compute(case: Case, task: PointTask, result: PointResult) -> None:
             found = modes_of(prepared, master, COMPUTED)
             result.residual, result.warnings = found.operating_point.residual, found.warnings
             _keep_modes(result, found.model, found.stability)
-        f_n = float(master.components["sg1"].description.variables["f_n"].start or 50.0)
+        f_n = prepared.system.components["sg1"].number("f_n")
         try:
             master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:

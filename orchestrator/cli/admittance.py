@@ -20,7 +20,7 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.fitting import fit
 from orchestrator.black_box.frequency_response import measure
 from orchestrator.black_box.passivity import passivity
-from orchestrator.cases.values import convert
+from orchestrator.cases.values import check_system_base, convert
 from orchestrator.cli.arguments import seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import made_folder, make_console
@@ -76,6 +76,7 @@ def _values(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, 
             raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
         try:
             values[name] = convert(info, value)
+            check_system_base(description, name, values[name])
         except ValueError as error:
             raise InputError(f"--set {name}: {error}") from error
     return values
@@ -83,7 +84,7 @@ def _values(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, 
 
 def _start(description: FmuDescription, name: str) -> float:
     info = description.variables.get(name)
-    return float(info.start) if info is not None and info.start else (1.0 if name == "v_0" else 0.0)
+    return info.start_number if info is not None and info.start is not None else float(name == "v_0")
 
 
 def _check_port(description: FmuDescription, bench: Bench) -> None:

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fmus.grid.names import line_variable
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
@@ -62,7 +64,7 @@ class LineSwitching(Event):
     connected: bool
 
     def settings(self) -> Mapping[str, float | bool]:
-        return {f"{self.line}.connected": self.connected}
+        return {line_variable(self.line, "connected"): self.connected}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +92,8 @@ class BranchChange(Event):
     R: float | None = None
 
     def settings(self) -> Mapping[str, float | bool]:
-        values = {f"X_{self.line}": self.X}
-        return values if self.R is None else values | {f"R_{self.line}": self.R}
+        values = {line_variable(self.line, "X"): self.X}
+        return values if self.R is None else values | {line_variable(self.line, "R"): self.R}
 
 
 @dataclass(frozen=True, slots=True)

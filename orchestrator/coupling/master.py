@@ -165,7 +165,7 @@ class Master:
         starts: dict[Endpoint, tuple[float, Endpoint]] = {}
         for wire in self.system.connections:
             info = self.system.components[wire.target.component].description.variables[wire.target.variable]
-            value = float(info.start or 0.0)
+            value = info.start_number
             known, other = starts.setdefault(wire.source, (value, wire.target))
             if known != value:
                 raise InputError(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.values import Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,22 @@ class ComponentPlan:
     parameters: dict[str, float | bool] = field(default_factory=dict)
     inputs: dict[str, float] = field(default_factory=dict)
     isolated: bool | None = None
+
+    def value(self, name: str) -> Scalar | None:
+        """What a parameter or an input is set to, else its start value; None where there is neither.
+
+        Raises
+        ------
+        KeyError
+            If the FMU has no variable of that name.
+        """
+        info = self.description.variables[name]
+        return self.parameters.get(name, self.inputs.get(name, info.start))
+
+    def number(self, name: str) -> float:
+        """The same as a number: 1 or 0 of a switch, 0 where there is neither or it is text."""
+        value = self.value(name)
+        return 0.0 if value is None or isinstance(value, str) else float(value)
 
 
 class System:

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.compiler import compile_here
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.interrupts import calls
-from orchestrator.fmi.port import PORT, START, SYSTEM_BASE_MVA, BoundDescription, PhasorMap
+from orchestrator.fmi.port import PORT, START, BoundDescription, PhasorMap
 
 _SOURCE = Path(__file__).with_name("port_adapter.c")
 
@@ -78,7 +79,7 @@ class BoundComponent(Component):
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._natives = description.port, description.natives
         self._start: dict[str, float] = {
-            name: float(description.variables[name].start or 0.0) for name in START if name in description.variables
+            name: description.variables[name].start_number for name in START if name in description.variables
         }
         self._start_is_new = True
         self._adapter = _Adapter()

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from xml.etree import ElementTree
 
 from orchestrator.errors import FmuFileError
@@ -101,16 +101,3 @@ def special_variables(root: ElementTree.Element) -> dict[int, tuple[int, ...]]:
         elif (causality == "input" and variability == "discrete") or (asks and variability == "tunable"):
             found[reference] = ()
     return found
-
-
-def start_of(text: str | None) -> float:
-    """A start value as a number; 0 where there is none."""
-    if text is None:
-        return 0.0
-    if text in ("true", "false"):
-        return float(text == "true")
-    try:
-        value = float(text.split()[0])
-    except (ValueError, IndexError):
-        return 0.0
-    return value if isfinite(value) else 0.0

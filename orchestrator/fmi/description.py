@@ -16,6 +16,7 @@ from fmpy.model_description import ModelDescription
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
 from orchestrator.fmi.clocks import Clock, clocks_of, special_variables
+from orchestrator.fmi.values import Scalar, typed
 
 VENDOR = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
@@ -40,6 +41,8 @@ class VariableInfo:
     ----------
     type
         By FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``.
+    start
+        By the type: a number of a Real, Integer or Enumeration, a bool of a Boolean, else text; None without one.
     declared_type
         As the file has it, such as ``Float64``.
     """
@@ -50,11 +53,16 @@ class VariableInfo:
     causality: str
     variability: str
     unit: str
-    start: str | None
+    start: Scalar | None
     minimum: float | None
     maximum: float | None
     description: str
     declared_type: str = ""
+
+    @property
+    def start_number(self) -> float:
+        """The start value as a number: 1 or 0 of a Boolean, 0 where there is no start value or it is text."""
+        return 0.0 if self.start is None or isinstance(self.start, str) else float(self.start)
 
 
 @dataclass(frozen=True)
@@ -213,7 +221,7 @@ def _fmi_version(path: Path, text: bytes) -> str:
 def _describe(
     path: Path, md: ModelDescription, text: bytes, platforms: tuple[str, ...], version: str
 ) -> FmuDescription:
-    variables = {v.name: _variable(v) for v in md.modelVariables}
+    variables = {v.name: _variable(path, v) for v in md.modelVariables}
     _check_names(path, md)
     root = ElementTree.fromstring(text)
     dependencies = {
@@ -302,18 +310,29 @@ def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:
     return {unit.get("name", ""): {} if base is None else dict(base.attrib) for unit, base in bases}
 
 
-def _variable(v: Any) -> VariableInfo:
+def _variable(path: Path, v: Any) -> VariableInfo:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
+    fmi_type = "Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type)
     return VariableInfo(
         name=v.name,
         reference=v.valueReference,
-        type="Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type),
+        type=fmi_type,
         causality=v.causality or "local",
         variability=v.variability or "continuous",
         unit=unit,
-        start=v.start,
+        start=None if v.start is None else _start(path, v, fmi_type),
         minimum=None if v.min is None else float(v.min),
         maximum=None if v.max is None else float(v.max),
         description=v.description or "",
         declared_type=v.type,
     )
+
+
+def _start(path: Path, v: Any, fmi_type: str) -> Scalar:
+    try:
+        return typed(v.start, fmi_type)
+    except ValueError as error:
+        raise FmuFileError(
+            f"{path}: {v.name[:80]!r} has the start value {v.start[:80]!r}; {error}: correct modelDescription.xml, or "
+            "export the FMU again"
+        ) from error

@@ -3,12 +3,13 @@
 import ctypes
 import os
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
-from orchestrator.fmi.clocks import MOST_CLOCKS, Clock, start_of
+from orchestrator.fmi.clocks import MOST_CLOCKS, Clock
 from orchestrator.fmi.description import FmuDescription
 
 _SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
@@ -201,5 +202,6 @@ def _specials(description: FmuDescription) -> list[_Special]:
         inside = variable.causality == "input"
         role = (_CLOCKED_INPUT if inside else _CLOCKED) if clocks else _DISCRETE_INPUT
         bits = sum(1 << place[clock] for clock in set(clocks) if clock in place)
-        found.append(_Special(bits, start_of(variable.start), reference, _KINDS.index(kind), role))
+        start = variable.start_number if isfinite(variable.start_number) else 0.0
+        found.append(_Special(bits, start, reference, _KINDS.index(kind), role))
     return found

@@ -11,13 +11,15 @@ from enum import IntEnum
 from math import pi
 from typing import Any, Self
 
+from fmus.toolchain.port_variables import INPUTS, OUTPUTS, S_N, START_VALUES
+from fmus.toolchain.variables import Variable
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 
-PORT = ("v_re", "v_im", "i_re", "i_im", "p", "q")
+PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 """Variables of the port; their places are their value references."""
 
-START = ("S_n", "P_0", "Q_0", "v_0", "theta_0")
-SYSTEM_BASE_MVA = 100.0
+START = tuple(variable.name for variable in START_VALUES)
+"""Its parameters: the rating and the power flow's start values."""
 
 Matrix2 = tuple[float, float, float, float]
 """A real 2×2 matrix, by rows."""
@@ -178,35 +180,31 @@ def _passed(native: FmuDescription, port: PortMap, name: str, own: str, referenc
 
 
 def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
-    texts = {
-        "v_re": ("input", "pu", "1.0", "Bus voltage, real part, network frame [pu, bus]"),
-        "v_im": ("input", "pu", "0.0", "Bus voltage, imaginary part, network frame [pu, bus]"),
-        "i_re": ("output", "pu", None, "Injected current, real part, network frame [pu, 100 MVA]"),
-        "i_im": ("output", "pu", None, "Injected current, imaginary part, network frame [pu, 100 MVA]"),
-        "p": ("output", "pu", None, "Active power into the bus [pu, S_n]"),
-        "q": ("output", "pu", None, "Reactive power into the bus [pu, S_n]"),
-        "S_n": ("parameter", "MVA", repr(port.rating), "Rated apparent power, the device's base"),
-        "P_0": ("parameter", "pu", "0.0", "Power flow: active power into the bus [pu, S_n]"),
-        "Q_0": ("parameter", "pu", "0.0", "Power flow: reactive power into the bus [pu, S_n]"),
-        "v_0": ("parameter", "pu", "1.0", "Power flow: voltage magnitude at the bus [pu, bus]"),
-        "theta_0": ("parameter", "rad", "0.0", "Power flow: voltage angle at the bus"),
-    }
-    limits = {"S_n": (1e-3, None), "P_0": (-2.0, 2.0), "Q_0": (-2.0, 2.0), "v_0": (0.1, 2.0)}
-    return {
-        name: VariableInfo(
-            name=name,
-            reference=PORT.index(name) if name in PORT else 2**32 - 1,  # start values are not read through it
-            type="Real",
-            causality=causality,
-            variability="fixed" if causality == "parameter" else "continuous",
-            unit=unit,
-            start=start,
-            minimum=limits.get(name, (None, None))[0],
-            maximum=limits.get(name, (None, None))[1],
-            description=text,
-        )
-        for name, (causality, unit, start, text) in texts.items()
-    }
+    found = [_info(v, "input", v.start) for v in INPUTS] + [_info(v, "output") for v in OUTPUTS]
+    for v in START_VALUES:
+        found.append(_info(v, "parameter", port.rating if v is S_N else v.start, v.minimum, v.maximum))
+    return {info.name: info for info in found}
+
+
+def _info(
+    variable: Variable,
+    causality: str,
+    start: float | None = None,
+    minimum: float | None = None,
+    maximum: float | None = None,
+) -> VariableInfo:
+    return VariableInfo(
+        name=variable.name,
+        reference=PORT.index(variable.name) if variable.name in PORT else 2**32 - 1,  # start values are not read
+        type="Real",
+        causality=causality,
+        variability="fixed" if causality == "parameter" else "continuous",
+        unit=variable.unit,
+        start=start,
+        minimum=minimum,
+        maximum=maximum,
+        description=variable.text,
+    )
 
 
 def _dependencies(

@@ -82,7 +82,7 @@ def _components(
             f"those with it: {', '.join(having[:12])}{' …' if len(having) > 12 else ''}"
         )
     key = (pattern,) if pattern is not None and chosen == fitting else tuple(chosen)
-    present = {int(_value(plan[name], f"{controller}.N_S")) for name in chosen}
+    present = {int(plan[name].number(f"{controller}.N_S")) for name in chosen}
     if stages is None and len(present) > 1:
         raise InputError(
             f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
@@ -119,18 +119,10 @@ def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[
 
 def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
     return not any(
-        _value(plan[name], f"{controller}.enabled")
+        plan[name].value(f"{controller}.enabled")
         for controller in CONTROLLERS
         for name in with_controller(plan, controller)
     )
-
-
-def _value(plan: ComponentPlan, variable: str) -> float | bool:
-    """What a parameter is set to, else its start value."""
-    if variable in plan.parameters:
-        return plan.parameters[variable]
-    start = plan.description.variables[variable].start or "0"
-    return start == "true" if start in ("true", "false") else float(start)
 
 
 def mode_name(case: Case, wanted: str | None) -> str:

@@ -7,6 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.values import as_text
 
 _ITEMS_SHOWN = 5
 """How many of a long list are shown, largest first."""
@@ -55,7 +56,7 @@ def fmu_variables(description: FmuDescription) -> Iterable[Table]:
             table.add_row(
                 v.name,
                 v.unit,
-                v.start or "",
+                "" if v.start is None else as_text(v.start),
                 "…".join(bounds) if any(bounds) else "",
                 v.variability,
                 v.description,

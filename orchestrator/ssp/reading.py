@@ -127,7 +127,7 @@ def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> d
         return {}
     fed = {variable for _, (sink, variable) in structure.connections if sink == owner}
     values = {v: _converted(value, fmu.variables[v].unit) for v, value in given.items() if v in fmu.variables}
-    open_inputs = {v: float(fmu.variables[v].start or 0) for v in fmu.inputs if fmu.variables[v].type == "Real"}
+    open_inputs = {v: fmu.variables[v].start_number for v in fmu.inputs if fmu.variables[v].type == "Real"}
     return {v: value for v, value in (open_inputs | values).items() if v not in fed}
 
 

@@ -6,7 +6,6 @@ from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.step_awareness import STEP_PARAMETER, knows_step
 from orchestrator.errors import AnalysisError
-from orchestrator.fmi.description import VariableInfo
 from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.study.modes import running
 
@@ -42,7 +41,7 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
         values = master.components[name].get([*c.states, *inputs, *outputs])
         given = {STEP_PARAMETER} if knows_step(master, name) else set()
     columns = [c.inputs.index(v) for v in inputs]
-    parameters = {v: x for v, x in plan.parameters.items() if x != _start(info[v]) and v not in given}
+    parameters = {v: x for v, x in plan.parameters.items() if x != info[v].start and v not in given}
     return EmbeddedModel(
         A=c.A_c,
         B=c.B_c[:, columns],
@@ -63,9 +62,3 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
             "fmu_guid": plan.description.guid,
         },
     )
-
-
-def _start(info: VariableInfo) -> float | bool | None:
-    if info.start is None:
-        return None
-    return info.start in ("true", "1") if info.type == "Boolean" else float(info.start)

@@ -174,8 +174,7 @@ def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
         return None
     units = {}
     for name, power in flow.powers.items():
-        plan = prepared.system.components[name]
-        rating = float(plan.parameters.get("S_n", plan.description.variables["S_n"].start or 0.0))
+        rating = prepared.system.components[name].number("S_n")
         units[name] = {"rating_mva": rating, "p_mw": power.real * rating, "q_mvar": power.imag * rating}
     buses = {bus: [abs(v), math.degrees(cmath.phase(v))] for bus, v in flow.voltages.items()}
     return {"residual": flow.residual, "buses": buses, "units": units}

@@ -24,8 +24,7 @@ class Settings:
     def values(self, component: str, parameter: str) -> Numbers:
         """A parameter or switch (1 or 0) at every look, shape (n,)."""
         plan = self._system.components[component]
-        start = plan.parameters.get(parameter, plan.description.variables[parameter].start)
-        held = np.full(len(self._times), _number(start))
+        held = np.full(len(self._times), plan.number(parameter))
         for time, name, value in self._changes:
             if name == f"{component}.{parameter}":
                 held[self._times > time] = value  # what is seen at an event's time is from before it
@@ -36,12 +35,6 @@ class Settings:
         held = np.ones(len(self._times))
         for name, plan in self._system.components.items():
             switch = "connected" if name == component else f"{component}.connected"
-            if switch in plan.description.variables:
+            if switch in plan.description.variables and plan.value(switch) is not None:
                 held *= self.values(name, switch) > 0
         return held
-
-
-def _number(value: object) -> float:
-    words = {"true": 1.0, "false": 0.0, "none": 0.0}
-    text = str(value).lower()
-    return words[text] if text in words else float(text)

@@ -144,7 +144,6 @@ def test_a_unit_slip_in_a_machine_is_questioned(questions, variable, value):
         ("pod_p.K", 50_000.0),
         ("voltage_control.tau", 50.0),
         ("current_control.tau", 1.0),
-        ("S_base", 1.0),
     ],
 )
 def test_a_unit_slip_in_a_converter_is_questioned(questions, variable, value):

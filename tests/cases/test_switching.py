@@ -1,5 +1,7 @@
 """Switching in a case file: what trips and comes back, in the right components, and names that do not exist."""
 
+from zipfile import ZipFile
+
 import pytest
 
 from fmus.toolchain.frames import current_of_power, polar
@@ -108,8 +110,8 @@ def test_a_unit_trips_on_both_sides_and_returns(prepared):
     assert off["vsc.omega"] == pytest.approx(1.03, abs=2e-3)  # droop at no load
 
 
-def vendor_fmu():
-    """A current source with the power flow's start values and no breaker."""
+def vendor_fmu(breaker=None):
+    """A current source with the power flow's start values; its breaker, if any, starts closed or open."""
     m = ModelBuilder("vendor", "Constant current, as another tool might export it")
     S_n = m.parameter("S_n", 100.0, "MVA", "Rating")
     values = {"P_0": ("pu", 0.5), "Q_0": ("pu", 0.0), "v_0": ("pu", 1.01), "theta_0": ("rad", 0.0)}
@@ -119,7 +121,44 @@ def vendor_fmu():
     i = current_of_power(p, q, polar(v, theta)) * (S_n / 100)
     m.output("i_re", i.re, "pu", "Current", base="100 MVA")
     m.output("i_im", i.im, "pu", "Current", base="100 MVA")
+    if breaker is not None:
+        m.switch("connected", breaker, "The breaker is closed")
     return cached(m.build())
+
+
+OTHER_BASE = (
+    "S_base = 90 MVA; currents at the port and all networks are in pu of the system base, which is 100 MVA: leave "
+    "S_base away, and give the device's own rating with S_n"
+)
+
+
+def test_another_system_base_is_refused_where_it_is_set(prepared):
+    base = RING.replace("P_0 = 0.6,", "P_0 = 0.6, S_base = 90,")
+    line = 1 + next(k for k, text in enumerate(base.splitlines()) if "S_base" in text)
+    with pytest.raises(CaseError, match="S_base") as caught:
+        prepared("", None, base)
+    assert f"line {line}, components.vsc.parameters.S_base: component 'vsc': {OTHER_BASE}" in str(caught.value)
+    assert the_problem(prepared, "", {"sg.S_base": "90 MVA"}) == f"--set sg.S_base: component 'sg': {OTHER_BASE}"
+
+
+def test_the_system_base_itself_may_be_set(prepared):
+    plain, given = prepared(), prepared("", {"vsc.S_base": "100 MVA"})
+    assert given.power_flow.powers == plain.power_flow.powers
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_breaker_that_another_tool_declares_as_1_or_0(prepared, tmp_path, closed):
+    path = tmp_path / "vendor.fmu"
+    with ZipFile(vendor_fmu(closed)) as good, ZipFile(path, "w") as written:
+        for name in good.namelist():
+            content = good.read(name)
+            if name == "modelDescription.xml":
+                old = f'<Boolean start="{str(closed).lower()}"'.encode()
+                assert content.count(old) == 1
+                content = content.replace(old, f'<Boolean start="{int(closed)}"'.encode())
+            written.writestr(name, content)
+    ready = prepared("", None, RING.replace('model = "gfor"', f"fmu = '{path}'"))
+    assert ready.power_flow.powers["vsc"].real == pytest.approx(0.6 * closed)
 
 
 def test_a_foreign_unit_without_a_breaker_of_its_own_is_opened_on_the_grids_side(prepared):

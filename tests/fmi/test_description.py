@@ -115,6 +115,24 @@ def test_a_model_description_that_contradicts_itself(rewritten):
     refused(path, "modelDescription.xml cannot be read", "fmpy validate")
 
 
+@pytest.mark.parametrize(
+    ("variable", "start", "rule"),
+    [
+        ("S_n", "1,5", "type Real takes a number"),
+        ("pod_p.N_S", "2.5", "type Integer takes a whole number"),
+        ("pod_p.enabled", "on", "type Boolean takes true, false, 1 or 0"),
+    ],
+)
+def test_a_malformed_start_value(rewritten, variable, start, rule):
+    path = rewritten(lambda text: start_of(variable, start, text))
+    refused(path, f"'{variable}' has the start value '{start}'", rule, "correct modelDescription.xml")
+
+
+def start_of(variable, start, text):
+    """The description with another start value of a variable."""
+    return re.sub(rf'(name="{re.escape(variable)}".*?start=")[^"]*', rf"\g<1>{start}", text, count=1, flags=re.DOTALL)
+
+
 # -- a good one --------------------------------------------------------------------------------
 
 
@@ -141,10 +159,16 @@ def test_the_converter_is_read_as_it_was_declared(fmu_path):
 def test_bounds_types_and_variability_of_parameters(fmu_path):
     variables = read_description(fmu_path("gfor")).variables
     K, N_S, enabled = (variables[f"pod_p.{name}"] for name in ("K", "N_S", "enabled"))
-    assert (K.type, K.variability, K.minimum, K.maximum, float(K.start)) == ("Real", "tunable", 0.0, 1e5, 200.0)
-    assert (N_S.type, N_S.variability, N_S.minimum, N_S.maximum, int(N_S.start)) == ("Integer", "fixed", 0, 3, 2)
-    assert (enabled.type, enabled.causality, enabled.start) == ("Boolean", "parameter", "false")
+    assert (K.type, K.variability, K.minimum, K.maximum, K.start) == ("Real", "tunable", 0.0, 1e5, 200.0)
+    assert (N_S.type, N_S.variability, N_S.minimum, N_S.maximum, N_S.start) == ("Integer", "fixed", 0, 3, 2)
+    assert (enabled.type, enabled.causality, enabled.start) == ("Boolean", "parameter", False)
+    assert type(N_S.start) is int
     assert variables["theta_0"].minimum is None
+
+
+def test_a_boolean_that_starts_at_1_is_true(rewritten):
+    path = rewritten(lambda text: start_of("pod_p.enabled", "1", text))
+    assert read_description(path).variables["pod_p.enabled"].start is True
 
 
 def test_direct_feedthrough(fmu_path):

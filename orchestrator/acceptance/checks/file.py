@@ -127,12 +127,9 @@ def declared_starts(subject: Subject) -> Result:
 
 
 def _out_of_bounds(info: VariableInfo) -> str | None:
-    try:
-        value = float(info.start or "")
-    except ValueError:
-        return f"{info.name} starts at {info.start!r}, which is no number"
+    value = info.start_number
     if not isfinite(value):
-        return f"{info.name} starts at {info.start}"
+        return f"{info.name} starts at {value}"
     low = -float("inf") if info.minimum is None else info.minimum
     high = float("inf") if info.maximum is None else info.maximum
     return None if low <= value <= high else f"{info.name} starts at {value:g}, outside of {low:g} to {high:g}"

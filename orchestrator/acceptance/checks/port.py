@@ -7,12 +7,13 @@ from math import isinf, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Point, Running, Subject, Vector
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.port import SYSTEM_BASE_MVA, BoundDescription
+from orchestrator.fmi.port import BoundDescription
 
 Complexes = NDArray[np.complex128]
 
@@ -40,7 +41,7 @@ def _rating(running: Running) -> float:
     info = running.component.description.variables.get("S_n")
     if set_to is not None:
         return float(set_to)
-    return SYSTEM_BASE_MVA if info is None else float(info.start or SYSTEM_BASE_MVA)
+    return SYSTEM_BASE_MVA if info is None or info.start is None else info.start_number
 
 
 def current_limit(subject: Subject) -> float | None:
@@ -49,7 +50,9 @@ def current_limit(subject: Subject) -> float | None:
     if isinstance(described, BoundDescription):
         return described.port.current_limit
     info = described.variables.get("I_max")
-    return float(info.start) if info is not None and info.start and info.unit in ("pu", "p.u.") else None
+    if info is None or info.start is None or info.unit not in ("pu", "p.u."):
+        return None
+    return info.start_number
 
 
 def currents(running: Running, deviation: complex, steps: int) -> Complexes:

@@ -155,7 +155,7 @@ def start_values(subject: Subject) -> Result:
         n
         for n, v in variables.items()
         if v.type == "Real"
-        and v.start
+        and v.start is not None
         and v.causality in ("parameter", "input")
         and v.reference < 2**32 - 1
         and not (subject.port and n in ("v_re", "v_im"))
@@ -174,7 +174,7 @@ def start_values(subject: Subject) -> Result:
     wrong = [
         f"{n} is {v:g} and {variables[n].start} is declared"
         for n, v in values.items()
-        if isnan(v) or abs(v - float(variables[n].start or 0)) > 1e-9 * max(1.0, abs(v))
+        if isnan(v) or abs(v - variables[n].start_number) > 1e-9 * max(1.0, abs(v))
     ]
     if wrong:
         return failed("start_values", "start values differ", "; ".join(wrong[:3]))
@@ -194,5 +194,5 @@ def _not_taken(subject: Subject) -> str | None:
     except ComponentError:
         return None  # it may refuse values that do not go together
     start = subject.description.variables
-    lost = [n for n, v in found.items() if v == float(start[n].start or 0) != wanted[n]]
+    lost = [n for n, v in found.items() if v == start[n].start_number != wanted[n]]
     return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None

@@ -162,7 +162,7 @@ class Subject:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
         voltage = (point or self.point).voltage
         known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
-        return np.array([known.get(n, _number(self.description.variables[n].start)) for n in self.inputs])
+        return np.array([known.get(n, self.description.variables[n].start_number) for n in self.inputs])
 
     # -- stimuli ---------------------------------------------------------------------------------
 
@@ -172,7 +172,7 @@ class Subject:
         sizes = []
         for name in self.inputs:
             info = self.description.variables[name]
-            start = _number(info.start)
+            start = info.start_number
             size = 0.02 if self.port and name in ("v_re", "v_im") else max(0.05 * abs(start), 0.05)
             room = [abs(limit - start) for limit in (info.minimum, info.maximum) if limit is not None]
             sizes.append(min([size, *[0.5 * r for r in room if r > 0]]))
@@ -291,8 +291,9 @@ def elsewhere(subject: Subject) -> dict[str, float]:
     """Other values of the tunable parameters, within their bounds."""
     found = {}
     for name, info in subject.description.variables.items():
-        if info.causality == "parameter" and info.variability == "tunable" and info.type == "Real" and info.start:
-            value = _number(info.start)
+        tunable = info.causality == "parameter" and info.variability == "tunable"
+        if tunable and info.type == "Real" and info.start is not None:
+            value = info.start_number
             moved = value * 1.1 if value else 0.1
             if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
                 found[name] = moved
@@ -316,10 +317,3 @@ def difference(a: Vector, b: Vector) -> tuple[float, int]:
     apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isfinite(apart), apart, np.inf))
     place = np.unravel_index(int(np.argmax(apart)), apart.shape)
     return float(apart[place]), int(place[1])
-
-
-def _number(text: str | None) -> float:
-    try:
-        return float(text) if text is not None else 0.0
-    except ValueError:
-        return 0.0

@@ -1,0 +1,16 @@
+"""How a grid names the variables of its lines, for models and for those who set and read them."""
+
+from collections.abc import Iterable
+
+_DATA = ("X", "R", "B", "tap", "shift")
+
+
+def line_variable(line: str, quantity: str) -> str:
+    """Name of a line's variable: its data are such as ``X_tie``, all others such as ``tie.connected``."""
+    return f"{quantity}_{line}" if quantity in _DATA else f"{line}.{quantity}"
+
+
+def lines_among(variables: Iterable[str]) -> list[str]:
+    """Names of the lines that a grid with these variables has: each has a reactance."""
+    begin = line_variable("", "X")
+    return [name.removeprefix(begin) for name in variables if name.startswith(begin)]

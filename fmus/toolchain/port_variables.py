@@ -1,0 +1,36 @@
+"""The variables of a device's port and the system base: names, units, texts and limits as plain data.
+
+Models declare their port from them, and the orchestrator gives a foreign FMU behind a binding the same one, so this
+module imports no CasADi.
+"""
+
+from fmus.toolchain.variables import Input, Output, Parameter
+
+SYSTEM_BASE_MVA = 100.0
+"""Base power of every network: of its powers, currents and admittances in pu."""
+
+SYSTEM_BASE = f"{SYSTEM_BASE_MVA:g} MVA"
+
+V_RE = Input("v_re", "pu", "Bus voltage, real part, network frame", base="bus", start=1.0)
+V_IM = Input("v_im", "pu", "Bus voltage, imaginary part, network frame", base="bus")
+I_RE = Output("i_re", "pu", "Injected current, real part, network frame", base=SYSTEM_BASE)
+I_IM = Output("i_im", "pu", "Injected current, imaginary part, network frame", base=SYSTEM_BASE)
+P = Output("p", "pu", "Active power into the bus", base="S_n")
+Q = Output("q", "pu", "Reactive power into the bus", base="S_n")
+
+S_N = Parameter("S_n", "MVA", "Rated apparent power, the device's base", minimum=1e-3)
+"""Each device has a start value of its own; so has `P_0`."""
+
+P_0 = Parameter("P_0", "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
+Q_0 = Parameter("Q_0", "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
+V_0 = Parameter(
+    "v_0", "pu", "Power flow: voltage magnitude at the bus", base="bus", start=1.0, minimum=0.1, maximum=2.0
+)
+THETA_0 = Parameter("theta_0", "rad", "Power flow: voltage angle at the bus")
+
+S_BASE = Parameter("S_base", "MVA", "Base power of the network", start=SYSTEM_BASE_MVA, minimum=1e-3)
+"""Our devices have it; what is coupled must leave it at its start, because networks are in pu of that base."""
+
+INPUTS = (V_RE, V_IM)
+OUTPUTS = (I_RE, I_IM, P, Q)
+START_VALUES = (S_N, P_0, Q_0, V_0, THETA_0)
