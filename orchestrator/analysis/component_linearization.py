@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from orchestrator.analysis.derivative_check import check_derivatives
 from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
+from orchestrator.analysis.held_inputs import over_held_inputs
 from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED, Matrix
 from orchestrator.analysis.response_check import ContinuousModel, check_response
 from orchestrator.analysis.state_access import StateAccess
@@ -230,15 +230,15 @@ def _over_step(
     D: Matrix,
 ) -> ComponentLinearization:
     """A continuous model, and its exact map over a communication step with the inputs held."""
-    (n, m), p = B_c.shape, len(exchange.outputs.names)
-    step_map = scipy.linalg.expm(step_size * np.block([[A_c, B_c], [np.zeros((m, n + m))]]))
+    p = len(exchange.outputs.names)
+    A, B = over_held_inputs(A_c, B_c, step_size)
     return ComponentLinearization(
         exchange.component.name,
         states,
         entries,
         exchange.outputs.names,
-        A=step_map[:n, :n],
-        B=step_map[:n, n:],
+        A=A,
+        B=B,
         C=C[:p],
         D=D[:p],
         observed=tuple(observed),

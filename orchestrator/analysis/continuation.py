@@ -1,22 +1,18 @@
-"""Following one mode while a parameter changes: by its eigenvectors, not by its place in a list.
-
-The measure is |l_aᴴ·r_b|·|l_bᴴ·r_a| with lᴴ·r = 1 for both. It is 1 for a mode and itself, 0 for two modes of the
-same matrix, and does not depend on the units of the states, as a comparison of mode shapes alone would.
-"""
+"""Following one mode while a parameter changes, by its eigenvectors, with the linear model at any value at hand."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from orchestrator.analysis.critical_modes import DENSE, nearest_pairs
 from orchestrator.analysis.linear_model import LinearModel, Vector
-from orchestrator.analysis.modes import to_continuous
+from orchestrator.analysis.modes import eigenvectors, in_range
+from orchestrator.analysis.similarity import similarity
 from orchestrator.errors import AnalysisError
 
 _SAME = 0.6
-"""Association from which two modes of neighbouring models count as one and the same."""
+"""Similarity from which two modes of neighbouring models count as one and the same."""
 
 _SHORTEST = 1 / 64
 """Smallest part of a path that is gone in one stride."""
@@ -35,18 +31,16 @@ class Eigenpair:
     left: Vector
     right: Vector
 
-    def association(self, other: "Eigenpair") -> float:
-        """How much the two are the same mode, from 0 to about 1."""
-        return float(abs(np.vdot(self.left, other.right)) * abs(np.vdot(other.left, self.right)))
+    def similarity(self, other: "Eigenpair") -> float:
+        """How much the two are the same mode, from 0 to about 1; above 1 only near a double eigenvalue."""
+        mine, theirs = (self.left[None], self.right[None]), (other.left[None], other.right[None])
+        return float(similarity(*mine, *theirs).item())
 
 
 def eigenpairs(model: LinearModel, lowest_hz: float, highest_hz: float) -> tuple[list[Eigenpair], Vector]:
     """The pairs of a frequency range [Hz], one of each conjugate two, and all eigenvalues [rad/s]."""
-    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
-    lambdas, alive = to_continuous(values, model.step_size)
-    left, right = left[:, alive], right[:, alive]
-    frequencies = lambdas.imag / (2 * np.pi)
-    chosen = np.flatnonzero((frequencies >= lowest_hz) & (frequencies <= highest_hz) & (lambdas.imag >= 0))
+    lambdas, left, right = eigenvectors(model)
+    chosen = in_range(lambdas, lowest_hz, highest_hz)
     return [_pair(complex(lambdas[k]), left[:, k], right[:, k]) for k in chosen], lambdas
 
 
@@ -62,7 +56,7 @@ def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
     return min(pairs_near(model, eigenvalue), key=lambda pair: abs(pair.eigenvalue - eigenvalue))
 
 
-def follow(start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float) -> Eigenpair:
+def follow_along(start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
     Parameters
@@ -95,8 +89,8 @@ def follow(start: Eigenpair, model_at: Callable[[float], LinearModel], begin: fl
 
 
 def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair]) -> Eigenpair | None:
-    best = max(candidates, key=pair.association, default=None)
-    return best if best is not None and pair.association(best) >= _SAME else None
+    best = max(candidates, key=pair.similarity, default=None)
+    return best if best is not None and pair.similarity(best) >= _SAME else None
 
 
 def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:

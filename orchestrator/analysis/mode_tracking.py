@@ -1,9 +1,8 @@
-"""Following modes from one operating point to the next by their eigenvectors.
+"""Following all modes from one operating point to the next by their eigenvectors.
 
-Sorted lists of eigenvalues lose a mode where two cross. What stays the same is the pair of eigenvectors: with
-lᴴ·r = 1, the product (l_aᴴ·r_b)(l_bᴴ·r_a) is 1 for one and the same mode, 0 for two modes of one matrix, and does
-not depend on how states or eigenvectors are scaled. Over all modes b these products sum to 1, so that one above
-a half means: most of mode a is in mode b.
+Sorted lists of eigenvalues lose a mode where two cross; its eigenvectors stay the same. Over all modes b of a point
+the products whose magnitude `orchestrator.analysis.similarity` is sum to 1, so that one above a half means: most of
+mode a is in mode b.
 """
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.similarity import similarity
 
 THRESHOLD = 0.5
 """Least similarity at which two modes are taken for the same."""
@@ -87,17 +87,17 @@ class Link:
     similarity: float
 
 
-def similarity(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
+def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
     """How much every mode of one point is every mode of another, shape (m_a, m_b), from 0 to 1.
 
     States that only one of the points has count as at rest.
     """
     common = [name for name in a.names if name in set(b.names)]
     of_a, of_b = ([s.names.index(name) for name in common] for s in (a, b))
-    forth = a.left[:, of_a].conj() @ b.right[:, of_b].T
-    back = (b.left[:, of_b].conj() @ a.right[:, of_a].T).T
     norm_a, norm_b = (np.einsum("ij,ij->i", s.left.conj(), s.right) for s in (a, b))
-    product = np.abs(forth * back) / np.abs(np.outer(norm_a, norm_b))
+    product = similarity(a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]) / np.abs(
+        np.outer(norm_a, norm_b)
+    )
     # Above 1 only near a double eigenvalue, where eigenvectors say little: as far from certain as its inverse.
     return np.asarray(np.where(product > 1, 1 / np.maximum(product, 1.0), product), dtype=float)
 
@@ -110,7 +110,7 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
     """
     if not (len(a.eigenvalues) and len(b.eigenvalues)):
         return []
-    alike = similarity(a, b)
+    alike = similarities(a, b)
     sizes = np.abs(a.eigenvalues)[:, None] + np.abs(b.eigenvalues)[None, :]
     distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(sizes > 0, sizes, 1.0)
     cost = np.where(alike >= threshold, 1 - alike + _DISTANCE_WEIGHT * distance, 1 + 2 * _DISTANCE_WEIGHT)
@@ -157,7 +157,7 @@ class Followed(Generic[Place]):
     origin: dict[Place, list[Place | None]] = field(default_factory=dict)
 
 
-def follow(
+def number_trajectories(
     points: Mapping[Place, ModeSet],
     route: Iterable[tuple[Place, Sequence[Place]]],
     threshold: float = THRESHOLD,

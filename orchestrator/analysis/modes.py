@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linear_model import LinearModel, Vector
 
 ZERO = 1e-3
 """An eigenvalue of at most this size [rad/s] is a zero: the free angle of a system without an infinite bus, in the
@@ -134,6 +134,20 @@ def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
     return to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)[0]
 
 
+def eigenvectors(model: LinearModel) -> tuple[NDArray[np.complex128], Vector, Vector]:
+    """All eigenvalues [rad/s], with the left and the right eigenvectors as columns."""
+    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
+    lambdas, alive = to_continuous(values, model.step_size)
+    return lambdas, left[:, alive], right[:, alive]
+
+
+def in_range(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> list[int]:
+    """Which eigenvalues [rad/s] have a frequency in a range [Hz], both ends included, one of each conjugate pair."""
+    hertz = values.imag / (2 * np.pi)
+    mask = (values.imag >= 0) & (lowest_hz <= hertz) & (hertz <= highest_hz)
+    return [int(k) for k in np.flatnonzero(mask)]
+
+
 def find_modes(
     model: LinearModel, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
 ) -> list[Mode]:
@@ -153,12 +167,8 @@ def find_spectrum(
     lowest_hz, highest_hz
         Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
     """
-    values, left, right = scipy.linalg.eig(model.A, left=True, right=True)
-    lambdas, alive = to_continuous(values, model.step_size)
-    left, right = left[:, alive], right[:, alive]
-    chosen = [
-        k for k, value in enumerate(lambdas) if value.imag >= 0 and lowest_hz <= value.imag / (2 * np.pi) <= highest_hz
-    ]
+    lambdas, left, right = eigenvectors(model)
+    chosen = in_range(lambdas, lowest_hz, highest_hz)
     modes = [make_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
     k = index_of_rightmost(lambdas)
     rightmost = None if k is None else make_mode(lambdas[k], left[:, k], right[:, k], model.names)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
+from orchestrator.analysis.held_inputs import over_held_inputs
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
@@ -273,13 +273,12 @@ class _Comparison:
     def _by_itself(self) -> Matrix:
         """All signals, from the inputs alone."""
         m = self.model
-        n, count = m.B.shape
-        whole = np.block([[m.A, m.B], [np.zeros((count, n + count))]])
-        over = {k: scipy.linalg.expm(k * self.step_size * whole) for k in set(self.plan.holds)}
-        x = np.zeros(n)
+        over = {k: over_held_inputs(m.A, m.B, k * self.step_size) for k in set(self.plan.holds)}
+        x = np.zeros(len(m.A))
         rows = []
         for hold, u in zip(self.plan.holds, self.plan.levels, strict=True):
-            x = over[hold][:n, :n] @ x + over[hold][:n, n:] @ u
+            A, B = over[hold]
+            x = A @ x + B @ u
             rows.append(np.concatenate([x, m.A @ x + m.B @ u, m.C @ x + m.D @ u]))
         return np.array(rows)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import scipy.linalg
 
+from orchestrator.analysis.held_inputs import over_held_inputs
 from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.coupling.schedule import Schedule
@@ -67,9 +67,7 @@ class StateSpace:
     def _over(self, duration: float) -> tuple[Matrix, Matrix]:
         """The map over a time [s] with the input held."""
         if self.step_size is None:
-            n, m = self.B.shape
-            whole = scipy.linalg.expm(duration * np.block([[self.A, self.B], [np.zeros((m, n + m))]]))
-            return whole[:n, :n], whole[:n, n:]
+            return over_held_inputs(self.A, self.B, duration)
         steps = round(duration / self.step_size)
         A, B = self.A, self.B
         A_all, B_all = np.eye(len(A)), np.zeros_like(B)

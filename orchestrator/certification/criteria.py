@@ -9,7 +9,7 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
-from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarity
+from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarities
 from orchestrator.analysis.modes import ZERO, damping_ratio
 from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
@@ -105,7 +105,7 @@ def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) ->
     """Every mode with the converter, beside what it was without."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
-        alike = similarity(having, lacking)
+        alike = similarities(having, lacking)
     partners = _partners(alike)
     left = [column for column in range(alike.shape[1]) if column not in partners.values()]
     for k, value in enumerate(having.eigenvalues.tolist()):

@@ -17,6 +17,7 @@ from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import Swing, SwingTest
 from orchestrator.fmi.origin import read_origin
+from orchestrator.results.mode_json import eigenvalue_json
 
 FORMAT = 2
 
@@ -65,7 +66,7 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "unknown": v.unknown,
         "modes": [mode_json(m) for m in v.modes],
         "modes_beside": [mode_json(m) for m in v.neighbours],
-        "modes_without": [] if without is None else [eigenvalue_json(x) for x in without.eigenvalues.tolist()],
+        "modes_without": [] if without is None else [_figures(x) for x in without.eigenvalues.tolist()],
         "lowered": [_lowered_json(m) for m in v.lowered],
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
@@ -92,8 +93,8 @@ def _model_json(point: PointResult) -> dict[str, Any]:
 
 def mode_json(m: ModeVerdict) -> dict[str, Any]:
     """A mode with the converter, and what it was without."""
-    without = None if m.before is None else eigenvalue_json(m.before)
-    return eigenvalue_json(m.eigenvalue) | {
+    without = None if m.before is None else _figures(m.before)
+    return _figures(m.eigenvalue) | {
         "without": without,
         "likeness": m.similarity,
         "components": m.components,
@@ -106,15 +107,14 @@ def _lowered_json(m: ModeVerdict) -> dict[str, Any]:
     return {"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
 
 
-def eigenvalue_json(value: complex) -> dict[str, float]:
+def _figures(value: complex) -> dict[str, float]:
     """An eigenvalue [rad/s]."""
-    return {"real": value.real, "imag": value.imag, "frequency_hz": value.imag / (2 * math.pi),
-            "damping_percent": 100 * damping_ratio(value)}  # fmt: skip
+    return eigenvalue_json(value, 100 * damping_ratio(value))
 
 
 def time_json(time: TimeVerdict) -> dict[str, Any]:
     """The time-domain criterion on one response."""
-    modal = [eigenvalue_json(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
+    modal = [_figures(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
     return {
         "signal": time.signal,
         "accepted": time.accepted,

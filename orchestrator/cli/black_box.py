@@ -23,6 +23,7 @@ from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import made_folder, make_console, make_errors
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
+from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.modes import modes_of, running
 
 
@@ -97,9 +98,8 @@ def _system_json(
     name: str, system: BoxedSystem, stability: Stability, passive: Any, white: list[Mode]
 ) -> dict[str, Any]:
     def figures(mode: Mode) -> dict[str, float]:
-        return {"real": mode.eigenvalue.real, "imag": mode.eigenvalue.imag, "frequency_hz": mode.frequency_hz,
-                "damping_percent": mode.damping_percent,
-                "participation": component_participation(mode, system.component)}  # fmt: skip
+        participation = component_participation(mode, system.component)
+        return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"participation": participation}
 
     return {"scenario": name, "component": system.component, "residual": system.residual,
             "stable": stability.stable, "largest_growth_rate": stability.largest_growth_rate,

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.cli.terminal import make_console
+from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import open_trajectory, recorded, strongest_modes
 
 
@@ -44,5 +45,4 @@ def mode_json(mode: IdentifiedMode | None) -> dict[str, Any] | None:
     """The machine-readable form of an identified mode."""
     if mode is None:
         return None
-    return {"real": mode.eigenvalue.real, "imag": mode.eigenvalue.imag, "frequency_hz": mode.frequency_hz,
-            "damping_percent": mode.damping_percent, "amplitude": mode.amplitude}  # fmt: skip
+    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"amplitude": mode.amplitude}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from orchestrator.analysis.continuation import Eigenpair, follow
+from orchestrator.analysis.continuation import Eigenpair, follow_along
 from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
@@ -135,7 +135,7 @@ class PodLoop:
             raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
         if gain == start.setting.gain:
             return Placed(setting, start.pair)
-        pair = follow(
+        pair = follow_along(
             start.pair, lambda value: self.model(replace(setting, gain=value)), start.setting.gain, setting.gain
         )
         return Placed(setting, pair)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.signals import relative_difference
 from orchestrator.results.storage import save_dataset, save_json, save_table
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
@@ -146,9 +147,9 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "largest_growth_rate": modes.stability.largest_growth_rate,
         "stability": modes.stability.as_json(),
         "outside_range": None if modes.hidden is None else modes.hidden.as_json(),
-        "modes": {name: _mode_summary(mode) for name, mode in modes.named.items()},
+        "modes": {name: eigenvalue_json(mode.eigenvalue, mode.damping_percent) for name, mode in modes.named.items()},
         "references": {name: table.model_dump(exclude_none=True) for name, table in modes.references.items()},
-        "ring_down": _mode_summary(seen),
+        "ring_down": None if seen is None else eigenvalue_json(seen.eigenvalue, seen.damping_percent),
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,
         "linear_difference": _linear_differences(result),
@@ -185,14 +186,3 @@ def _linear_differences(result: RunResult) -> dict[str, float] | None:
     if result.linear is None:
         return None
     return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}
-
-
-def _mode_summary(mode: Any) -> dict[str, float] | None:
-    if mode is None:
-        return None
-    return {
-        "real": mode.eigenvalue.real,
-        "imag": mode.eigenvalue.imag,
-        "frequency_hz": mode.frequency_hz,
-        "damping_percent": mode.damping_percent,
-    }

@@ -28,6 +28,7 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master
+from orchestrator.results.mode_json import eigenvalue_json
 
 
 @dataclass(frozen=True)
@@ -268,10 +269,7 @@ def modes_json(results: Sequence[ModesResult]) -> Mapping[str, Any]:
                 "warnings": list(r.warnings),
                 "modes": [
                     {
-                        "real": m.eigenvalue.real,
-                        "imag": m.eigenvalue.imag,
-                        "frequency_hz": m.frequency_hz,
-                        "damping_percent": m.damping_percent,
+                        **eigenvalue_json(m.eigenvalue, m.damping_percent),
                         "name": r.name_of(m),
                         "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
                         "components": {c: f for c, f in m.by_component.items() if f >= 1e-4},

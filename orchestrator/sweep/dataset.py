@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.analysis.modes import damping_percent
+from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.storage import provenance, save_table
 from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
@@ -247,10 +248,7 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
 def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:
     return {
         "values": setting,
-        "real": sample["real"],
-        "imag": sample["imag"],
-        "frequency_hz": sample["frequency"],
-        "damping_percent": sample["damping"],
+        **eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"]),
         "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"],
         "named": sample["named"],
         "beginning": sample["beginning"].name.lower(),

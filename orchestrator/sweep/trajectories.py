@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from orchestrator.analysis.mode_tracking import Followed, ModeSet, follow, near_an_end
+from orchestrator.analysis.mode_tracking import Followed, ModeSet, near_an_end, number_trajectories
 from orchestrator.sweep.point import PointRecord
 
 Place = tuple[float, ...]
@@ -81,7 +81,7 @@ def find_trajectories(
     """
     modes = {place: record.modes for place, record in points.items() if record.modes is not None}
     route = list(_route(modes))
-    followed = follow(modes, route)
+    followed = number_trajectories(modes, route)
     first = {place for place, origins in route if not origins}
     trajectories: dict[int, Trajectory] = {}
     for place, _ in route:

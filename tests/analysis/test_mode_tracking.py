@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.mode_tracking import ModeSet, follow, is_ambiguous, match, similarity
+from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous, match, number_trajectories, similarities
 from orchestrator.analysis.modes import find_modes
 
 RANGE = (0.1, 2.0)
@@ -37,7 +37,7 @@ def oscillators(f_a, f_b, coupling=0.0, damping=(0.3, 0.2), scale=1.0):
 def along(sets):
     """Follow modes along a line of points; trajectories as number → {point: frequency}."""
     points = dict(enumerate(sets))
-    result = follow(points, [(k, [k - 1] if k else []) for k in points])
+    result = number_trajectories(points, [(k, [k - 1] if k else []) for k in points])
     found = {}
     for k, modes in points.items():
         for number, frequency in zip(result.trajectory[k], modes.frequencies, strict=True):
@@ -97,10 +97,10 @@ def test_one_that_vanishes_in_the_middle_of_the_range_is_ambiguous():
 def test_similarity_knows_no_scaling_of_states_nor_of_eigenvectors():
     a, b = oscillators(0.9, 1.1, coupling=1.0), oscillators(0.95, 1.05, coupling=1.0)
     scaled = [oscillators(*f, coupling=1.0, scale=1e4) for f in ((0.9, 1.1), (0.95, 1.05))]
-    assert similarity(*scaled) == pytest.approx(similarity(a, b), rel=1e-6)
+    assert similarities(*scaled) == pytest.approx(similarities(a, b), rel=1e-6)
     turned = ModeSet(a.eigenvalues, a.left * (3 + 4j), a.right * 1j, a.names)
-    assert similarity(turned, b) == pytest.approx(similarity(a, b))
-    assert similarity(a, a) == pytest.approx(np.eye(2), abs=1e-9)
+    assert similarities(turned, b) == pytest.approx(similarities(a, b))
+    assert similarities(a, a) == pytest.approx(np.eye(2), abs=1e-9)
 
 
 def test_states_that_come_and_go_do_not_lose_the_modes():
@@ -121,7 +121,7 @@ def shared(similarity):
 @pytest.mark.parametrize("alike", [0.35, 0.49, 0.51, 0.75])
 def test_more_than_half_of_a_mode_is_the_mode(alike):
     a, b = shared(alike)
-    assert similarity(a, b).item() == pytest.approx(alike)
+    assert similarities(a, b).item() == pytest.approx(alike)
     assert [link.similarity for link in match(a, b)] == ([pytest.approx(alike)] if alike > 0.5 else [])
 
 
@@ -130,7 +130,7 @@ def test_a_mode_with_a_rival_nearly_as_good_is_taken_for_neither(best, other, li
     a, _ = shared(1.0)
     vectors = np.sqrt(np.array([[best, 1 - best], [other, 1 - other]], complex))
     b = ModeSet(np.array([1.01j, 1.02j]), vectors, vectors, ("x", "y"))
-    assert similarity(a, b)[0] == pytest.approx([best, other])
+    assert similarities(a, b)[0] == pytest.approx([best, other])
     assert bool(match(a, b)) == linked
 
 
@@ -145,7 +145,7 @@ def test_rows_are_linked_by_what_they_have_in_common():
     route = [
         ((r, c), [place for place in ((r, c - 1), (r - 1, c)) if min(place) >= 0]) for r in range(3) for c in range(4)
     ]
-    result = follow(points, route)
+    result = number_trajectories(points, route)
     numbers = {frequency > 1: set() for frequency in (0.5, 1.5)}
     for place, modes in points.items():
         for number, frequency in zip(result.trajectory[place], modes.frequencies, strict=True):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.analysis.continuation import follow, pair_at, pairs_near
+from orchestrator.analysis.continuation import follow_along, pair_at, pairs_near
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
@@ -106,13 +106,13 @@ def crossing(p):
 
 def test_a_mode_is_followed_through_the_frequency_of_another():
     start = pair_at(crossing(-1.0), complex(-0.5, 2.0))
-    end = follow(start, crossing, -1.0, 1.0)
+    end = follow_along(start, crossing, -1.0, 1.0)
     assert end.eigenvalue == pytest.approx(complex(-0.5, 4.0))
 
 
 def test_modes_of_one_matrix_are_not_associated():
     pairs = [p for p in pairs_near(crossing(0.3), 3j) if p.eigenvalue.imag > 0]
-    table = np.array([[a.association(b) for b in pairs] for a in pairs])
+    table = np.array([[a.similarity(b) for b in pairs] for a in pairs])
     assert table == pytest.approx(np.eye(2), abs=1e-10)
 
 
@@ -120,7 +120,7 @@ def test_a_defective_mode_is_like_no_other():
     """Equal stages side by side have one eigenvector between them."""
     A = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -5.0]])
     pairs = pairs_near(LinearModel.from_matrix(A, tuple("abc"), None), -1 + 0j)
-    assert all(np.isfinite(a.association(b)) for a in pairs for b in pairs)
+    assert all(np.isfinite(a.similarity(b)) for a in pairs for b in pairs)
 
 
 def test_a_mode_that_meets_another_is_not_guessed():
@@ -130,6 +130,6 @@ def test_a_mode_that_meets_another_is_not_guessed():
         return LinearModel.from_matrix(np.array([[0.0, 1.0], [-1.0, -2 * p]]), ("x", "v"), None)
 
     start = pair_at(damped(0.1), 1j)
-    assert follow(start, damped, 0.1, 0.9).eigenvalue == pytest.approx(complex(-0.9, math.sqrt(1 - 0.81)))
+    assert follow_along(start, damped, 0.1, 0.9).eigenvalue == pytest.approx(complex(-0.9, math.sqrt(1 - 0.81)))
     with pytest.raises(AnalysisError, match=r"cannot be followed beyond .* merges with another mode"):
-        follow(start, damped, 0.1, 1.0)
+        follow_along(start, damped, 0.1, 1.0)
