@@ -11,8 +11,8 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearity import Doubt, doubts
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, Spectrum, find_spectrum
-from orchestrator.analysis.resolution import check_resolution
-from orchestrator.analysis.stability import WHOLE, Cause, Stability, judge, whole_spectrum
+from orchestrator.analysis.resolution import check_resolution, verdict_warnings
+from orchestrator.analysis.stability import WHOLE, Stability, judge, whole_spectrum
 from orchestrator.coupling.master import Master
 
 
@@ -69,15 +69,12 @@ def examine(
     stability = confirmed(master, blocks, model, judge(model, spectrum, system))
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     if turning := _turning(blocks, master, model, stability, found, rightmost):
-        return Examination(
-            replace(stability, stable=None, reason="; ".join(map(str, turning))),
-            tuple(str(doubt) for doubt in found if doubt not in turning),
-        )
-    unstable = stability.cause is Cause.COUPLING
-    step = check_resolution(
-        master, model, system, modes if shown is None else shown, frequency_range, coupling_unstable=unstable
-    )
-    return Examination(stability, (*_coupling(stability), *step, *map(str, found)))
+        stability = replace(stability, stable=None, reason="; ".join(map(str, turning)))
+        found = [doubt for doubt in found if doubt not in turning]
+        return Examination(stability, (*verdict_warnings(stability), *map(str, found)))
+    shown = modes if shown is None else shown
+    step = check_resolution(master, model, system, shown, frequency_range, stability)
+    return Examination(stability, (*step, *map(str, found)))
 
 
 def _turning(
@@ -95,14 +92,3 @@ def _turning(
     if stability.stable is False:
         return [doubt for doubt in doubts(blocks, master.schedule, model, rightmost) if doubt.turns]
     return turning
-
-
-def _coupling(stability: Stability) -> tuple[str, ...]:
-    """Say before a run that the coupling itself is unstable."""
-    rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
-    if stability.cause is not Cause.COUPLING or growth is None:
-        return ()
-    return (
-        f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
-        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
-    )

@@ -16,6 +16,7 @@ from orchestrator.analysis.critical_modes import DENSE, nearest_eigenvalue
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode, damping_percent, eigenvalues
+from orchestrator.analysis.stability import Cause, Stability
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError, InputError
 
@@ -64,10 +65,9 @@ def check_resolution(
     system: LinearModel | None,
     modes: Sequence[Mode],
     frequency_range: tuple[float, float],
-    *,
-    coupling_unstable: bool = False,
+    stability: Stability,
 ) -> tuple[str, ...]:
-    """Compare the modes of a step map with those of the continuous system.
+    """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
     Parameters
     ----------
@@ -79,26 +79,47 @@ def check_resolution(
         Of the step map.
     frequency_range
         In which modes were looked for [Hz].
-    coupling_unstable
-        Ask for a step at which the coupling is stable, even if the modes are resolved.
+    stability
+        The verdict. Where the coupling is unstable, a step at which it is stable is looked for even if the modes
+        are resolved.
 
     Returns
     -------
-    What is to be said, with a step that is short enough: as computed, not as guessed.
+    Warnings, with a step that is short enough: as computed, not as guessed.
 
     Raises
     ------
     InputError
         If a slow mode is lost: what the step map shows in its place would be a wrong verdict.
     """
-    step = model.step_size
-    if step is None or system is None:
-        return ()
+    said = verdict_warnings(stability)
+    if model.step_size is None or system is None:
+        return said
     pairs = _pairs(model, system, modes, frequency_range)
+    return (*said, *_step_warnings(master, model.step_size, system, pairs, stability))
+
+
+def verdict_warnings(stability: Stability) -> tuple[str, ...]:
+    """Say before a run that the coupling itself is unstable, or that the FMUs do not confirm the verdict."""
+    if stability.stable is None and stability.reason:
+        return (f"whether the system is stable is not known: {stability.reason}",)
+    rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
+    if stability.cause is not Cause.COUPLING or growth is None:
+        return ()
+    return (
+        f"the coupling is numerically unstable: with a communication step of {stability.step_size:g} s the step map "
+        f"grows at {rate:.3g} 1/s where the continuous system has at most {growth:.3g} 1/s",
+    )
+
+
+def _step_warnings(
+    master: Master, step: float, system: LinearModel, pairs: Sequence[Pair], stability: Stability
+) -> tuple[str, ...]:
+    """For the mode that a step [s] moves most, and for a coupling that is unstable at this step."""
     worst = max(pairs, key=lambda pair: (_is_slow(pair) and pair.is_lost, pair.error), default=None)
     moved = worst is not None and worst.error > MOVED
     if worst is None or not moved:
-        return (_advice(master, system, pairs),) if coupling_unstable else ()
+        return (_advice(master, system, pairs),) if stability.cause is Cause.COUPLING else ()
     short = _short_step(master, system, pairs)
     text = (
         f"the communication step of {step:g} s {'does not resolve' if worst.is_lost else 'moves'} a mode: the step map "

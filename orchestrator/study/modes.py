@@ -181,7 +181,6 @@ def modes_from(
         references=_references(prepared),
         warnings=(
             *map(str, prepared.questions),
-            *_unknown(stability),
             *examined.warnings,
         ),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
@@ -229,13 +228,6 @@ def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> 
         if mode is not None:
             found[table.name] = mode
     return found
-
-
-def _unknown(stability: Stability) -> tuple[str, ...]:
-    """Say that a verdict is missing, and why."""
-    if stability.stable is None and stability.reason:
-        return (f"whether the system is stable is not known: {stability.reason}",)
-    return ()
 
 
 def _references(prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:
