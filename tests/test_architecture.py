@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
-    ("orchestrator.errors", "orchestrator.units"),
+    ("orchestrator.arrays", "orchestrator.errors", "orchestrator.units"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),

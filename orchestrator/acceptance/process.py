@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
@@ -30,8 +31,6 @@ from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
 from orchestrator.fmi.messages import FLOODED, texts
 from orchestrator.fmi.port import BoundDescription
-
-Vector = NDArray[np.float64]
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _LOOK = 0.05
@@ -144,9 +143,9 @@ class FmuProcess:
         return content
 
     def run(
-        self, instance: int, into: NDArray[np.uint32], rows: Vector, out: NDArray[np.uint32],
+        self, instance: int, into: NDArray[np.uint32], rows: Numbers, out: NDArray[np.uint32],
         steps: int = 0, time: float = 0.0, step_size: float = 0.0,
-    ) -> tuple[int, int, int, Vector]:  # fmt: skip
+    ) -> tuple[int, int, int, Numbers]:  # fmt: skip
         """Set inputs, step and read, as often as asked.
 
         Parameters
@@ -329,7 +328,7 @@ class HostedComponent(Component):
 
     # -- numbers ---------------------------------------------------------------------------------
 
-    def run(self, into: RealBatch, rows: Vector, out: RealBatch, steps: int, time: float, step_size: float) -> Vector:
+    def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
         Raises

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from orchestrator.analysis.derivative_check import check_derivatives
 from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.held_inputs import over_held_inputs
-from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED, Matrix
+from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED
 from orchestrator.analysis.response_check import ContinuousModel, check_response
 from orchestrator.analysis.state_access import StateAccess
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE, nearest_pairs
-from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import eigenvectors, in_range
 from orchestrator.analysis.similarity import similarity
+from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 _SAME = 0.6

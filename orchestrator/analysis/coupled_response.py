@@ -12,9 +12,10 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.linear_model import HELD, IDENTIFIED, LinearModel, Matrix
+from orchestrator.analysis.linear_model import HELD, IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.stability import Stability
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, ComponentError
 from orchestrator.fmi.instance import is_ours

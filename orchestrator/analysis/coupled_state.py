@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.state_access import StateAccess
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 
 

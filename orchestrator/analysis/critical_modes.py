@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
     Mode,
@@ -24,6 +24,7 @@ from orchestrator.analysis.modes import (
     to_continuous,
 )
 from orchestrator.analysis.threads import one_thread
+from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 DENSE = 200

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.arrays import Matrix
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 

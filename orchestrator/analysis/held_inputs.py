@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.linalg
 
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.arrays import Matrix
 
 
 def over_held_inputs(A: Matrix, B: Matrix, duration: float) -> tuple[Matrix, Matrix]:

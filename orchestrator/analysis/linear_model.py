@@ -13,10 +13,8 @@ from typing import Any, Self
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[Any]
+from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode
+from orchestrator.arrays import Vector
 from orchestrator.coupling.schedule import Schedule
 
 LARGEST_SHIFT = 1e-3

@@ -16,7 +16,8 @@ from orchestrator.analysis.component_linearization import (
     linearize_by_derivatives,
     linearize_component,
 )
-from orchestrator.analysis.linear_model import HELD, LinearModel, Matrix
+from orchestrator.analysis.linear_model import HELD, LinearModel
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.step_awareness import knows_step, other_step

@@ -15,6 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.similarity import similarity
+from orchestrator.arrays import Complex
 
 THRESHOLD = 0.5
 """Least similarity at which two modes are taken for the same."""
@@ -29,7 +30,6 @@ _EDGE = 1.1
 """A mode nearer than this factor to an end of the range of frequencies may leave or enter there."""
 
 Place = TypeVar("Place", bound=Hashable)
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.arrays import Vector
 
 ZERO = 1e-3
 """An eigenvalue of at most this size [rad/s] is a zero: the free angle of a system without an infinite bus, in the

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.held_inputs import over_held_inputs
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.arrays import Matrix
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 

@@ -7,7 +7,7 @@ not depend on the units of the states, as a comparison of mode shapes alone woul
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.analysis.linear_model import Vector
+from orchestrator.arrays import Vector
 
 
 def similarity(left_a: Vector, right_a: Vector, left_b: Vector, right_b: Vector) -> NDArray[np.float64]:

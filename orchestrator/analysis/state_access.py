@@ -1,7 +1,7 @@
 """Reading and setting the continuous states of a running FMU, and whether that can be done at all."""
 
 from orchestrator.analysis.embedded_model import embedded_model
-from orchestrator.analysis.linear_model import Matrix
+from orchestrator.arrays import Matrix
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.analysis.held_inputs import over_held_inputs
-from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.linearization import Blocks, compose, continuous
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import InputError
 from orchestrator.fmi.linear_model import read_embedded_model

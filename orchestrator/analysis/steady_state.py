@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.linear_model import Matrix
 from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.errors import AnalysisError

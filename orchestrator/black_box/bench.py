@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
+from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
@@ -29,8 +29,6 @@ _STRETCH = 20000
 
 STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state."""
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass

@@ -7,8 +7,7 @@ M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from orchestrator.arrays import Complex, Numbers
 
 _CHUNK = 4096
 

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-from numpy.typing import NDArray
 from skrf import Network
 from skrf.vectorFitting import VectorFitting
 
-from orchestrator.black_box.frequency_response import Complex, FrequencyResponse
+from orchestrator.arrays import Complex, Matrix
+from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.errors import AnalysisError
-
-Matrix = NDArray[np.float64]
 
 ORDERS = ((2, 2), (2, 4), (3, 5), (4, 6), (4, 8), (5, 9), (6, 10), (8, 14))
 """Numbers of real poles and of complex pairs that are tried, in turn."""

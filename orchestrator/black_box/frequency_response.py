@@ -7,6 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.black_box.bench import Bench, Runs
 from orchestrator.black_box.excitation import line_response, multisine, odd_lines, pulse_response
 from orchestrator.errors import AnalysisError
@@ -21,9 +22,6 @@ _APART = 10.0
 _AWAY = 0.1
 """A periodic response has a mean of zero, and one to a pulse ends at zero, as every excitation does; a device that
 keeps more than this part of the response's size has left its operating point."""
-
-Numbers = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

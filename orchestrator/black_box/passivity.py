@@ -8,11 +8,9 @@ at which it could, together with a grid that lets it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.black_box.frequency_response import FrequencyResponse
-
-Numbers = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from fmus.grid.network import Line, Load, Shunt
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.network_sources import Matrix, SourceTables
+from orchestrator.arrays import Matrix
+from orchestrator.cases.network_sources import SourceTables
 from orchestrator.errors import InputError
 
 _REFERENCE, _OUT = 3, 4

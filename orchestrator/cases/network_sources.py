@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Matrix
 from orchestrator.cases.names import close_names
 from orchestrator.errors import InputError
 
-Matrix = NDArray[np.float64]
 _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestrator.arrays import Numbers
 from orchestrator.certification.criteria import (
     ModalTest,
     ModeVerdict,
@@ -14,7 +15,7 @@ from orchestrator.certification.criteria import (
 )
 from orchestrator.certification.motion import motion_faults
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
-from orchestrator.certification.swings import Numbers, SwingTest, slow_part, swing_test
+from orchestrator.certification.swings import SwingTest, slow_part, swing_test
 
 SETTLING = 0.5
 """From this long after the event [s] the signal is taken for a free response and decomposed into modes."""

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.arrays import Numbers
 from orchestrator.certification.point import FREQUENCY, POWER
-from orchestrator.certification.swings import SLOWEST_PERIOD, Numbers
+from orchestrator.certification.swings import SLOWEST_PERIOD
 from orchestrator.watch.finding import UNSTABLE
 
 LARGEST_DEVIATION = 2.5

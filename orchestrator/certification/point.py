@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.analysis.linear_model import LinearModel
@@ -12,6 +11,7 @@ from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.analysis.threads import alone
+from orchestrator.arrays import Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
 from orchestrator.coupling.master import Master
@@ -30,7 +30,6 @@ that those just outside are listed."""
 CONVERTER = "converter"
 POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
-Numbers = NDArray[np.float64]
 
 _SIGNAL = "signal "
 """Begins the names of signals among a stored point's arrays."""

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-from numpy.typing import NDArray
+
+from orchestrator.arrays import Numbers
 
 LARGEST_RATIO = 0.25
 """ΔP5M5 over ΔP1M1 must be less."""
@@ -21,8 +22,6 @@ RESOLUTION = 1e-3
 
 SLOWEST_PERIOD = 10.0
 """Of the modes that the norm judges [s]: without a turn for so long, no such mode is left above the resolution."""
-
-Numbers = NDArray[np.float64]
 
 
 FASTEST = 5.0

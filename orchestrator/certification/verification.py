@@ -12,13 +12,14 @@ import xarray as xr
 
 from orchestrator.acceptance.runner import file_hash
 from orchestrator.analysis.modes import damping_ratio
+from orchestrator.arrays import Numbers
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.form import check_form
-from orchestrator.certification.point import CONVERTER, Numbers, PointResult, PointTask, compute_point
+from orchestrator.certification.point import CONVERTER, PointResult, PointTask, compute_point
 from orchestrator.certification.rejudgement import rejudge
 from orchestrator.certification.request import same_reactance
 from orchestrator.errors import InputError

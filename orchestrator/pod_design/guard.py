@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.analysis.linear_model import LinearModel, Vector
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio, find_spectrum, to_continuous
 from orchestrator.analysis.stability import fastest_growth
+from orchestrator.arrays import Vector
 
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
 

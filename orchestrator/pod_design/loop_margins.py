@@ -13,8 +13,9 @@ from functools import partial
 import numpy as np
 import scipy.optimize
 
-from orchestrator.analysis.linear_model import LinearModel, Matrix, Vector
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ZERO
+from orchestrator.arrays import Matrix, Vector
 from orchestrator.errors import AnalysisError
 
 _FREQUENCIES = (0.01, 500.0)

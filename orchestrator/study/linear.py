@@ -7,11 +7,12 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.analysis.examination import Examination, examine
-from orchestrator.analysis.linear_model import LinearModel, Matrix
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous_model
 from orchestrator.analysis.stability import judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
+from orchestrator.arrays import Matrix
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.watch.finding import Finding
-from orchestrator.watch.seen import Numbers, Seen
+from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
 LEAST_DURATION = 0.1

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.identification import identify_modes
+from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
-from orchestrator.watch.seen import Numbers
 
 LEAST_PERIODS = 2
 """An oscillation is told by at least so many of its periods."""

@@ -6,6 +6,7 @@ from itertools import chain
 
 import numpy as np
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding, Kind
 from orchestrator.watch.oscillation import (
@@ -16,7 +17,7 @@ from orchestrator.watch.oscillation import (
     too_fast,
     without_trend,
 )
-from orchestrator.watch.seen import Numbers, Seen, is_derivative, unit
+from orchestrator.watch.seen import Seen, is_derivative, unit
 
 FEWEST_LOOKS = 60
 """In the stretch that is looked at: the last three quarters of the time since the last event."""

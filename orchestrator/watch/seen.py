@@ -4,13 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
-
-Numbers = NDArray[np.float64]
 
 LOOK_INTERVAL = 5e-3
 """The watch looks about so often [s]; what happens between two looks is seen in the extremes of coupled outputs."""

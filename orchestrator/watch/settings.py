@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.system import System
-from orchestrator.watch.seen import Numbers
 
 
 class Settings:

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
-from orchestrator.watch.seen import Numbers, Seen
+from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
 ANGLES = ("delta", "droop.theta", "source.theta")

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
-from orchestrator.watch.seen import Numbers, Seen, is_derivative, unit
+from orchestrator.watch.seen import Seen, is_derivative, unit
 
 LEAST_GROWTH = 1e-6
 """A growth is told once a signal is this far from its start, as a part of 1 or of the start."""

@@ -4,7 +4,8 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import EQUAL, affordable
-from orchestrator.acceptance.checks.subject import Subject, Vector, difference
+from orchestrator.acceptance.checks.subject import Subject, difference
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 
 _STEPS = 50
@@ -34,7 +35,7 @@ def nan_input(subject: Subject) -> Result:
     return passed("nan_input", seen)
 
 
-def _answer(subject: Subject, deviation: Vector) -> str:
+def _answer(subject: Subject, deviation: Numbers) -> str:
     """What it says to inputs of that kind."""
     try:
         with subject.running() as running:
@@ -80,7 +81,7 @@ def extreme_inputs(subject: Subject) -> Result:
     return passed("extreme_inputs", f"finite or refused up to 1e6{said}")
 
 
-def _deviations(subject: Subject, size: float) -> list[tuple[str, Vector]]:
+def _deviations(subject: Subject, size: float) -> list[tuple[str, Numbers]]:
     """Each input alone and all together, up and down, within declared bounds."""
     low, high = np.full(len(subject.inputs), -np.inf), np.full(len(subject.inputs), np.inf)
     rest = subject.start_inputs(None)
@@ -98,7 +99,7 @@ def _deviations(subject: Subject, size: float) -> list[tuple[str, Vector]]:
     return [(name, np.clip(deviation, low, high)) for name, deviation in found]
 
 
-def _held(subject: Subject, deviation: Vector) -> str | None:
+def _held(subject: Subject, deviation: Numbers) -> str | None:
     """Hold inputs: "" where all stays finite, the FMU's words where it refuses, None where it gives no numbers."""
     try:
         with subject.running() as running:

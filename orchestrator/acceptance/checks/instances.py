@@ -4,7 +4,8 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.running import EQUAL, affordable
-from orchestrator.acceptance.checks.subject import Point, Running, Stimulus, Subject, Vector, difference, elsewhere
+from orchestrator.acceptance.checks.subject import Point, Running, Stimulus, Subject, difference, elsewhere
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
 _OTHER = Point(v=1.03, theta=0.4, P=0.7, Q=-0.1)
@@ -44,7 +45,7 @@ def _idle(subject: Subject) -> str | None:
     return subject.watched[place] if apart > EQUAL else None
 
 
-def _beside(subject: Subject, steps: int, stimulus: Stimulus) -> Vector:
+def _beside(subject: Subject, steps: int, stimulus: Stimulus) -> Numbers:
     """A run of one instance, while another one that started elsewhere is fed and stepped otherwise."""
     h, other = subject.step_size, subject.steps(hold=7 * subject.step_size, seed=2)
     with subject.running("first") as first:

@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from math import isinf, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Point, Running, Subject, Vector
+from orchestrator.acceptance.checks.subject import Point, Running, Subject
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
-
-Complexes = NDArray[np.complex128]
 
 POINTS = (
     Point(1.0, 0.0, 0.5, 0.1),
@@ -55,7 +53,7 @@ def current_limit(subject: Subject) -> float | None:
     return info.start_number
 
 
-def currents(running: Running, deviation: complex, steps: int) -> Complexes:
+def currents(running: Running, deviation: complex, steps: int) -> Complex:
     """Step with the voltage moved by a deviation [pu]; the injected current after each step [pu, S_n]."""
     names = running.subject.inputs
     change = np.zeros((1, len(names)))
@@ -63,10 +61,10 @@ def currents(running: Running, deviation: complex, steps: int) -> Complexes:
     return of_current(running, running.hold(change, steps, running.subject.step_size))
 
 
-def of_current(running: Running, values: Vector) -> Complexes:
+def of_current(running: Running, values: Numbers) -> Complex:
     """The injected current [pu, S_n] in rows of outputs."""
     names = running.subject.outputs
-    found: Complexes = values[:, names.index("i_re")] + 1j * values[:, names.index("i_im")]
+    found: Complex = values[:, names.index("i_re")] + 1j * values[:, names.index("i_im")]
     return found * SYSTEM_BASE_MVA / _rating(running)
 
 
@@ -173,7 +171,7 @@ def _judged(asked: Sequence[complex], found: Sequence[complex], voltages: Sequen
     return failed("power_balance", fault, f"{seen}: {says}", **figures)
 
 
-def _fit(asked: Complexes, found: Complexes) -> tuple[complex, complex, complex, float]:
+def _fit(asked: Complex, found: Complex) -> tuple[complex, complex, complex, float]:
     """The coefficients a, b, c of found = a·asked + b·conj(asked) + c, and the largest rest."""
     (a, b, c), *_ = np.linalg.lstsq(np.column_stack([asked, asked.conj(), np.ones(len(asked))]), found, rcond=None)
     return complex(a), complex(b), complex(c), float(np.abs(found - (a * asked + b * asked.conj() + c)).max())

@@ -6,7 +6,8 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.subject import Subject, Vector, difference, elsewhere
+from orchestrator.acceptance.checks.subject import Subject, difference, elsewhere
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 
@@ -79,7 +80,7 @@ def _ended(subject: Subject, error: EndedError) -> Result:
     return remarked("runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended)
 
 
-def _not_finite(subject: Subject, values: Vector, time: float) -> Result:
+def _not_finite(subject: Subject, values: Numbers, time: float) -> Result:
     bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
     return failed(
         "runs",

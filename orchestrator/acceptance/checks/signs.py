@@ -7,9 +7,10 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.droop import FREQUENCY, POINT, POINTS, SETTLED, VOLTAGE, Answer, droop
-from orchestrator.acceptance.checks.port import WHY, Complexes, of_current
+from orchestrator.acceptance.checks.port import WHY, of_current
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Point, Subject, Vector
+from orchestrator.acceptance.checks.subject import Point, Subject
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -106,10 +107,10 @@ def _answers(subject: Subject, steps: int, point: Point) -> tuple[Answer, Answer
     )
 
 
-def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float, Vector], Complexes]) -> Answer:
+def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float, Numbers], Complex]) -> Answer:
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
-    time: Vector = np.arange(steps, dtype=np.float64) * h
+    time: Numbers = np.arange(steps, dtype=np.float64) * h
     found, far = [], 0.0
     names = subject.inputs
     for sign in (1.0, -1.0):

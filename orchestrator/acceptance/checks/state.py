@@ -4,7 +4,8 @@ from time import perf_counter
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, Vector, difference, elsewhere, saved
+from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, difference, elsewhere, saved
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
 _CLEAR = 1e-6
@@ -117,7 +118,9 @@ def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
     )
 
 
-def _in_another(running: Running, content: bytes, at: float, first: Vector, h: float, stimulus: Stimulus) -> str | None:
+def _in_another(
+    running: Running, content: bytes, at: float, first: Numbers, h: float, stimulus: Stimulus
+) -> str | None:
     """What is wrong with a state of one instance that another one takes from bytes: a pointer may have been saved."""
     subject = running.subject
     if subject.description.one_instance:

@@ -9,15 +9,14 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.acceptance.process import FmuProcess, HostedComponent
+from orchestrator.arrays import Numbers
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import START, BoundDescription
 
-Vector = NDArray[np.float64]
-Stimulus = Callable[[float], Vector]
+Stimulus = Callable[[float], Numbers]
 """Time [s] → the inputs' deviations from where they start."""
 
 PORT_STEP = 1e-4
@@ -158,7 +157,7 @@ class Subject:
         """Bus voltage [pu] at which it starts."""
         return self.point.voltage
 
-    def start_inputs(self, point: Point | None) -> Vector:
+    def start_inputs(self, point: Point | None) -> Numbers:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
         voltage = (point or self.point).voltage
         known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
@@ -167,7 +166,7 @@ class Subject:
     # -- stimuli ---------------------------------------------------------------------------------
 
     @property
-    def amplitudes(self) -> Vector:
+    def amplitudes(self) -> Numbers:
         """A small deviation for each input, within what it declares."""
         sizes = []
         for name in self.inputs:
@@ -191,7 +190,7 @@ class Subject:
         """All inputs move with every step."""
         return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
-    def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Vector:
+    def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs)."""
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
@@ -223,26 +222,26 @@ class Running:
         self.feed(np.zeros(len(self.rest)))
         component.exit_initialization_mode()
 
-    def feed(self, deviation: Vector) -> None:
+    def feed(self, deviation: Numbers) -> None:
         """Set the inputs to their start values plus a deviation."""
         self._in.values[:] = self.rest + deviation
         self._in.write()
 
-    def read(self) -> Vector:
+    def read(self) -> Numbers:
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:
         self.component.step(self.time, step_size)
         self.time += step_size
 
-    def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Vector:
+    def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Numbers:
         """Step and read, shape (steps + 1, n); the first row is before the stimulus."""
         begin = self.time
         before = self.read()
         rows = [stimulus(begin + k * step_size) for k in range(steps)]  # not accumulated: equal runs have equal times
         return np.vstack([before, self.hold(np.array(rows).reshape(steps, len(self.rest)), steps, step_size)])
 
-    def hold(self, deviations: Vector, steps: int, step_size: float) -> Vector:
+    def hold(self, deviations: Numbers, steps: int, step_size: float) -> Numbers:
         """Step many times at once, shape (steps, n): what was read after each.
 
         Parameters
@@ -300,16 +299,16 @@ def elsewhere(subject: Subject) -> dict[str, float]:
     return found
 
 
-def scales(*trajectories: Vector) -> Vector:
+def scales(*trajectories: Numbers) -> Numbers:
     """For each output how far it moves in all runs together; its size where it hardly moves."""
     values = np.concatenate(trajectories)
     finite = np.where(np.isfinite(values), values, 0.0)
     size = np.abs(finite).max(axis=0)
-    moved: Vector = np.maximum(np.ptp(finite, axis=0), np.maximum(1e-6 * size, 1e-9))
+    moved: Numbers = np.maximum(np.ptp(finite, axis=0), np.maximum(1e-6 * size, 1e-9))
     return moved
 
 
-def difference(a: Vector, b: Vector) -> tuple[float, int]:
+def difference(a: Numbers, b: Numbers) -> tuple[float, int]:
     """Largest difference of two runs relative to how far the outputs move, and the output's place."""
     if not a.size:
         return 0.0, 0

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.acceptance.checks.subject import Vector, scales
+from orchestrator.acceptance.checks.subject import scales
+from orchestrator.arrays import Numbers
 
 _LEVELS = 4
 """A signal with more values than that does not switch."""
@@ -24,7 +25,7 @@ _DWELL = 0.1
 _STEPS = 2.0
 """How many of the longer steps a time between two switchings may differ by."""
 
-Run = tuple[Vector, float]
+Run = tuple[Numbers, float]
 """What was read after every step, from the start on, and the step [s]."""
 
 

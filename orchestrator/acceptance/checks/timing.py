@@ -4,8 +4,9 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Subject, Vector, scales
+from orchestrator.acceptance.checks.subject import Subject, scales
 from orchestrator.acceptance.checks.switching import switches_elsewhere
+from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
 _SMALL = 1e-6
@@ -93,7 +94,7 @@ def delay(subject: Subject) -> Result:
     )
 
 
-def _at_step_sizes(subject: Subject) -> tuple[Vector, Vector, Vector] | str:
+def _at_step_sizes(subject: Subject) -> tuple[Numbers, Numbers, Numbers] | str:
     """The response to one step of all inputs, with one, two and four times a step size.
 
     That is the FMU's own, or a quarter of it where four times as much leads nowhere: not every FMU that is good at its
@@ -105,11 +106,11 @@ def _at_step_sizes(subject: Subject) -> tuple[Vector, Vector, Vector] | str:
             subject.memory["step sizes"] = runs = _runs_from(subject, base)
             if not isinstance(runs, str) and _stays(runs):
                 break
-    found: tuple[Vector, Vector, Vector] | str = subject.memory["step sizes"]
+    found: tuple[Numbers, Numbers, Numbers] | str = subject.memory["step sizes"]
     return found
 
 
-def _runs_from(subject: Subject, base: float) -> tuple[Vector, Vector, Vector] | str:
+def _runs_from(subject: Subject, base: float) -> tuple[Numbers, Numbers, Numbers] | str:
     steps = 4 * (affordable(subject, 400) // 4)
     try:
         one, two, four = (subject.trajectory(steps // many, many * base, subject.one_step()) for many in (1, 2, 4))
@@ -118,14 +119,14 @@ def _runs_from(subject: Subject, base: float) -> tuple[Vector, Vector, Vector] |
     return one, two, four
 
 
-def _stays(runs: tuple[Vector, Vector, Vector]) -> bool:
+def _stays(runs: tuple[Numbers, Numbers, Numbers]) -> bool:
     """Whether the longer steps lead to numbers of the same order."""
     fine, *coarse = runs
     size = np.abs(fine).max(initial=1e-9)
     return all(bool(np.isfinite(run).all()) and np.abs(run).max(initial=0.0) < 100 * size for run in coarse)
 
 
-def _shift(fine: Vector, coarse: Vector, many: int) -> int:
+def _shift(fine: Numbers, coarse: Numbers, many: int) -> int:
     """By how many communication steps an output of the coarse run is late, and of the fine run as well; else 0.
 
     Late by ``count`` steps of any size, it lags ``count·(many − 1)`` fine steps more in the coarse run.
@@ -144,7 +145,7 @@ def _shift(fine: Vector, coarse: Vector, many: int) -> int:
     return 0
 
 
-def _rms(values: Vector) -> float:
+def _rms(values: Numbers) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
@@ -228,7 +229,7 @@ def _switching(name: str, signals: list[str], seen: str, **figures: float) -> Re
     )
 
 
-def _typical(a: Vector, b: Vector) -> float:
+def _typical(a: Numbers, b: Numbers) -> float:
     """The difference that most samples have, relative to the range, of the output that differs most.
 
     One sample beside an event, such as a bounce, says nothing.

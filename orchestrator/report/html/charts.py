@@ -7,9 +7,8 @@ from html import escape
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from orchestrator.arrays import Numbers
 
 _WIDTH, _HEIGHT = 720, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 14, 12, 42
