@@ -5,14 +5,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
+from fmus.grid.network import OPEN_CHARGING, SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.port import BREAKER_TIME
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
-
-OPEN_CHARGING = 1e-3
-"""Part of an open line's charging that stays, so that a bus which only this line supports keeps a defined voltage."""
 
 
 @dataclass

@@ -9,6 +9,9 @@ from fmus.grid.names import line_variable
 SMALLEST_REACTANCE = 1e-5
 """Of a line [pu, 100 MVA]."""
 
+OPEN_CHARGING = 1e-3
+"""Part of an open line's charging that stays, so that a bus which only this line supports keeps a defined voltage."""
+
 ActivePower = Literal["impedance", "current"]
 """How a load's active power follows its voltage: with its square, or in proportion."""
 

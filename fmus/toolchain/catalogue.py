@@ -5,6 +5,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from fmus.toolchain.extras import require
 from fmus.toolchain.model import Model
 
 GROUP = "gfor_cosim.models"
@@ -52,4 +53,5 @@ def _factory(name: str) -> Any:
     found = _entries().get(name)
     if found is None:
         raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
+    require(f"the model {name!r} of the catalogue", "casadi")
     return found.load()

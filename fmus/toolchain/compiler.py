@@ -1,4 +1,8 @@
-"""A C compiler without a system compiler: ziglang from PyPI, its results kept between runs."""
+"""A C compiler without a system compiler: ziglang from PyPI, its results kept between runs.
+
+A released wheel brings the orchestrator's own libraries for every platform in the folder ``prebuilt``, so that running
+FMUs needs no compiler.
+"""
 
 import hashlib
 import re
@@ -11,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.extras import require
 from fmus.toolchain.universal_binary import universal_binary
 
 TARGETS = {
@@ -37,6 +42,8 @@ _MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
 
 
 _OWN_HEADER = re.compile(r'#include "(\w+\.h)"\s*$')
+
+_PREBUILT = Path(__file__).with_name("prebuilt")
 
 
 @cache
@@ -82,17 +89,40 @@ def compile_library(source: str, platform: str) -> Path:
 
 
 def compile_here(*files: Path) -> Path:
-    """Compile files of C, as one, to a shared library for this machine; see `joined_source`.
+    """Compile files of C, as one (`joined_source`), for this machine, or return the library that this package brought.
 
     Raises
     ------
+    MissingLibraryError
+        If there is no such library, and no compiler is installed.
     RuntimeError
         If the compiler fails, or has no target for this machine.
     """
     platform = host_platform()
     if platform is None:
         raise RuntimeError("there is no compiler for this platform")
-    return compile_library(joined_source(*files), platform)
+    source = joined_source(*files)
+    brought = _prebuilt(source, platform)
+    return brought if brought.exists() else compile_library(source, platform)
+
+
+def prebuild(*files: Path) -> None:
+    """Compile files of C, as one, for every platform into the folder that a released wheel takes along.
+
+    Raises
+    ------
+    RuntimeError
+        As `compile_library`.
+    """
+    source = joined_source(*files)
+    for platform in TARGETS:
+        _put(compile_library(source, platform).read_bytes(), _prebuilt(source, platform))
+
+
+def _prebuilt(source: str, platform: str) -> Path:
+    """Where the package has the library of a source, if it brought one; another source has another name."""
+    key = hashlib.sha256("\0".join([source, platform, *FLAGS, *_MAC_FLAGS]).encode()).hexdigest()[:32]
+    return _PREBUILT / f"{key}{ENDINGS[platform]}"
 
 
 def joined_source(*files: Path) -> str:
@@ -113,6 +143,7 @@ def joined_source(*files: Path) -> str:
 
 def compile_for(source: str, target: str, ending: str) -> Path:
     """Compile C source for one zig target; otherwise as `compile_library`."""
+    require("compiling C", "ziglang")
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS
     key = hashlib.sha256("\0".join([source, target, *recipe()]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"

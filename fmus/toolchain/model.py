@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
-
-import casadi as ca
+from typing import Any, Literal
 
 from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
 
 Integrator = Literal["runge_kutta", "sdirk"]
+
+Function = Any
+"""A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,10 @@ class Model:
     inputs: tuple[Input, ...]
     states: tuple[State, ...]
     outputs: tuple[Output, ...]
-    initialise: ca.Function
-    derivatives: ca.Function
-    outputs_function: ca.Function
-    requirements: ca.Function
+    initialise: Function
+    derivatives: Function
+    outputs_function: Function
+    requirements: Function
     requirement_texts: tuple[str, ...]
     integrator: Integrator = "runge_kutta"
 
@@ -59,8 +60,10 @@ class Model:
         names = [v.name for v in self.variables] + [f"der({s.name})" for s in self.states]
         return {name: index for index, name in enumerate(names)}
 
-    def jacobians(self) -> ca.Function:
+    def jacobians(self) -> Function:
         """Exact (A, B, C, D) of the continuous model as a function of (x, u, p, c)."""
+        import casadi as ca  # noqa: PLC0415 - of the extra `build`
+
         x, u, p, c = (ca.SX.sym(s, n) for s, n in zip("xupc", self._sizes, strict=True))
         f = self.derivatives(x, u, p, c)
         y = self.outputs_function(x, u, p, c)

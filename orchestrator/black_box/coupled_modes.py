@@ -18,7 +18,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, find_spectru
 from orchestrator.analysis.state_access import StateAccess, obstacle
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.black_box.bench import Bench
-from orchestrator.black_box.fitting import IdentifiedModel, fit
+from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -104,6 +104,7 @@ def linearize_with_box(
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
+    require_fitting()
     residual = _check_still(master, [component])
     response, moved = _respond(master, component, excitation or Excitation(), restore=restore)
     identified = fit(response)
@@ -132,6 +133,7 @@ def modes_with_boxes(
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)
+    require_fitting()
     residual = _check_still(master, boxes)
     known = {}
     for name in boxes:

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-from skrf import Network
-from skrf.vectorFitting import VectorFitting
 
+from fmus.toolchain.extras import require
 from orchestrator.arrays import Complex, Matrix
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.errors import AnalysisError
@@ -29,6 +28,17 @@ _MOST_ITERATIONS = 30
 
 _COUNTS = 1e-7
 """A residue's singular value counts from this part of the largest response on."""
+
+
+def require_fitting() -> None:
+    """Refuse, before anything is measured, what cannot be fitted afterwards.
+
+    Raises
+    ------
+    MissingLibraryError
+        If scikit-rf is not installed.
+    """
+    require("fitting a model to a measured response", "skrf")
 
 
 @dataclass(frozen=True)
@@ -92,6 +102,10 @@ def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedM
 
 def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedModel | None:
     """Model with the given number of poles; None where the fit breaks down or is unstable."""
+    require_fitting()
+    from skrf import Network  # noqa: PLC0415 - of the extra `black-box`
+    from skrf.vectorFitting import VectorFitting  # noqa: PLC0415 - as above
+
     H = response.step_size
     warped = np.tan(np.pi * response.frequencies * H) / (np.pi * H)
     data = response.strictly_proper

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.extras import require
 from orchestrator.arrays import Matrix
 from orchestrator.cases.names import close_names
 from orchestrator.errors import InputError
@@ -59,6 +60,8 @@ def read_matpower(path: Path) -> SourceTables:
         raise InputError(f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)")
     if path.suffix not in (".m", ".mat"):
         raise InputError(f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}")
+    if path.suffix == ".m":
+        require(f"reading the MATPOWER case {path.name}", "matpowercaseframes")
     try:
         tables = _m_file(path) if path.suffix == ".m" else _mat_file(path)
     except Exception as error:  # both libraries let all kinds of errors through
@@ -97,6 +100,7 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
 @cache
 def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
     """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
+    require(f"the pandapower network {name!r}", "pandapower")
     import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
 
     logging.getLogger("pandapower").setLevel(logging.CRITICAL)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.toolchain.extras import require
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers, widest_angle
 from orchestrator.errors import InputError
@@ -107,6 +108,7 @@ def _pandapower_voltages(
     at_bus: Mapping[str, Sequence[FlowUnit]],
     slack_bus: str,
 ) -> dict[str, complex]:
+    require("the power flow from which a network starts", "pandapower")
     import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
 
     logging.getLogger("pandapower").setLevel(logging.ERROR)

@@ -7,8 +7,7 @@ from functools import cache
 
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
-from fmus.toolchain.native_fmu import cached_native
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.extras import require
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.definition import CaseDefinition
@@ -73,7 +72,17 @@ def _takes_network(table: ComponentTable) -> bool:
 
 @cache
 def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
-    """FMU of a model of the catalogue, built once a machine."""
+    """FMU of a model of the catalogue, built once a machine.
+
+    Raises
+    ------
+    MissingLibraryError
+        If the extra that builds FMUs is not installed.
+    """
+    require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
+    from fmus.toolchain.native_fmu import cached_native  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.python_fmu import cached  # noqa: PLC0415 - as above
+
     arguments = {"network": network} if network is not None else {}
     build = cached_native if native else cached
     return read_description(build(build_model(model, **arguments)))

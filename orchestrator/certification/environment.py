@@ -5,15 +5,17 @@ import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
+from orchestrator.results.storage import versions_of
+
 _LIBRARIES = ("numpy", "scipy", "fmpy", "casadi", "xarray", "scikit-rf")
 _ROOT = Path(__file__).parents[2]
 
 
 def environment() -> dict[str, str]:
-    """Name and version of each."""
+    """Name and version of each, without libraries that are not installed."""
     known = {"gfor-cosim": version("gfor-cosim"), "Commit": commit(), "Operating system": platform.platform(),
              "Processor": platform.machine(), "Python": platform.python_version()}  # fmt: skip
-    return known | {name: version(name) for name in _LIBRARIES}
+    return known | versions_of(_LIBRARIES)
 
 
 def commit() -> str:

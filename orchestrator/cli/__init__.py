@@ -4,11 +4,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-
-from orchestrator.errors import INTERRUPTED, CosimError
+from fmus.toolchain.extras import MissingLibraryError
+from orchestrator.errors import INTERRUPTED, CosimError, InputError
 
 COMMANDS = {
     "run": "steady state, modes and time response of a case's scenarios",
@@ -61,17 +60,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     options = _parser(next((word for word in words if not word.startswith("-")), None)).parse_args(words)
-    errors = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
     try:
         return int(options.command(options))
     except CosimError as error:
-        errors.print(f"[bold red]error:[/bold red] {escape(str(error))}")
+        _print_error(str(error))
         return error.exit_code
+    except MissingLibraryError as error:
+        _print_error(str(error))
+        return InputError.exit_code
     except BrokenPipeError:
         return 0
     except KeyboardInterrupt:
-        errors.print("interrupted")
+        print("interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+def _print_error(text: str) -> None:
+    from rich.console import Console  # noqa: PLC0415 - `gfor --version` and `gfor --help` do without
+    from rich.markup import escape  # noqa: PLC0415
+
+    console = Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
+    console.print(f"[bold red]error:[/bold red] {escape(text)}")
+
+
+class _Version(argparse.Action):
+    """Prints the installed version; it is only looked up when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version  # noqa: PLC0415 - not needed by any command
+
+        print(f"gfor-cosim {version('gfor-cosim')}")
+        parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -84,6 +103,7 @@ class _Parser(argparse.ArgumentParser):
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
     parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=argparse.ArgumentParser)
     for name, words in COMMANDS.items():
         command = commands.add_parser(name, help=words)

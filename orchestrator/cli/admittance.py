@@ -17,7 +17,7 @@ from orchestrator.analysis.modes import damping_percent
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification
-from orchestrator.black_box.fitting import fit
+from orchestrator.black_box.fitting import fit, require_fitting
 from orchestrator.black_box.frequency_response import measure
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cases.values import check_system_base, convert
@@ -42,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, fit, write, and say what was found."""
+    require_fitting()
     console = make_console(stderr=options.json)
     description = bound_fmu(options.fmu, options.binding)
     values = _values(description, dict(options.set))

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
+from fmus.toolchain.extras import require
 from fmus.toolchain.model import Model
-from fmus.toolchain.native_fmu import export_native
-from fmus.toolchain.python_fmu import export
 from orchestrator.cli import linear_model
 from orchestrator.errors import InputError
 
@@ -31,6 +30,10 @@ def run(options: argparse.Namespace) -> int:
     """Build every model and print the files' paths."""
     if options.fmi != "2.0" and not options.native:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
+    require("building FMUs", "casadi", "pythonfmu", "ziglang")
+    from fmus.toolchain.native_fmu import export_native  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.python_fmu import export  # noqa: PLC0415 - as above
+
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     models = [_model(name) for name in names]
     extra = linear_model.extra_members(options, [model.name for model in models])

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.extras import require
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
@@ -66,6 +66,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> int:
+    require("building the probe FMUs", "casadi", "ziglang")
+    from fmus.toolchain.native_fmu import export_native  # noqa: PLC0415 - needs the extra `build`
+
     folder, host = made_folder(options.build, "--build"), host_platform()
     platforms = tuple(options.platform or ([host] if host else []))
     for name in ("probe_a", "probe_b"):

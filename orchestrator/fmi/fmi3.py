@@ -12,7 +12,7 @@ from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.clocks import MOST_CLOCKS, Clock
 from orchestrator.fmi.description import FmuDescription
 
-_SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
+SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
 """Compiled as one, in this order."""
 
 _KINDS = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
@@ -96,7 +96,7 @@ def adapter_path() -> Path:
         If it cannot be compiled here.
     """
     try:
-        return compile_here(*(Path(__file__).with_name(name) for name in _SOURCES))
+        return compile_here(*(Path(__file__).with_name(name) for name in SOURCES))
     except (OSError, RuntimeError) as error:
         raise FmuFileError(f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0") from error
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
@@ -76,11 +77,7 @@ class DaskCluster:
 
 
 def _distributed() -> Any:
-    try:
-        import distributed  # noqa: PLC0415 - an extra, and slow to import
-    except ImportError as error:
-        raise InputError(
-            "--scheduler needs Dask, which is not installed; install it with `pip install 'gfor-cosim[cluster]'`, "
-            "or leave --scheduler out to use this machine's cores"
-        ) from error
+    require("--scheduler", "distributed")
+    import distributed  # noqa: PLC0415 - of the extra `cluster`, and slow to import
+
     return distributed

@@ -3,7 +3,8 @@
 import csv
 import json
 from collections.abc import Iterable, Mapping
-from importlib.metadata import version
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -30,9 +31,18 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
         "fmus": json.dumps(
             {n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool} for n, d in fmus.items()}
         ),
-        "versions": json.dumps({p: version(p) for p in packages}),
+        "versions": json.dumps(versions_of(packages)),
         "Conventions": "CF-1.10",
     }
+
+
+def versions_of(packages: Iterable[str]) -> dict[str, str]:
+    """Versions of packages, by name, without those whose extra is not installed."""
+    found = {}
+    for package in packages:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
 
 
 class Recorded(Protocol):

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from fmus.toolchain.extras import MissingLibraryError
 from orchestrator.errors import InputError
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.executor import WorkerLostError
@@ -49,7 +50,7 @@ def test_leaving_early_stops_the_workers():
 
 def test_without_dask_the_error_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'gfor-cosim\[cluster\]'"):
+    with pytest.raises(MissingLibraryError, match=r"pip install 'gfor-cosim\[cluster\]'"):
         list(DaskCluster("tcp://localhost:1").run(double, NUMBERS))
 
 

@@ -1,0 +1,43 @@
+"""Libraries that only some users need: the extra that installs each, and one error where one is missing."""
+
+from importlib.util import find_spec
+
+EXTRAS = {
+    "casadi": "build",
+    "pythonfmu": "build",
+    "ziglang": "build",
+    "matpowercaseframes": "networks",
+    "pandapower": "networks",
+    "skrf": "black-box",
+    "distributed": "cluster",
+}
+"""Name of a library in an import → extra of this distribution that installs it."""
+
+
+class MissingLibraryError(RuntimeError):
+    """A library that an extra installs is needed, and is not installed."""
+
+
+def require(purpose: str, *libraries: str) -> None:
+    """Refuse a task whose libraries are not installed, before it imports them.
+
+    Parameters
+    ----------
+    purpose
+        The task, as the subject of the error's sentence, such as "building an FMU".
+    libraries
+        Keys of `EXTRAS`.
+
+    Raises
+    ------
+    MissingLibraryError
+        If any is missing; the message names the extra to install.
+    """
+    missing = [library for library in libraries if find_spec(library) is None]
+    if missing:
+        extras = ",".join(sorted({EXTRAS[library] for library in missing}))
+        are = "is" if len(missing) == 1 else "are"
+        raise MissingLibraryError(
+            f"{purpose} needs {', '.join(missing)}, which {are} not installed; "
+            f"install what is missing with `pip install 'gfor-cosim[{extras}]'`"
+        )

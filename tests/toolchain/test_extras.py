@@ -1,0 +1,85 @@
+"""What an installation without extras can do, and what it says where it cannot."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fmus.toolchain import compiler
+from fmus.toolchain.extras import EXTRAS, MissingLibraryError, require
+
+ROOT = Path(__file__).parents[2]
+DISTRIBUTIONS = {"skrf": "scikit-rf"}
+"""Name in an import → name on PyPI, where they differ."""
+
+
+def test_the_table_of_extras_is_that_of_the_distribution():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    for library, extra in EXTRAS.items():
+        names = [re.split(r"[^\w.-]", text)[0] for text in extras[extra]]
+        assert DISTRIBUTIONS.get(library, library) in names
+    always = [re.split(r"[^\w.-]", text)[0] for text in project["dependencies"]]
+    assert not {DISTRIBUTIONS.get(library, library) for library in EXTRAS} & set(always)
+    (everything,) = extras["all"]
+    assert set(EXTRAS.values()) == set(re.findall(r"\[(.*)\]", everything)[0].split(","))
+
+
+def test_a_missing_library_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    monkeypatch.setitem(sys.modules, "pandapower", None)
+    with pytest.raises(MissingLibraryError, match=r"a trial needs casadi, which is not installed.*gfor-cosim\[build\]"):
+        require("a trial", "casadi", "ziglang")
+    with pytest.raises(MissingLibraryError, match=r"casadi, pandapower, which are .*gfor-cosim\[build,networks\]"):
+        require("a trial", "casadi", "pandapower")
+
+
+WITHOUT_EXTRAS = """
+import sys
+for library in {libraries}:
+    sys.modules[library] = None
+from importlib import import_module
+from pathlib import Path
+from orchestrator.cli import COMMANDS, main
+for name in COMMANDS:
+    import_module("orchestrator.cli." + name.replace("-", "_"))
+sys.exit(main({arguments}))
+"""
+
+
+def gfor_without_extras(*arguments):
+    """Run the command line where no library of an extra can be imported, after importing every command."""
+    script = WITHOUT_EXTRAS.format(libraries=list(EXTRAS), arguments=list(arguments))
+    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+
+
+def test_every_command_can_be_imported_without_extras():
+    done = gfor_without_extras("info", "no_such.fmu")
+    assert done.returncode == 2, done.stderr
+    assert "no_such.fmu" in done.stderr
+
+
+def test_a_command_that_needs_an_extra_says_so():
+    done = gfor_without_extras("modes", "two_area")
+    assert done.returncode == 2, done.stderr
+    assert "error: the model" in done.stderr
+    assert "pip install 'gfor-cosim[build]'" in done.stderr
+
+
+def test_a_library_that_the_wheel_brought_is_taken_as_it_is(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler, "_PREBUILT", tmp_path)
+    source = tmp_path / "source.c"
+    text = '__attribute__((visibility("default"))) int number(void) { return 7; }\n'
+    source.write_text(text, encoding="utf-8")
+    compiled = compiler.compile_here(source)
+    assert compiled.parent != tmp_path
+    compiler.prebuild(source)
+    assert len(list(tmp_path.glob("*.*"))) == 1 + len(compiler.TARGETS)
+    brought = compiler.compile_here(source)
+    assert brought.parent == tmp_path
+    assert brought.read_bytes() == compiled.read_bytes()
+    source.write_text(text.replace("7", "8"), encoding="utf-8")
+    assert compiler.compile_here(source).parent != tmp_path
