@@ -1,0 +1,1 @@
+"""Models of generators, networks and probes, and the toolchain that makes FMUs of models."""

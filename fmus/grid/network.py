@@ -35,6 +35,7 @@ class Line:
 
     @property
     def has_ratio(self) -> bool:
+        """Whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0
 
     def variable(self, quantity: str) -> str:

@@ -25,7 +25,8 @@ class Exciter(Protocol):
 
     def __call__(
         self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-    ) -> tuple[ca.SX, ca.SX]: ...
+    ) -> tuple[ca.SX, ca.SX]:
+        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
 
 
 def ac4a(

@@ -42,30 +42,37 @@ class Axis:
 
     @property
     def weight_1(self) -> ca.SX:
+        """Part of the first rotor branch's flux in the subtransient flux."""
         return self.X_subtransient / self.branches.X_1
 
     @property
     def weight_2(self) -> ca.SX:
+        """Part of the second rotor branch's flux in the subtransient flux."""
         return self.X_subtransient / self.branches.X_2
 
     @property
     def emf(self) -> ca.SX:
+        """Subtransient flux of the rotor [pu]."""
         return self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2
 
     @property
     def i(self) -> ca.SX:
+        """Stator current of this axis [pu]."""
         return (self.emf - self.psi) / self.X_between
 
     @property
     def psi_airgap(self) -> ca.SX:
+        """Flux in the air gap [pu]."""
         return self.emf - self.X_subtransient * self.i
 
     @property
     def i_1(self) -> ca.SX:
+        """Current of the first rotor branch [pu]."""
         return (self.psi_1 - self.psi_airgap) / self.branches.X_1
 
     @property
     def i_2(self) -> ca.SX:
+        """Current of the second rotor branch [pu]."""
         return (self.psi_2 - self.psi_airgap) / self.branches.X_2
 
     def current_rate(self, psi_rate: ca.SX, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
@@ -110,6 +117,7 @@ class Machine:
 
     @property
     def torque(self) -> ca.SX:
+        """Electrical torque [pu]."""
         return self.d.psi * self.q.i - self.q.psi * self.d.i
 
     @property

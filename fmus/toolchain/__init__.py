@@ -1,0 +1,1 @@
+"""From a model's equations to an FMU: kernel, exporters and compiler."""

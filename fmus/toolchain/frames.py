@@ -42,15 +42,19 @@ class Phasor:
         return Phasor(self.re / other, self.im / other)
 
     def conjugate(self) -> Phasor:
+        """The complex conjugate."""
         return Phasor(self.re, -self.im)
 
     def times_j(self) -> Phasor:
+        """The phasor, turned ahead by 90°."""
         return Phasor(-self.im, self.re)
 
     def magnitude(self) -> ca.SX:
+        """Its length."""
         return ca.sqrt(self.re**2 + self.im**2)
 
     def angle(self) -> ca.SX:
+        """Its angle [rad]."""
         return ca.atan2(self.im, self.re)
 
     def rotated(self, angle: Scalar) -> Phasor:
@@ -109,9 +113,11 @@ class QdState:
 
     @property
     def value(self) -> Phasor:
+        """The two states as a phasor."""
         return Phasor(self.q, -self.d)
 
     def set_derivative(self, m: ModelBuilder, rate: Phasor) -> None:
+        """Give both states their rates of change."""
         m.derivative(self.q, rate.re)
         m.derivative(self.d, -rate.im)
 

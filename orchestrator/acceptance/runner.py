@@ -65,6 +65,7 @@ class Report:
 
     @property
     def failures(self) -> list[Result]:
+        """Results of the checks that failed."""
         return [r for r in self.results if r.verdict is Verdict.FAIL]
 
     @property
@@ -83,6 +84,7 @@ class Report:
         return not self.failures and not self.not_supported
 
     def as_dict(self) -> dict[str, Any]:
+        """The report as JSON's types."""
         return {
             "tool": f"gfor-cosim {version('gfor-cosim')}",
             "fmu": str(self.fmu),
@@ -109,6 +111,7 @@ def file_hash(path: Path | None) -> str | None:
 
 
 def question_of(name: str) -> str:
+    """The question that a check asks, in words."""
     return FILE_CHECKS[name] if name in FILE_CHECKS else CHECKS[name].question
 
 

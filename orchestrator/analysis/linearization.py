@@ -122,12 +122,15 @@ class Blocks:
 
     @property
     def disagreement(self) -> float:
+        """The largest of all components' disagreements."""
         return max(c.disagreement for c in self.components.values())
 
     def state_names(self) -> list[str]:
+        """Names ``component.state`` of all states, in their order."""
         return [f"{name}.{state}" for name, c in self.components.items() for state in c.states]
 
     def state_windows(self) -> dict[str, slice]:
+        """Where the states of each component stand in the vector of all states."""
         windows, first = {}, 0
         for name, c in self.components.items():
             windows[name] = slice(first, first + len(c.states))

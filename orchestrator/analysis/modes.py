@@ -67,6 +67,7 @@ class Mode:
 
     @property
     def damping_percent(self) -> float:
+        """Damping ratio [%]."""
         return 100 * self.damping_ratio
 
     @property

@@ -128,6 +128,7 @@ class Stability:
 
     @property
     def verdict(self) -> str:
+        """The verdict in one word or two: stable, UNSTABLE, not known."""
         return {True: "stable", False: "UNSTABLE", None: "not known"}[self.stable]
 
     def sentence(self) -> str:

@@ -47,9 +47,11 @@ class StateAccess:
         self._buffer = RealBatch(component, component.description.states)
 
     def read(self) -> Matrix:
+        """The present values of the states."""
         return self.batch.read().copy()
 
     def write(self, values: Matrix) -> None:
+        """Set the states, where a master can set them."""
         if self._settable:
             self._buffer.values[:] = values
             self._buffer.write()

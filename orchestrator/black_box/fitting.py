@@ -64,6 +64,7 @@ class IdentifiedModel:
 
     @property
     def poles(self) -> Complex:
+        """Poles as eigenvalues λ = ln μ/H [rad/s]."""
         return np.asarray(np.log(np.linalg.eigvals(self.A).astype(complex)) / self.step_size)
 
     def response(self, z: Complex) -> Complex:

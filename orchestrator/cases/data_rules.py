@@ -13,6 +13,7 @@ class Rule:
     may_be_equal: bool = False
 
     def holds(self, larger: float, smaller: float) -> bool:
+        """Whether two values obey the rule."""
         return larger > smaller or (self.may_be_equal and larger == smaller)
 
     def text(self, larger: str, smaller: str) -> str:

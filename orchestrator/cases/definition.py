@@ -36,6 +36,7 @@ class CaseDefinition:
 
     @property
     def name(self) -> str:
+        """The case's name."""
         return self.table.name
 
     @property

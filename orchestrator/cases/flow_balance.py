@@ -29,6 +29,7 @@ class FlowLine:
 
     @property
     def has_ratio(self) -> bool:
+        """Whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0
 
     @property

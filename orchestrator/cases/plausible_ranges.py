@@ -27,6 +27,7 @@ class Plausible:
     or_zero: bool = False
 
     def fits(self, value: float) -> bool:
+        """Whether a value lies in the range."""
         return self.low <= value <= self.high or (self.or_zero and value == 0)
 
 

@@ -63,6 +63,8 @@ class PowerFlowTable(Table):
 
 
 class LineTable(Table):
+    """A line or transformer of the network."""
+
     from_bus: str = Field(alias="from")
     to_bus: str = Field(alias="to")
     X: PerUnit
@@ -73,6 +75,8 @@ class LineTable(Table):
 
 
 class LoadTable(Table):
+    """A load of the network."""
+
     bus: str
     p: Megawatt
     q: Megavar = 0.0
@@ -118,11 +122,15 @@ class UnitsTable(Table):
 
 
 class ConnectionTable(Table):
+    """A connection from an output to an input."""
+
     source: str = Field(alias="from")
     target: str = Field(alias="to")
 
 
 class EventBase(Table):
+    """What all events have: a time."""
+
     time: Seconds = Field(ge=0)
 
 
@@ -133,44 +141,60 @@ class GridEventBase(EventBase):
 
 
 class LoadChangeTable(GridEventBase):
+    """A load changes to a multiple of its power."""
+
     type: Literal["load_change"]
     load: str
     scale: float = Field(gt=0)
 
 
 class LoadTripTable(GridEventBase):
+    """A load is disconnected."""
+
     type: Literal["load_trip"]
     load: str
 
 
 class LoadReconnectionTable(GridEventBase):
+    """A load is connected again."""
+
     type: Literal["load_reconnection"]
     load: str
     scale: float = Field(default=1.0, gt=0)
 
 
 class LineTripTable(GridEventBase):
+    """A line opens, and may close again."""
+
     type: Literal["line_trip"]
     line: str
     reclose_after: Seconds | None = Field(default=None, gt=0)
 
 
 class LineReclosingTable(GridEventBase):
+    """A line closes again."""
+
     type: Literal["line_reclosing"]
     line: str
 
 
 class UnitTripTable(GridEventBase):
+    """A unit is disconnected."""
+
     type: Literal["unit_trip"]
     unit: str
 
 
 class UnitReconnectionTable(GridEventBase):
+    """A unit is connected again."""
+
     type: Literal["unit_reconnection"]
     unit: str
 
 
 class BranchChangeTable(GridEventBase):
+    """A line gets another impedance."""
+
     type: Literal["branch_change"]
     line: str
     X: PerUnit
@@ -178,6 +202,8 @@ class BranchChangeTable(GridEventBase):
 
 
 class ReferenceChangeTable(EventBase):
+    """A reference of a component steps."""
+
     type: Literal["reference_change"]
     component: str
     reference: str
@@ -185,6 +211,8 @@ class ReferenceChangeTable(EventBase):
 
 
 class ParameterChangeTable(EventBase):
+    """A parameter of a component changes."""
+
     type: Literal["parameter_change"]
     component: str
     parameter: str
@@ -217,6 +245,8 @@ class ScenarioTable(Table):
 
 
 class RingDownTable(Table):
+    """A recorded signal in which modes are identified."""
+
     signal: str
     start: Seconds
 
@@ -239,6 +269,8 @@ class AnalysisTable(Table):
 
 
 class ReferenceModeTable(Table):
+    """A published mode to compare with."""
+
     real: float | None = None
     imag: float | None = None
     frequency_hz: float
@@ -255,12 +287,16 @@ class ReferenceTable(Table):
 
 
 class PanelTable(Table):
+    """One axis of a plot."""
+
     signal: str
     label: str
     scale: float = 1.0
 
 
 class PlotTable(Table):
+    """A plot of recorded signals."""
+
     name: str
     title: str
     panels: list[PanelTable]

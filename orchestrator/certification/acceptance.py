@@ -33,6 +33,7 @@ class Acceptance:
 
     @property
     def checks(self) -> list[dict[str, Any]]:
+        """The results of all checks."""
         return list(self.report["checks"])
 
     def keep(self, folder: Path) -> None:

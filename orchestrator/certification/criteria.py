@@ -50,10 +50,12 @@ class ModeVerdict:
 
     @property
     def frequency_hz(self) -> float:
+        """Frequency of the oscillation [Hz]."""
         return self.eigenvalue.imag / (2 * np.pi)
 
     @property
     def damping_percent(self) -> float:
+        """Damping ratio [%]."""
         return 100 * damping_ratio(self.eigenvalue)
 
     @property

@@ -50,6 +50,7 @@ class TimeVerdict:
 
     @property
     def accepted(self) -> bool:
+        """Whether the criterion is met."""
         return self.swings.accepted or self.modal.accepted
 
 
@@ -79,14 +80,17 @@ class PointVerdict:
 
     @property
     def judged(self) -> bool:
+        """Whether all that the judgement needs is known."""
         return not self.unknown
 
     @property
     def accepted(self) -> bool:
+        """Whether the criterion is met."""
         return self.judged and not self.faults
 
     @property
     def eigenvalues_accepted(self) -> bool:
+        """Whether there are modes to judge, and all are damped well enough."""
         return bool(self.modes) and all(m.accepted for m in self.modes)
 
     @property

@@ -96,6 +96,7 @@ class Certification:
 
     @property
     def passed(self) -> bool:
+        """Whether the converter passes the test."""
         return self.verdict == PASSES
 
     @property

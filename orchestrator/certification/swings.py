@@ -54,6 +54,7 @@ class Swing:
 
     @property
     def depth(self) -> float:
+        """How far the minimum lies below the line."""
         return self.line - self.minimum.value
 
 

@@ -52,6 +52,7 @@ class Verification:
 
     @property
     def holds(self) -> bool:
+        """Whether the certificate holds."""
         return not self.faults
 
 

@@ -42,6 +42,7 @@ class LoadChange(Event):
     scale: float
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         return {f"{self.load}.scale": self.scale}
 
 
@@ -53,6 +54,7 @@ class LoadSwitching(Event):
     scale: float = 0.0
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         return {f"{self.load}.scale": self.scale}
 
 
@@ -64,6 +66,7 @@ class LineSwitching(Event):
     connected: bool
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         return {line_variable(self.line, "connected"): self.connected}
 
 
@@ -76,9 +79,11 @@ class UnitSwitching(Event):
     has_breaker: bool = True
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         return {f"{self.unit}.connected": self.connected}
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
+        """The values that the event sets, by component and variable."""
         own: dict[str, Mapping[str, float | bool]] = {self.unit: {"connected": self.connected}}
         return (own if self.has_breaker else {}) | {self.component: self.settings()}
 
@@ -92,6 +97,7 @@ class BranchChange(Event):
     R: float | None = None
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         values = {line_variable(self.line, "X"): self.X}
         return values if self.R is None else values | {line_variable(self.line, "R"): self.R}
 
@@ -104,6 +110,7 @@ class ReferenceChange(Event):
     delta: float
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         scope, _, name = self.reference.rpartition(".")
         return {f"{scope}.delta_{name}" if scope else f"delta_{name}": self.delta}
 
@@ -116,4 +123,5 @@ class ParameterChange(Event):
     value: float | bool
 
     def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
         return {self.parameter: self.value}

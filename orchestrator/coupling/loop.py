@@ -126,6 +126,7 @@ class CompiledLoop:
         call.tracks = self._tracks.address(exchange.window.start or 0)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
+        """See `Loop.advance`."""
         with calls:
             status = self._library.advance(
                 ctypes.addressof(self._calls),
@@ -145,6 +146,7 @@ class CompiledLoop:
             component.check(status, _FUNCTIONS[self._failure[2]], self._failure[0] * step_size)
 
     def seconds(self) -> list[float]:
+        """See `Loop.seconds`."""
         return [call.spent for call in self._calls]
 
 
@@ -174,6 +176,7 @@ class PythonLoop:
         self.completed = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
+        """See `Loop.advance`."""
         self.completed = 0
         for k in range(index, index + count):
             with calls:
@@ -219,6 +222,7 @@ class PythonLoop:
         return known
 
     def seconds(self) -> list[float]:
+        """See `Loop.seconds`."""
         return [seconds for group in self._spent for seconds in group]
 
 

@@ -190,6 +190,7 @@ class Master:
 
     @property
     def time(self) -> float:
+        """Present time [s]."""
         return self.clock.time(self.index)
 
     def exchange_inputs(self, name: str) -> None:

@@ -24,17 +24,28 @@ class ObservedRun(Protocol):
     """
 
     @property
-    def index(self) -> int: ...
+    def index(self) -> int:
+        """Number of communication steps done."""
+
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Present time [s]."""
+
     @property
-    def components(self) -> Mapping[str, Component]: ...
+    def components(self) -> Mapping[str, Component]:
+        """The components by name."""
+
     @property
-    def output_names(self) -> tuple[str, ...]: ...
+    def output_names(self) -> tuple[str, ...]:
+        """Names ``component.variable`` of the coupled outputs, in the order of y."""
+
     @property
-    def y(self) -> NDArray[np.float64]: ...
+    def y(self) -> NDArray[np.float64]:
+        """The coupled outputs."""
+
     @property
-    def tracks(self) -> Tracks: ...
+    def tracks(self) -> Tracks:
+        """Where each coupled output went since it was last looked at."""
 
     def exchange(self) -> None:
         """Hand every component the newest outputs of its partners."""

@@ -38,13 +38,16 @@ class Recorder:
 
     @property
     def times(self) -> NDArray[np.float64]:
+        """Times of the recorded rows [s]."""
         return self._times[: self._count]
 
     @property
     def values(self) -> NDArray[np.float64]:
+        """Recorded values, a row for each time and a column for each name."""
         return self._values[: self._count]
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
+        """See `Observer.begin`."""
         by_component: dict[str, list[tuple[int, str]]] = {}
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
@@ -64,6 +67,7 @@ class Recorder:
         self._values = np.empty((rows, len(self.names)))
 
     def observe(self, run: ObservedRun) -> None:
+        """See `Observer.observe`."""
         if self.after_exchange:
             run.exchange()
         self._times[self._count] = run.time

@@ -31,6 +31,7 @@ class StepStatistics:
 
     @property
     def steps_per_second(self) -> float:
+        """Communication steps in a second of wall-clock time."""
         return self.steps / self.seconds if self.seconds > 0 else 0.0
 
     @property

@@ -38,6 +38,7 @@ class Clock:
 
     @property
     def periodic(self) -> bool:
+        """Whether it ticks at a fixed interval."""
         return self.variability in ("constant", "fixed", "tunable")
 
     @property

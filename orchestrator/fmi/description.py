@@ -133,14 +133,17 @@ class FmuDescription:
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
         return self._names("input")
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
         return self._names("output")
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
         return self._names("parameter")
 
     def _names(self, causality: str) -> tuple[str, ...]:

@@ -181,6 +181,7 @@ class Mailbox:
             return []
 
     def clear_log(self) -> None:
+        """Forget what the FMU has logged."""
         self._memory[self._log] = 0
 
     def function(self, name: str, *arguments: Any) -> Any:

@@ -122,6 +122,7 @@ class PortMap:
 
     @property
     def omega(self) -> float:
+        """Rated angular frequency [rad/s]."""
         return 2 * pi * self.f_n
 
     @property

@@ -43,6 +43,7 @@ class Placed:
 
     @property
     def damping_ratio(self) -> float:
+        """Damping ratio of the mode."""
         return damping_ratio(self.eigenvalue)
 
 

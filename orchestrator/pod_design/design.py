@@ -157,6 +157,7 @@ class PodDesign:
 
     @property
     def damping_met(self) -> bool:
+        """Whether the required damping is achieved."""
         return self.achieved_damping >= self.required_damping - _MET
 
     @property
@@ -166,6 +167,7 @@ class PodDesign:
 
     @property
     def achieved_damping(self) -> float:
+        """Damping ratio that the design achieves."""
         return damping_ratio(self.achieved)
 
     @property

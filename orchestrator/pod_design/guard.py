@@ -44,10 +44,12 @@ class Surroundings:
 
     @property
     def worst(self) -> Mode | None:
+        """The least damped of the other modes; None where there are no others."""
         return self.others[0] if self.others else None
 
     @property
     def is_unstable(self) -> bool:
+        """Whether the system grows."""
         return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":

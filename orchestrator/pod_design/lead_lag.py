@@ -40,6 +40,7 @@ class LeadLag:
 
     @property
     def is_lead(self) -> bool:
+        """Whether it advances the phase."""
         return self.T_S1 > self.T_S2
 
     @property

@@ -49,11 +49,16 @@ class Recorded(Protocol):
     """Values by time and name, such as those of a `Recorder`."""
 
     @property
-    def names(self) -> tuple[str, ...]: ...
+    def names(self) -> tuple[str, ...]:
+        """Names ``component.variable`` of the columns."""
+
     @property
-    def times(self) -> NDArray[np.float64]: ...
+    def times(self) -> NDArray[np.float64]:
+        """Times of the rows [s]."""
+
     @property
-    def values(self) -> NDArray[np.float64]: ...
+    def values(self) -> NDArray[np.float64]:
+        """A row for each time and a column for each name."""
 
 
 def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:

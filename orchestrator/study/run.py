@@ -38,6 +38,7 @@ class ModeShift:
 
     @property
     def shift(self) -> float:
+        """How far the communication step moves the eigenvalue [rad/s]."""
         return abs(self.eigenvalue - self.continuous)
 
 

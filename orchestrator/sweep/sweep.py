@@ -49,6 +49,7 @@ class SweepPlan:
 
     @property
     def number_of_points(self) -> int:
+        """Points of the grid in all scenarios."""
         return len(self.scenarios) * int(np.prod([len(axis.values) for axis in self.axes]))
 
     def values(self, place: Place) -> dict[str, Value]:

@@ -81,12 +81,14 @@ class Watcher:
         self._count = 0
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
+        """See `Observer.begin`."""
         self._recorder.begin(run, stop_index)
         self._outputs, self._count = run.output_names, 0
         self._tracks = np.empty((4, (stop_index - run.index) // self.every + 2, len(run.output_names)))
         run.tracks.look(run.y)
 
     def observe(self, run: ObservedRun) -> None:
+        """See `Observer.observe`."""
         self._recorder.observe(run)
         tracks = run.tracks
         for kept, now in zip(self._tracks, (run.y, tracks.low, tracks.high, tracks.turns), strict=True):

@@ -65,6 +65,7 @@ class Result:
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> "Result":
+        """The result that `as_dict` wrote."""
         return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
 
 
@@ -117,18 +118,22 @@ def check(
 
 
 def passed(name: str, evidence: str, **figures: Any) -> Result:
+    """A check that found no fault."""
     return Result(name, Verdict.PASS, evidence, figures=figures)
 
 
 def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> Result:
+    """A check that found something to ask about, which is no fault."""
     return Result(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
 
 
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> Result:
+    """A check that found a fault of the FMU."""
     return Result(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 
 
 def not_applicable(name: str, because: str) -> Result:
+    """A check that has nothing to test on this FMU."""
     return Result(name, Verdict.NOT_APPLICABLE, because)
 
 

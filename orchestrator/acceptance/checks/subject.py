@@ -34,6 +34,7 @@ class Point:
 
     @property
     def voltage(self) -> complex:
+        """The bus voltage as a complex number [pu]."""
         return rect(self.v, self.theta)
 
 
@@ -228,9 +229,11 @@ class Running:
         self._in.write()
 
     def read(self) -> Numbers:
+        """The outputs at this time."""
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:
+        """Do one communication step [s]."""
         self.component.step(self.time, step_size)
         self.time += step_size
 
@@ -258,12 +261,15 @@ class Running:
         return values
 
     def save(self) -> Any:
+        """Save the FMU's state."""
         return self.component.save_state()
 
     def restore(self, state: Any) -> None:
+        """Restore a saved state."""
         self.component.restore_state(state)
 
     def reset(self) -> None:
+        """Reset the instance and initialise it again."""
         self.component.reset()
         self.begin()
 

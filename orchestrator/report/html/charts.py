@@ -52,6 +52,7 @@ class Frame:
     parts: list[str] = field(default_factory=list)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
+        """Place of a point on the page [px]."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         across, up = (x - x0) / (x1 - x0), (y - y0) / (y1 - y0)
         return _LEFT + across * (_WIDTH - _LEFT - _RIGHT), self.height - _BOTTOM - up * (self.height - _TOP - _BOTTOM)
