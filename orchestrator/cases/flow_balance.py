@@ -63,7 +63,15 @@ def nodal_powers(
     loads: Sequence[FlowLoad],
     shunts: Sequence[FlowShunt],
 ) -> dict[str, complex]:
-    """P + jQ [pu, 100 MVA] that must be fed into every bus for the voltages to hold."""
+    """P + jQ [pu, 100 MVA] that must be fed into every bus for the voltages to hold.
+
+    Parameters
+    ----------
+    voltages
+        Complex voltage of every bus [pu].
+    lines, loads, shunts
+        What draws power; an open line only its charging.
+    """
     needed = dict.fromkeys(voltages, 0j)
     for line in lines:
         v_from, v_to = voltages[line.from_bus], voltages[line.to_bus]

@@ -67,6 +67,17 @@ def solve_power_flow(
     Units at one bus hold its voltage together; they share its reactive power, and at the slack
     bus what is left of the active power, in proportion to their ratings.
 
+    Parameters
+    ----------
+    buses
+        Names of all buses.
+    lines, loads, shunts
+        Elements of the network [pu, 100 MVA; loads in MW and Mvar].
+    units
+        What feeds the network: each with its bus, power and voltage.
+    slack_bus
+        The bus whose units feed what is left; its angle is zero.
+
     Raises
     ------
     InputError

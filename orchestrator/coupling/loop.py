@@ -237,7 +237,21 @@ def make_loop(
     schedule: Schedule,
     hand_over: Callable[[], None] | None = None,
 ) -> Loop:
-    """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
+    """The compiled loop where there is one and it can do what is asked, else the loop in Python.
+
+    Parameters
+    ----------
+    groups
+        Components that step together, in the order of the schedule.
+    y
+        All coupled outputs; the loop writes them.
+    tracks
+        Where each output went; the loop writes them.
+    schedule
+        What is special about its steps decides whether the compiled loop can do them.
+    hand_over
+        As for `PythonLoop`.
+    """
     library = _library() if schedule.is_plain else None
     if library is None:
         return PythonLoop(groups, y, tracks, schedule, hand_over)

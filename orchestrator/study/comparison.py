@@ -87,6 +87,17 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
 def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:
     """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on.
 
+    Parameters
+    ----------
+    a, b
+        Trajectories of the two runs.
+    expression
+        The signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
+    start
+        Oscillations are looked for from this time on [s].
+    labels
+        Names of the two runs for tables and errors.
+
     Raises
     ------
     InputError

@@ -55,6 +55,15 @@ def linear_model(
 
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
+    Parameters
+    ----------
+    prepared
+        The scenario.
+    inputs, outputs
+        Names ``component.variable``.
+    as_continuous
+        A model in continuous time instead of the map over one communication step.
+
     Raises
     ------
     InputError

@@ -137,7 +137,21 @@ def modes_of(
     *,
     directional: bool = False,
 ) -> ModesResult:
-    """Steady state and modes of a running system; see `compute_modes`."""
+    """Steady state and modes of a running system; see `compute_modes`.
+
+    Parameters
+    ----------
+    prepared
+        The scenario that runs.
+    master
+        Its FMUs, initialised; afterwards they stand at the operating point.
+    frequency_range
+        Modes of these frequencies are shown [Hz].
+    critical
+        Damping ratio below which a sparse search looks for modes; None computes the whole spectrum.
+    directional
+        Linearise with the FMUs' own directional derivatives.
+    """
     point = find_operating_point(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
     return modes_from(prepared, master, point, blocks, frequency_range, critical)
@@ -151,7 +165,19 @@ def modes_from(
     frequency_range: tuple[float, float],
     critical: float | None = None,
 ) -> ModesResult:
-    """The modes of components that were linearised at an operating point."""
+    """The modes of components that were linearised at an operating point.
+
+    Parameters
+    ----------
+    prepared, master
+        The scenario, and its FMUs at the operating point.
+    point
+        The operating point.
+    blocks
+        The linearised components.
+    frequency_range, critical
+        As for `modes_of`.
+    """
     model = compose(blocks, master.schedule)
     system = continuous_model(master, blocks)
     low, high = frequency_range

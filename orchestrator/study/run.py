@@ -87,6 +87,17 @@ def run_scenario(
     A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
     A component that fails in the middle ends the run, and so does Ctrl-C; what was recorded until then is in the
     result.
+
+    Parameters
+    ----------
+    prepared
+        The scenario.
+    frequency_range
+        Modes of these frequencies are shown [Hz].
+    observers
+        What else looks on at every step, such as a recorder.
+    linear
+        Compute the linear model's response as well.
     """
     watch = Watch(prepared)
     statistics = None
