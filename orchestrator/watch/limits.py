@@ -15,8 +15,25 @@ from orchestrator.watch.settings import Settings
 LEAST_DURATION = 0.1
 """A limit that acts for less than this in all [s], as in a short dip, does its work and is not told."""
 
-AT_LIMIT = 0.999
-"""A controlled current is at its reference's limit from this part of it on."""
+AT_LIMIT = 1 - 1e-9
+"""From this part of its limit on a signal is at it: what is saturated equals its limit but for the last digits."""
+
+
+@dataclass(frozen=True)
+class Lead:
+    """What is limited is the signal + T/gain·(d state/dt), where a block's state or a control's integrator shows it.
+
+    Attributes
+    ----------
+    state
+        Whose derivative is read.
+    time, gain
+        Parameters with T [s] and the gain; 1 where there is none.
+    """
+
+    state: str
+    time: str
+    gain: str | None = None
 
 
 @dataclass(frozen=True)
@@ -32,12 +49,9 @@ class Limit:
     limit
         Parameter with the limit of its magnitude; None where the signal is in parts of the limit.
     lead
-        Time constant T where the limited signal is signal + T·(d signal/dt): the output of a lead-lag block, of which
-        the signal is the state.
+        How a derivative shows what is limited, where the signal only follows it.
     enabled
         Switch without which the limited signal goes nowhere.
-    share
-        The limit acts where the signal is at least this part of it.
     represented
         Whether the model has the limit; else it only tells when the limit would act.
     """
@@ -45,29 +59,37 @@ class Limit:
     name: str
     signal: str
     limit: str | None
-    lead: str | None = None
+    lead: Lead | None = None
     enabled: str | None = None
-    share: float = 1.0
     represented: bool = True
 
     def variables(self) -> tuple[str, ...]:
         """Signals to be read."""
-        return (self.signal,) if self.lead is None else (self.signal, f"der({self.signal})")
+        return (self.signal,) if self.lead is None else (self.signal, f"der({self.lead.state})")
 
     def needed(self) -> tuple[str, ...]:
         """All variables that an FMU must have."""
-        parameters = (self.limit, self.lead, self.enabled)
+        lead = (self.lead.time, self.lead.gain) if self.lead is not None else ()
+        parameters = (self.limit, self.enabled, *lead)
         return (*self.variables(), *(p for p in parameters if p is not None))
 
 
+def _current_limit(what: str, axis: str) -> Limit:
+    """The reference is the current and what the integrator of the current control, R/τ·(reference - current), adds."""
+    lead = Lead(f"current_control.x_{axis}", "current_control.tau", "filter.R_c")
+    return Limit(f"limit of the {what} current reference (i_{axis})", f"filter.i_s_{axis}",
+                 f"voltage_control.i_{axis}_max", lead)  # fmt: skip
+
+
 LIMITS = (
-    Limit("limit of the active current reference (i_q)", "filter.i_s_q", "voltage_control.i_q_max", share=AT_LIMIT),
-    Limit("limit of the reactive current reference (i_d)", "filter.i_s_d", "voltage_control.i_d_max", share=AT_LIMIT),
+    _current_limit("active", "q"),
+    _current_limit("reactive", "d"),
     Limit("current limit (which the phasor model lacks)", "current_limit", None, represented=False),
     Limit("output limit of POD-P", "delta_p_pod", "pod_p.limit", enabled="pod_p.enabled"),
     Limit("output limit of POD-Q", "delta_q_pod", "pod_q.limit", enabled="pod_q.enabled"),
-    Limit("output limit of the stabiliser", "pss.lead_lag_2", "pss.limit", lead="pss.T_3", enabled="pss.enabled"),
-)
+    Limit("output limit of the stabiliser", "pss.lead_lag_2", "pss.limit", Lead("pss.lead_lag_2", "pss.T_3"),
+          "pss.enabled"),
+)  # fmt: skip
 """Limits of the catalogue's models; an FMU of others with the same variables is watched as well."""
 
 
@@ -97,9 +119,13 @@ def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Fi
 def _acting(seen: Seen, name: str, limit: Limit, settings: Settings) -> NDArray[np.bool_]:
     signal = seen.values[f"{name}.{limit.signal}"]
     if limit.lead is not None:
-        signal = signal + settings.values(name, limit.lead) * seen.values[f"{name}.der({limit.signal})"]
+        factor = settings.values(name, limit.lead.time)
+        if limit.lead.gain is not None:
+            gain = settings.values(name, limit.lead.gain)
+            factor = np.divide(factor, gain, out=np.zeros_like(factor), where=gain != 0)
+        signal = signal + factor * seen.values[f"{name}.der({limit.lead.state})"]
     bound = settings.values(name, limit.limit) if limit.limit is not None else np.ones(len(seen.times))
-    acting: NDArray[np.bool_] = (np.abs(signal) >= limit.share * bound) & (bound > 0)
+    acting: NDArray[np.bool_] = (np.abs(signal) >= AT_LIMIT * bound) & (bound > 0)
     return acting & (settings.values(name, limit.enabled) > 0) if limit.enabled is not None else acting
 
 

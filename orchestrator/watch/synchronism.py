@@ -1,6 +1,7 @@
 """Loss of synchronism: a unit's angle runs away from the others'."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ _SPEED = "omega"
 
 _OUT_OF_STEP = np.pi
 _NAMED = 4
-"""How many of the others are named."""
+"""How many units of a group are named."""
 
 
 def angle_signals(system: System) -> list[str]:
@@ -36,10 +37,11 @@ def _angle_variable(system: System, name: str) -> str | None:
 
 
 def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
-    """Units that are left by the others' angles by more than half a turn, each told once.
+    """Groups of units that are left by the others' angles by more than half a turn; each pair of groups is told once.
 
     The units on the grid are sorted by angle. Where two neighbours are more than half a turn apart, the system has
-    fallen into two groups: the one with less rating is out of step with the other.
+    fallen apart there. Units that this never parts are a group. Of two groups the one with less rating is the one that
+    lost the other.
     """
     names = [name for name in system.components if _angle_variable(system, name) is not None]
     if len(names) < 2:
@@ -47,25 +49,86 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
     on = np.array([settings.connected(name) > 0 for name in names])
     angles = np.array([_angle(seen, system, settings, name) for name in names])
     _forget_turns_off_the_grid(angles, on)
-    rating = {name: _rating(system, settings, name) for name in names}
-    told: set[str] = set()
-    for row in np.flatnonzero(_largest_gap(angles, on) > _OUT_OF_STEP):
-        order = [k for k in np.argsort(angles[:, row]) if on[k, row]]
-        cut = int(np.argmax(np.diff(angles[order, row]))) + 1
-        sides = [names[k] for k in order[:cut]], [names[k] for k in order[cut:]]
-        lost, kept = sorted(sides, key=lambda side: (sum(rating[n] for n in side), len(side)))
-        for name in lost:
-            if name not in told:
-                relative = angles[names.index(name)] - np.mean([angles[names.index(n)] for n in kept], axis=0)
-                yield _finding(seen.times, _angle_variable(system, name) or "", name, kept, relative, int(row))
-        told |= {*lost, *kept}
+    sides = _sides(angles, on)
+    rating = [_rating(system, settings, name) for name in names]
+    groups = sorted(_groups(sides), key=lambda group: (sum(rating[k] for k in group), len(group)))
+    means = [_mean(angles[group], on[group]) for group in groups]
+    for number, group in enumerate(groups[:-1]):
+        apart = [
+            pair
+            for other, mean in zip(groups[number + 1 :], means[number + 1 :], strict=True)
+            if (pair := _pair(sides, group, other, means[number] - mean)) is not None
+        ]
+        if apart:
+            variable = _angle_variable(system, names[group[0]]) or ""
+            yield _finding(seen.times, variable, [names[k] for k in group], apart, names)
 
 
-def _largest_gap(angles: Numbers, on: NDArray[np.bool_]) -> Numbers:
-    """Between neighbours among the angles of the units on the grid [rad], shape (n,)."""
-    gaps = np.diff(np.sort(np.where(on, angles, np.nan), axis=0), axis=0)  # those off the grid come last
-    largest: Numbers = np.where(np.isfinite(gaps), gaps, 0.0).max(axis=0)
-    return largest
+@dataclass(frozen=True)
+class _Pair:
+    """A group that another one lost: its units, the first row apart, and the angle between both [rad]."""
+
+    other: Sequence[int]
+    row: int
+    relative: Numbers
+    lasts: bool
+
+    @property
+    def turns(self) -> float:
+        """From the start to the last look at which both were on the grid."""
+        return abs(float(self.relative[-1] - self.relative[0])) / (2 * np.pi)
+
+    @property
+    def slips(self) -> bool:
+        """Whether they still slip when the run ends."""
+        return self.lasts and slips_at_the_end(self.relative)
+
+
+def _sides(angles: Numbers, on: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """The part of the system in which a unit is, counted by angle, and -1 off the grid; shape (units, n)."""
+    order = np.argsort(np.where(on, angles, np.inf), axis=0)
+    in_order = np.take_along_axis(angles, order, axis=0)
+    part = np.zeros(angles.shape, dtype=np.int_)
+    part[1:] = np.cumsum(np.diff(in_order, axis=0) > _OUT_OF_STEP, axis=0)
+    sides = np.empty_like(part)
+    np.put_along_axis(sides, order, part, axis=0)
+    sides[~on] = -1
+    return sides
+
+
+def _groups(sides: NDArray[np.int_]) -> list[list[int]]:
+    """Units that are on the same side whenever they are on the grid."""
+    groups: list[list[int]] = []
+    for unit, side in enumerate(sides):
+        for group in groups:
+            if all(_row_apart(side, sides[k]) is None for k in group):
+                group.append(unit)
+                break
+        else:
+            groups.append([unit])
+    return groups
+
+
+def _row_apart(one: NDArray[np.int_], other: NDArray[np.int_]) -> int | None:
+    """The first row at which two units on the grid are on different sides."""
+    rows = np.flatnonzero((one != other) & (one >= 0) & (other >= 0))
+    return int(rows[0]) if len(rows) else None
+
+
+def _mean(angles: Numbers, on: NDArray[np.bool_]) -> Numbers:
+    """Of the units on the grid [rad], shape (n,); not a number where there are none."""
+    count = on.sum(axis=0)
+    total = np.where(on, angles, 0.0).sum(axis=0)
+    mean: Numbers = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+    return mean
+
+
+def _pair(sides: NDArray[np.int_], group: Sequence[int], other: Sequence[int], relative: Numbers) -> _Pair | None:
+    rows = [row for a in group for b in other if (row := _row_apart(sides[a], sides[b])) is not None]
+    if not rows:
+        return None
+    both = np.isfinite(relative)
+    return _Pair(other, min(rows), relative[both], bool(both[-1]))
 
 
 def _angle(seen: Seen, system: System, settings: Settings, name: str) -> Numbers:
@@ -98,16 +161,33 @@ def _start(system: System, settings: Settings, name: str, parameter: str, defaul
     return float(settings.values(name, parameter)[0]) if known else default
 
 
-def _finding(times: Numbers, variable: str, name: str, kept: Sequence[str], relative: Numbers, row: int) -> Finding:
-    time, turns = float(times[row]), abs(float(relative[-1] - relative[0])) / (2 * np.pi)
-    still = slips_at_the_end(relative)
-    others = ", ".join(kept[:_NAMED]) + (f" and {len(kept) - _NAMED} more" if len(kept) > _NAMED else "")
-    message = (
-        f"{name} loses synchronism with {others}: from t = {time:.4g} s its angle is more than 180 degrees from "
-        f"theirs; at the end it has moved by {turns:.2f} turns against them and {'still slips' if still else 'holds'}"
+def _finding(
+    times: Numbers, variable: str, group: Sequence[str], apart: Sequence[_Pair], names: Sequence[str]
+) -> Finding:
+    pairs = sorted(apart, key=lambda pair: pair.row)
+    time = float(times[pairs[0].row])
+    others = [[names[k] for k in pair.other] for pair in pairs]
+    verb, whose = ("loses", "its angle is") if len(group) == 1 else ("lose", "their angle is")
+    moved = "; ".join(
+        f"{pair.turns:.2f} turns against {_listed(other)}, and {'still slips' if pair.slips else 'holds'}"
+        + ("" if pair.lasts else " when one of both leaves the grid")
+        + (f" (apart from t = {times[pair.row]:.4g} s on)" if pair is not pairs[0] else "")
+        for pair, other in zip(pairs, others, strict=True)
     )
-    figures = {"turns": turns, "slips_at_the_end": float(still)}
-    return Finding("loss_of_synchronism", time, name, variable, message, None, figures)
+    message = (
+        f"{_listed(group)} {verb} synchronism with {_listed([name for other in others for name in other])}: from "
+        f"t = {time:.4g} s {whose} more than 180 degrees from theirs; at the end it has moved by {moved}"
+    )
+    figures = {
+        "turns": max(pair.turns for pair in pairs),
+        "slips_at_the_end": float(any(pair.slips for pair in pairs)),
+        **({f"turns_against_{o[0]}": pair.turns for pair, o in zip(pairs, others, strict=True)} if pairs[1:] else {}),
+    }
+    return Finding("loss_of_synchronism", time, group[0], variable, message, None, figures)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if len(names) > _NAMED else "")
 
 
 def slips_at_the_end(relative: Numbers) -> bool:

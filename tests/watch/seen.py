@@ -1,8 +1,13 @@
 """Runs made by hand: signals by formula, as the watch would see them."""
 
+from functools import cache
+
 import numpy as np
 
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.python_fmu import cached
 from orchestrator.coupling.system import System
+from orchestrator.fmi.description import read_description
 from orchestrator.watch.seen import Seen
 from tests.coupling.small_fmus import small_fmu
 
@@ -33,3 +38,23 @@ def seen_of(signals, stop):
         parts["high"][name] = np.concatenate([[y[0]], np.maximum(inner.max(axis=1), y[:-1:every])])
         parts["turns"][name] = np.concatenate([[0.0], turned[1:].reshape(-1, every).sum(axis=1)])
     return Seen(times[::every], dict(parts["last"]), parts["last"], parts["low"], parts["high"], parts["turns"])
+
+
+@cache
+def unit_fmu():
+    """A unit with a breaker: its speed, its angle and its voltage are what a test says."""
+    m = ModelBuilder("small_unit", "A unit")
+    m.parameter("S_n", 100.0, "MVA", "Rated power")
+    on = m.switch("connected", True, "Breaker", tunable=True)
+    u = m.input("u", "1", "Input")
+    for name, what in (("omega", "pu"), ("delta", "rad"), ("v_re", "pu"), ("v_im", "pu")):
+        m.output(name, u * on, what, name, base="S_n")
+    return read_description(cached(m.build()))
+
+
+def units(**ratings):
+    """Units on the grid, with their ratings [MVA]."""
+    made = System()
+    for name, rating in ratings.items():
+        made.add(name, unit_fmu(), {"S_n": rating})
+    return made

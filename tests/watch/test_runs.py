@@ -127,6 +127,14 @@ def test_limits_and_lost_synchronism_are_said_once_in_terminal_summary_and_repor
     assert "What the runs did wrong" in page
 
 
+@pytest.mark.parametrize("limit", [0.5984, 0.6])
+def test_a_limit_that_is_only_near_does_not_act(tmp_path, limit):
+    """The converter rests at 0.59825 pu."""
+    file = tmp_path / "case.toml"
+    file.write_text(DEEP, encoding="utf-8")
+    assert findings(file, "deep", 0.3, gfor__voltage_control__i_q_max=limit) == []
+
+
 def test_a_run_without_findings_says_so_in_its_report(gfor, tmp_path):
     code, _, said = gfor("run", "two_area_rms", "--scenario", "gfor", "--out", tmp_path)
     assert (code, said) == (0, "")

@@ -1,0 +1,65 @@
+"""Who loses synchronism with whom, by how many turns, and who does not."""
+
+import numpy as np
+import pytest
+
+from orchestrator.coupling.events import ParameterChange
+from orchestrator.watch.settings import Settings
+from orchestrator.watch.synchronism import lost_synchronism
+from tests.watch.seen import seen_of, units
+
+TURN = 2 * np.pi
+STOP = 10.0
+
+
+def slip(turns, since=2.0, until=STOP, start=0.0):
+    """So many turns from ``since`` to ``until`` [s]."""
+    return lambda t: start + TURN * turns * np.clip((t - since) / (until - since), 0.0, 1.0)
+
+
+def found(ratings, events=(), **angles):
+    system = units(**ratings)
+    seen = seen_of({f"{name}.delta": angle for name, angle in angles.items()}, STOP)
+    return list(lost_synchronism(seen, system, Settings(system, events, seen.times)))
+
+
+def test_three_units_that_part_are_told_pair_by_pair_with_their_own_turns():
+    """Their mean belongs to none of them: 36.46 turns where g1 moved by 5.97 and 66.95."""
+    gfor, g1 = found(
+        {"g1": 400, "gfor": 150, "g2": 600}, g1=slip(66.95, until=8), gfor=slip(60.98, until=8), g2=slip(0.0)
+    )
+    assert gfor.component == "gfor"
+    assert gfor.figures["turns_against_g1"] == pytest.approx(5.97)
+    assert gfor.figures["turns_against_g2"] == pytest.approx(60.98)
+    assert "5.97 turns against g1, and holds" in gfor.message
+    assert "60.98 turns against g2, and holds" in gfor.message
+    assert (g1.component, g1.figures["turns"]) == ("g1", pytest.approx(66.95))
+    assert "g1 loses synchronism with g2" in g1.message
+    assert "gfor" not in g1.message
+
+
+def test_units_that_stay_together_are_one_group_and_are_told_once():
+    (finding,) = found({"a": 100, "b": 100, "c": 900}, a=slip(6.0), b=slip(6.0, start=2.5), c=slip(0.0))
+    assert finding.message.startswith("a, b lose synchronism with c: from t = ")
+    assert finding.figures == {"turns": pytest.approx(6.0), "slips_at_the_end": 1.0}
+
+
+def test_the_time_is_that_of_the_first_half_turn():
+    (finding,) = found({"a": 100, "b": 900}, a=slip(2.0, since=2, until=6), b=slip(0.0))
+    assert finding.time == pytest.approx(3.0, abs=0.006)
+    assert finding.message.endswith("2.00 turns against b, and holds")
+
+
+def test_a_chain_of_neighbours_holds_together():
+    """The ends are 300 degrees apart, and no neighbours more than 150."""
+    assert found({"a": 1, "b": 1, "c": 1}, a=slip(0), b=slip(5 / 12), c=slip(10 / 12)) == []
+
+
+def test_turns_off_the_grid_count_for_nothing():
+    """It slips one turn until it is tripped at 4 s, and turns freely from then on."""
+    trip = ParameterChange(4.0, "a", "connected", value=False)
+    (finding,) = found({"a": 100, "b": 900}, [trip], a=slip(50.0, since=3.84), b=slip(0.0))
+    assert finding.figures["turns"] == pytest.approx(50 * 0.16 / 6.16, abs=0.05)
+    assert finding.figures["slips_at_the_end"] == 0.0
+    assert "when one of both leaves the grid" in finding.message
+    assert found({"a": 100, "b": 900}, [trip], a=slip(50.0, since=4.1), b=slip(0.0)) == []
