@@ -1,6 +1,7 @@
 """The strongest oscillation in a stretch of a signal: frequency, growth rate and amplitude."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,8 +19,11 @@ _PER_PERIOD = 5
 """Samples that a period must have to be seen in samples."""
 
 
-_MOST_SAMPLES = 1200
+_MOST_SAMPLES = 600
 """A long stretch of a fast oscillation is judged by so many samples at its end."""
+
+_ENOUGH_SAMPLES, _BEYOND = 300, 3
+"""A slow one is thinned to so many samples, but for frequencies up to so many times that at which it passes its trend."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +42,12 @@ def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float 
     crossing = crossings_hz(times, signal)
     enough = round(_MOST_SAMPLES / (_PER_PERIOD * max(crossing, _HIGHEST_HZ / 2) * float(times[1] - times[0])))
     times, signal = times[-enough:], signal[-enough:]
+    length = float(times[-1] - times[0])
+    highest = max(min(_HIGHEST_HZ, max(_ENOUGH_SAMPLES / (10 * length), _BEYOND * crossing)), 1.2 * crossing)
     try:
-        found = identify_modes(times, signal - signal.mean(), highest_hz=max(_HIGHEST_HZ, 1.2 * crossing))
+        found = identify_modes(times, signal - signal.mean(), highest_hz=highest)
     except AnalysisError:
         return None
-    length = float(times[-1] - times[0])
     all_modes = (  # an oscillation is a pair of exponentials
         Oscillation(m.frequency_hz, m.eigenvalue.real, 2 * m.amplitude * float(np.exp(m.eigenvalue.real * length)))
         for m in found
@@ -65,6 +70,13 @@ def too_fast(times: Numbers, signal: Numbers) -> bool:
 
 def without_trend(signal: Numbers) -> Numbers:
     """What a cubic leaves over, along the first axis."""
-    basis = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(signal)), 3)
-    rest: Numbers = signal - basis @ np.linalg.lstsq(basis, signal, rcond=None)[0]
+    basis = _cubics(len(signal))
+    rest: Numbers = signal - basis @ (basis.T @ signal)
     return rest
+
+
+@lru_cache(maxsize=64)
+def _cubics(count: int) -> Numbers:
+    """Orthonormal columns that span the cubics."""
+    basis: Numbers = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, count), 3))[0]
+    return basis
