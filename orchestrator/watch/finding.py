@@ -4,11 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "undisturbed_motion", "active_limit",
-               "loss_of_synchronism", "not_finite", "failure"]  # fmt: skip
+Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_away", "undisturbed_motion",
+               "active_limit", "loss_of_synchronism", "not_finite", "failure"]  # fmt: skip
 
 UNSTABLE: frozenset[Kind] = frozenset(
-    {"growth", "growing_oscillation", "sustained_oscillation", "loss_of_synchronism", "not_finite", "failure"}
+    {
+        "growth",
+        "growing_oscillation",
+        "sustained_oscillation",
+        "run_away",
+        "loss_of_synchronism",
+        "not_finite",
+        "failure",
+    }
 )
 """Kinds of finding that no stable system gives."""
 
@@ -28,7 +36,7 @@ class Finding:
     until
         When it was over [s]; None where it lasts to the end, or has no duration.
     figures
-        By name with the unit in it: growth rates, frequencies, amplitudes, durations.
+        By name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations.
     """
 
     kind: Kind

@@ -23,7 +23,7 @@ _MOST_SAMPLES = 600
 """A long stretch of a fast oscillation is judged by so many samples at its end."""
 
 _ENOUGH_SAMPLES, _BEYOND = 300, 3
-"""A slow one is thinned to so many samples, but for frequencies up to so many times that at which it passes its trend."""
+"""A slow one is thinned to so many samples, but for frequencies up to so many times its own."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
-"""The response at its end: an oscillation that grows, or one that neither grows nor decays, as a limit cycle does."""
+"""The response after an event: an oscillation that grows, or one that neither grows nor decays."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
@@ -18,9 +19,10 @@ from orchestrator.watch.oscillation import (
     without_trend,
 )
 from orchestrator.watch.seen import Seen, is_derivative, unit
+from orchestrator.watch.stretches import Stretch
 
 FEWEST_LOOKS = 60
-"""In the stretch that is looked at: the last three quarters of the time since the last event."""
+"""In what is looked at: the last three quarters of the time from one event to the next, or to the end."""
 
 KEPT = 0.7
 """What has lost more than this leaves of its swing, from the middle to the last third of the stretch, is decaying."""
@@ -58,6 +60,9 @@ _TURNS, _FEWEST_GROUPS = 6, 12
 _TRIED = 8
 """Signals in which oscillations are looked for: those that swing most at the end."""
 
+ONE = 0.3
+"""An oscillation goes on over events if it leaves less than this of the swing between any two of them unexplained."""
+
 _PARTS, _SHORT = 40, 0.1
 """At most so many pieces of at least this length [s], of which the first is looked for with an oscillation in full."""
 
@@ -73,9 +78,9 @@ class Swing:
     scale
         1 or the start's magnitude [the signal's unit].
     response
-        Times [s] since the last event, and the signal at them.
+        Times [s] since the event, and the signal at them.
     times, signal
-        The same in the stretch.
+        The same in the last three quarters.
     turns_hz
         Half of how often the signal turns [Hz], step by step; only for what was followed between the looks.
     """
@@ -88,59 +93,51 @@ class Swing:
     signal: Numbers
     turns_hz: float | None = None
 
-    @property
-    def after(self) -> float:
-        """Time of the last event [s]."""
-        return float(self.response[0][0])
 
-
-def unsettled_response(seen: Seen, system: System, after: float, units: Sequence[str]) -> Iterator[Finding]:
-    """At most one growing and one sustained oscillation after the last event, where they are strongest.
+def unsettled_response(seen: Seen, system: System, stretch: Stretch, units: Sequence[str]) -> list[Finding]:
+    """At most one growing and one sustained oscillation in a stretch, where they are strongest.
 
     Where one is faster than the looks, only such are told: in the looks it would pass for a slower one.
+    In a stretch with events that nobody notices only what goes on over all of them is told.
 
     Parameters
     ----------
-    after
-        Time of the last event, or the start [s].
     units
         Components that feed the grid: they are named rather than the grid where both swing.
     """
-    first = int(np.searchsorted(seen.times, after))
-    begin = after + (float(seen.times[-1]) - after) / 4
+    seen = seen.until(stretch.end)
+    first = int(np.searchsorted(seen.times, stretch.begin))
+    begin = stretch.begin + (stretch.end - stretch.begin) / 4
     if (seen.times >= begin).sum() < FEWEST_LOOKS:
-        return
+        return []
     times = seen.times[first:]
-    slow = (_swing(name, y[first:], times, begin) for name, y in _signals(seen, system).items())
+    slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
     swings = [swing for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
     # What is faster than the looks shows in the signals as something slower, so it goes first.
     quick = [s for s in swings if s.turns_hz is not None]
     others = [s for s in swings if s.turns_hz is None and not (quick and too_fast(s.times, s.signal))]
-    for group in (quick, others):
-        told = _told(group[:_TRIED], system, irregular_as_well=not quick)
-        if told:
-            yield from told
-            return
+    told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
+    return told or _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
 
 
-def _told(swings: Sequence[Swing], system: System, *, irregular_as_well: bool) -> list[Finding]:
+def _told(swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one."""
     told: dict[Kind, Finding] = {}
     irregular = []
     for swing in swings:
         oscillation = _fast(swing) if swing.turns_hz is not None else _single(swing)
         if oscillation is not None:
-            finding = _regular(swing, oscillation, unit(swing.name, system))
-            if finding is not None:
-                told.setdefault(finding.kind, finding)
+            finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
+            if finding is not None and finding.kind not in told and _goes_on(swing, oscillation, stretch.breaks):
+                told[finding.kind] = finding
         elif irregular_as_well and _is_irregular(swing):
-            irregular.append(_irregular(swing, unit(swing.name, system)))
+            irregular.append(_irregular(swing, unit(swing.name, system), stretch))
     return [*told.values()] or irregular[:1]
 
 
-def _signals(seen: Seen, system: System) -> dict[str, Numbers]:
+def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
     """Signals that rest in a steady state at any frequency: no angles, magnitudes of real and imaginary parts."""
     everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
     found = {}
@@ -170,6 +167,35 @@ def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | 
 
 def _rms(signal: Numbers) -> float:
     return float(np.sqrt(np.mean(without_trend(signal) ** 2)))
+
+
+def _goes_on(swing: Swing, oscillation: Oscillation, breaks: Sequence[float]) -> bool:
+    """Whether one oscillation, with one phase, makes the swing before and after each of these times."""
+    if not breaks:
+        return True
+    since = swing.times - swing.times[-1]
+    shortest = 1 / oscillation.frequency_hz if swing.turns_hz is None else 0.0
+    pieces = _pieces(swing.times, breaks, shortest)
+    if swing.turns_hz is not None:
+        rest = np.log(swing.signal) - oscillation.rate * since
+        middles = [float(np.median(rest[rows])) for rows in pieces]
+        return max(middles) - min(middles) < ONE
+    turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
+    shapes = [without_trend(np.column_stack([turn[rows].real, turn[rows].imag])) for rows in pieces]
+    swings = [without_trend(swing.signal[rows]) for rows in pieces]
+    share = np.linalg.lstsq(np.concatenate(shapes), np.concatenate(swings), rcond=None)[0]
+    return all(np.linalg.norm(y - shape @ share) < ONE * np.linalg.norm(y)
+               for shape, y in zip(shapes, swings, strict=True))  # fmt: skip
+
+
+def _pieces(times: Numbers, breaks: Sequence[float], shortest: float) -> list[NDArray[np.int_]]:
+    """Rows between the breaks, in pieces of at least so long [s]."""
+    kept = [float(times[0])]
+    for time in breaks:
+        if time - kept[-1] >= shortest and times[-1] - time >= shortest:
+            kept.append(time)
+    pieces = np.split(np.arange(len(times)), np.searchsorted(times, kept[1:], side="right"))
+    return [rows for rows in pieces if len(rows)]
 
 
 def _since(swing: Swing, frequency: float | None) -> float:
@@ -211,12 +237,12 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     return Swing(name, size, scale, (times, ripple), times[stretch], ripple[stretch], hz)
 
 
-def _regular(swing: Swing, oscillation: Oscillation, unit: str) -> Finding | None:
+def _regular(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding | None:
     """A finding, unless the oscillation decays."""
     change = oscillation.rate * float(swing.times[-1] - swing.times[0])
     if change < -STEADY:
         return None
-    return _growing(swing, oscillation, unit) if change > STEADY else _sustained(swing, oscillation, unit)
+    return (_growing if change > STEADY else _sustained)(swing, oscillation, unit, stretch)
 
 
 def _is_irregular(swing: Swing) -> bool:
@@ -250,42 +276,53 @@ def _fast(swing: Swing) -> Oscillation | None:
     return Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)
 
 
-def _growing(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
+def _growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
     message = (
-        f"the response grows from t = {swing.after:.4g} s on: {_shown(swing.name)} swings at "
-        f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at the end its amplitude is "
-        f"{oscillation.amplitude:.3g} {unit}"
+        f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
+        f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
+        f"is {oscillation.amplitude:.3g} {unit}"
     )
-    return _finding("growing_oscillation", swing.after, swing, message, oscillation)
+    return _finding("growing_oscillation", stretch.begin, swing, message, oscillation, stretch)
 
 
-def _sustained(swing: Swing, oscillation: Oscillation, unit: str) -> Finding:
+def _sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
     since = _since(swing, oscillation.frequency_hz)
     message = (
-        f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to the end "
+        f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
         f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
         f"{oscillation.amplitude:.3g} {unit}"
     )
-    return _finding("sustained_oscillation", since, swing, message, oscillation)
+    return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
 
 
-def _irregular(swing: Swing, unit: str) -> Finding:
+def _irregular(swing: Swing, unit: str, stretch: Stretch) -> Finding:
     amplitude, since = float(np.sqrt(2)) * swing.size * swing.scale, _since(swing, None)
     fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
     message = (
-        f"the response does not settle: from t = {since:.4g} s to the end {_shown(swing.name)} swings by about "
+        f"the response does not settle: from t = {since:.4g} s to {_end(stretch)} {_shown(swing.name)} swings by about "
         f"{amplitude:.3g} {unit}, at no single frequency{fast}"
     )
-    return Finding("sustained_oscillation", since, *_place(swing.name), message, None, {"amplitude": amplitude})
+    figures = {"amplitude": amplitude}
+    return Finding("sustained_oscillation", since, *_place(swing.name), message, _until(stretch), figures)
 
 
-def _finding(kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation) -> Finding:
+def _finding(
+    kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation, stretch: Stretch
+) -> Finding:
     figures = {
         "growth_rate": oscillation.rate,
         "frequency_hz": oscillation.frequency_hz,
         "amplitude": oscillation.amplitude,
     }
-    return Finding(kind, time, *_place(swing.name), message, None, figures)
+    return Finding(kind, time, *_place(swing.name), message, _until(stretch), figures)
+
+
+def _end(stretch: Stretch) -> str:
+    return "the end" if stretch.last else f"the next event at t = {stretch.end:.4g} s"
+
+
+def _until(stretch: Stretch) -> float | None:
+    return None if stretch.last else stretch.end
 
 
 def _place(name: str) -> tuple[str, str]:

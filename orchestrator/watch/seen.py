@@ -39,6 +39,14 @@ class Seen:
     high: Mapping[str, Numbers]
     turns: Mapping[str, Numbers]
 
+    def until(self, time: float) -> "Seen":
+        """The same up to a time [s]."""
+        count = int(np.searchsorted(self.times, time * (1 + 1e-12), side="right"))
+        if count == len(self.times):
+            return self
+        parts = (self.values, self.last, self.low, self.high, self.turns)
+        return Seen(self.times[:count], *({name: y[:count] for name, y in part.items()} for part in parts))
+
     @property
     def interval(self) -> float:
         """Between two looks [s]."""

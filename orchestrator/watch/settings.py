@@ -30,6 +30,20 @@ class Settings:
                 held[self._times > time] = value  # what is seen at an event's time is from before it
         return held
 
+    def effective_times(self) -> list[float]:
+        """When an event sets anything to another value than it has [s]."""
+        now: dict[str, float | None] = {}
+        found = set()
+        for time, name, value in self._changes:
+            if name not in now:
+                component, _, variable = name.partition(".")
+                plan = self._system.components[component]
+                now[name] = None if plan.value(variable) is None else plan.number(variable)
+            if value != now[name]:
+                found.add(time)
+            now[name] = value
+        return sorted(found)
+
     def connected(self, component: str) -> Numbers:
         """Whether a component is on the grid: its own breaker, and the grid's port for it; 1 or 0, shape (n,)."""
         held = np.ones(len(self._times))

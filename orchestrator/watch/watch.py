@@ -1,18 +1,23 @@
 """All that is watched, put together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.events import Event
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
-from orchestrator.watch.finding import Finding
+from orchestrator.watch.finding import Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
-from orchestrator.watch.response import unsettled_response
+from orchestrator.watch.response import resting_signals, unsettled_response
+from orchestrator.watch.run_away import run_away, speed_signals
 from orchestrator.watch.seen import Seen, Watcher, look_every
 from orchestrator.watch.settings import Settings
+from orchestrator.watch.stretches import Stretch, stretches
 from orchestrator.watch.synchronism import angle_signals, lost_synchronism
 from orchestrator.watch.undisturbed import undisturbed_motion
 
@@ -35,7 +40,9 @@ class Watch:
         self._prepared = prepared
         self.recorder = Recorder(prepared.record, prepared.record_every)
         every = look_every(prepared.step_size, prepared.record_every, prepared.stop_time)
-        needed = dict.fromkeys([*limit_signals(prepared.system), *angle_signals(prepared.system)])
+        needed = dict.fromkeys(
+            [*limit_signals(prepared.system), *angle_signals(prepared.system), *speed_signals(prepared.system)]
+        )
         at_each_look = set(prepared.record) if every % prepared.record_every == 0 else set()
         self._watcher = Watcher([name for name in needed if name not in at_each_look], every)
         self.observers = (self.recorder, self._watcher)
@@ -43,24 +50,54 @@ class Watch:
     def findings(self, failure: CosimError | None = None) -> list[Finding]:
         """What was wrong, in the order of its beginning; after the run, also after one that failed."""
         seen = self._watcher.seen(self.recorder)
-        found = chain(_failure(failure), _not_finite(seen), self._judged(seen) if len(seen.times) > 1 else ())
+        told = judged(seen, self._prepared.system, self._prepared.events) if len(seen.times) > 1 else ()
+        found = chain(_failure(failure), _not_finite(seen), told)
         return sorted(found, key=lambda finding: finding.time)
 
-    def _judged(self, seen: Seen) -> list[Finding]:
-        system, events = self._prepared.system, self._prepared.events
-        settings = Settings(system, events, seen.times)
-        end = float(seen.times[-1])
-        happened = sorted(event.time for event in events if event.time < end)
-        units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
-        lost = list(lost_synchronism(seen, system, settings))
-        found = [
-            *undisturbed_motion(seen, system, happened[0] if happened else end),
-            *active_limits(seen, system, settings),
-            *lost,
-        ]
-        if any(finding.figures["slips_at_the_end"] for finding in lost):
-            return found  # everything swings with the slip
-        return [*found, *unsettled_response(seen, system, happened[-1] if happened else 0.0, units)]
+
+def judged(seen: Seen, system: System, events: Sequence[Event]) -> list[Finding]:
+    """All that the signals show."""
+    settings = Settings(system, events, seen.times)
+    end = float(seen.times[-1])
+    happened = [time for time in settings.effective_times() if time < end]
+    undisturbed = list(undisturbed_motion(seen, system, happened[0] if happened else end))
+    lost = list(lost_synchronism(seen, system, settings))
+    parts = stretches(seen, resting_signals(seen, system), happened or [0.0])
+    if happened and happened[0] > 0:
+        parts.insert(0, Stretch(0.0, happened[0]))
+    found = [
+        *undisturbed,
+        *active_limits(seen, system, settings),
+        *lost,
+        *run_away(seen, system, settings, parts, slipped=bool(lost)),
+    ]
+    if any(finding.figures["slips_at_the_end"] for finding in lost):
+        return found  # everything swings with the slip
+    if happened and [finding.kind for finding in undisturbed] != ["undisturbed_motion"]:
+        parts = [part for part in parts if part.begin >= happened[0]]
+    units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
+    return [*found, *_first_of_each(_responses(seen, system, parts, units))]
+
+
+def _responses(seen: Seen, system: System, parts: Sequence[Stretch], units: Sequence[str]) -> Iterator[Finding]:
+    """What is found in each stretch as a whole, or else between its events that nobody notices."""
+    for part in parts:
+        whole = unsettled_response(seen, system, part, units)
+        yield from whole
+        if part.breaks and not whole:
+            for piece in part.parts():
+                yield from unsettled_response(seen, system, piece, units)
+
+
+def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
+    """The first finding of each kind, which says that there are others."""
+    by_kind: dict[Kind, list[Finding]] = {}
+    for finding in found:
+        by_kind.setdefault(finding.kind, []).append(finding)
+    return [
+        replace(first, message=f"{first.message}; the same again from t = {again[0].time:.4g} s") if again else first
+        for first, *again in by_kind.values()
+    ]
 
 
 def _failure(error: CosimError | None) -> Sequence[Finding]:

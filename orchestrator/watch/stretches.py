@@ -1,0 +1,90 @@
+"""The stretches of a run between its events; those that an event does not part are one."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.watch.seen import Seen
+
+NOTICED = 0.01
+"""An event is noticed if a signal kinks at it by this part of how far it went before, since the last noticed event."""
+
+_KINK_LOOKS = 4
+"""Looks after an event in which its immediate effect is seen."""
+
+_USUAL_LOOKS, _USUAL = 20, 2.0
+"""A kink is more than so many times what the signal does by itself in so many looks before the event."""
+
+_ROUNDING = 1e-12
+"""Of 1 or of the signal."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """From one event, or the start, to the next, or the end [s].
+
+    Attributes
+    ----------
+    breaks
+        Events in between that nobody notices.
+    last
+        Whether it ends with the run.
+    """
+
+    begin: float
+    end: float
+    breaks: tuple[float, ...] = ()
+    last: bool = False
+
+    def parts(self) -> Iterator["Stretch"]:
+        """From event to event, whether they are noticed or not."""
+        edges = (self.begin, *self.breaks, self.end)
+        for begin, end in pairwise(edges):
+            yield Stretch(begin, end, last=self.last and end == self.end)
+
+
+def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]) -> list[Stretch]:
+    """What lies after each noticed event.
+
+    Parameters
+    ----------
+    signals
+        In which an event is noticed; of the looks.
+    times
+        Of the events [s].
+    """
+    if not times:
+        return []
+    found, begin, breaks = [], times[0], list[float]()
+    for time in times[1:]:
+        if _noticed(seen.times, signals, begin, time):
+            found.append(Stretch(begin, time, tuple(breaks)))
+            begin, breaks = time, []
+        else:
+            breaks.append(time)
+    return [*found, Stretch(begin, float(seen.times[-1]), tuple(breaks), last=True)]
+
+
+def _row(times: Numbers, time: float) -> int:
+    """The last look before an event; one at its very time is from before it."""
+    return int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1
+
+
+def _noticed(times: Numbers, signals: Mapping[str, Numbers], begin: float, time: float) -> bool:
+    """Whether an event changes the course of any signal at once."""
+    first, row = _row(times, begin) + 1, _row(times, time)
+    start = max(first, row - _USUAL_LOOKS)
+    for signal in signals.values():
+        bends = np.abs(np.diff(signal[start : row + _KINK_LOOKS + 1], 2))
+        before = row - start - 1  # of the bends are from before the event
+        if len(bends) <= max(before, 0):
+            continue
+        kink = bends[max(before, 0) :].max()
+        usual = bends[:before].max() if before > 0 else 0.0
+        size = np.ptp(signal[first : row + 1]) if row > first else 0.0
+        if kink > _USUAL * usual + NOTICED * size + _ROUNDING * max(1.0, abs(float(signal[row]))):
+            return True
+    return False
