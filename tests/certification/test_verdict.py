@@ -209,7 +209,7 @@ def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swing
 
 @pytest.mark.parametrize(
     ("kind", "fails"),
-    [("loss_of_synchronism", True), ("sustained_oscillation", True), ("growing_oscillation", True),
+    [("loss_of_synchronism", True), ("sustained_oscillation", True), ("growing_oscillation", True), ("run_away", True),
      ("active_limit", False), ("undisturbed_motion", False)],
 )  # fmt: skip
 def test_what_the_watch_saw_of_an_unstable_run_fails_the_point(certified, kind, fails):

@@ -102,6 +102,12 @@ def test_decays_that_events_excite_anew_are_silent():
         assert found(y, events(1.0, 8.0), stop=16.0) == []
 
 
+def test_an_event_that_sets_what_holds_does_not_end_the_undisturbed_state():
+    (finding,) = found(lambda t: 0.7 + 1e-9 * np.exp(9 * np.minimum(t, 1.5)), events(0.1, values=[0.0]), stop=1.5)
+    assert finding.kind == "growth"
+    assert finding.figures["growth_rate"] == pytest.approx(9.0, rel=0.05)
+
+
 def test_a_limit_cycle_from_the_start_is_told_though_an_event_follows():
     def y(t):
         return 0.9 + 0.01 * np.sin(2 * PI * t)

@@ -1,12 +1,14 @@
 """`gfor run` on cases that are well, and on cases with something planted in them: what it says, and where."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
+from orchestrator.coupling.events import LoadChange, UnitSwitching
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.study.modes import running
 from orchestrator.study.run import run_scenario
@@ -84,6 +86,31 @@ def test_the_papers_base_case_grows_after_its_load_step(case, rate):
     assert (finding.kind, finding.component, finding.time) == ("growing_oscillation", "sg1", 1.0)
     assert finding.figures["growth_rate"] == pytest.approx(rate, abs=0.001)
     assert finding.figures["frequency_hz"] == pytest.approx(0.573, abs=0.001)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.02])
+def test_an_event_shortly_before_the_end_hides_no_growth(scale):
+    """The first sets what holds already, the second is noticed."""
+    loaded = load_case("two_area_rms")
+    (ready,) = loaded.prepare(["base"], stop_time=15.0)
+    (first,) = ready.events
+    late = LoadChange(14.8, first.component, first.load, first.scale * scale)
+    (finding,) = run_scenario(loaded, replace(ready, events=[first, late])).findings
+    assert (finding.kind, finding.time) == ("growing_oscillation", 1.0)
+    assert finding.until == (14.8 if scale == 1.02 else None)
+    assert finding.figures["growth_rate"] == pytest.approx(0.033, abs=0.001)
+
+
+def test_speeds_without_governors_run_away():
+    off = {"sg1.governor.enabled": False, "sg2.governor.enabled": False}
+    loaded = load_case("two_area_rms")
+    (ready,) = loaded.prepare(["gfor"], off, stop_time=15.0)
+    trip = UnitSwitching(1.0, ready.events[0].component, "gfor", connected=False)
+    found = run_scenario(loaded, replace(ready, events=[trip])).findings
+    speed = next(finding for finding in found if finding.variable == "omega")
+    assert (speed.kind, speed.time) == ("run_away", 1.0)
+    assert speed.figures["value"] < 0.9
+    assert {finding.kind for finding in found} == {"run_away"}
 
 
 @pytest.mark.slow

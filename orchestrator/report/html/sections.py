@@ -19,6 +19,7 @@ _KINDS = {
     "undisturbed_motion": "the undisturbed state moves",
     "growing_oscillation": "growing oscillation",
     "sustained_oscillation": "sustained oscillation",
+    "run_away": "run-away",
     "active_limit": "active limit",
     "loss_of_synchronism": "loss of synchronism",
     "not_finite": "not a number",
