@@ -95,7 +95,7 @@ def test_an_event_shortly_before_the_end_hides_no_growth(scale):
     (ready,) = loaded.prepare(["base"], stop_time=15.0)
     (first,) = ready.events
     late = LoadChange(14.8, first.component, first.load, first.scale * scale)
-    (finding,) = run_scenario(loaded, replace(ready, events=[first, late])).findings
+    (finding,) = run_scenario(replace(ready, events=[first, late])).findings
     assert (finding.kind, finding.time) == ("growing_oscillation", 1.0)
     assert finding.until == (14.8 if scale == 1.02 else None)
     assert finding.figures["growth_rate"] == pytest.approx(0.033, abs=0.001)
@@ -106,7 +106,7 @@ def test_speeds_without_governors_run_away():
     loaded = load_case("two_area_rms")
     (ready,) = loaded.prepare(["gfor"], off, stop_time=15.0)
     trip = UnitSwitching(1.0, ready.events[0].component, "gfor", connected=False)
-    found = run_scenario(loaded, replace(ready, events=[trip])).findings
+    found = run_scenario(replace(ready, events=[trip])).findings
     speed = next(finding for finding in found if finding.variable == "omega")
     assert (speed.kind, speed.time) == ("run_away", 1.0)
     assert speed.figures["value"] < 0.9
