@@ -92,24 +92,30 @@ def _of_fmu(request: CertificationRequest, description: FmuDescription, content:
     for name, value in origin.items():
         if content["fmu"].get(name) != value:
             yield f"'fmu.{name}' is {content['fmu'].get(name)!r}; {FMU} says {value!r}"
-    stated = DampingControllers(content["pod"], content["pod_source"], content["pod_values"])
-    if stated not in list(_possible(request, description, content["pod"])):
+    if _controllers(request, description, content) is None:
         yield f"'pod', 'pod_source' and 'pod_values' are not what {FMU} and the values come to"
 
 
-def _possible(request: CertificationRequest, description: FmuDescription, pod: str) -> Iterator[DampingControllers]:
-    """What it comes to where ``--pod`` was left away, and where it was given."""
-    for given in (None, pod):
+def _controllers(
+    request: CertificationRequest, description: FmuDescription, content: dict[str, Any]
+) -> DampingControllers | None:
+    """Those that are stated, as they follow with ``--pod`` or without it; None where they follow from neither."""
+    stated = (content["pod"], content["pod_source"], content["pod_values"])
+    for given in (None, content["pod"]):
+        again = CertificationRequest(request.fmu, request.binding, request.values, given)
         try:
-            yield damping_controllers(
-                description, CertificationRequest(request.fmu, request.binding, request.values, given)
-            )
+            found = damping_controllers(description, again)
         except InputError:
             continue  # the switches contradict this one
+        if (found.pod, found.source, found.settings) == stated:
+            return found
+    return None
 
 
 def _of_sentence(request: CertificationRequest, description: FmuDescription, content: dict[str, Any]) -> Iterator[str]:
-    controllers = DampingControllers(content["pod"], content["pod_source"], content["pod_values"])
+    controllers = _controllers(request, description, content)
+    if controllers is None:
+        return  # said already
     verdicts = [
         PointVerdict(p["X_L"], (), None, None, tuple(p["faults"]), unknown=p["unknown"]) for p in content["points"]
     ]

@@ -89,6 +89,17 @@ def test_what_nobody_touched_holds(certificate, gfor):
     assert "no proof of who made it" in text
 
 
+@pytest.mark.parametrize("pod", ["p", "pq", "none"])
+def test_what_is_only_declared_holds_as_well(tmp_path, gallery, gfor, monkeypatch, pod):
+    """The FMU shows no damping controller, so that the sentence says whose word it is."""
+    monkeypatch.setattr(study_module, "compute_point", rings)
+    fmu, binding = gallery("converter_power_si")
+    arguments = ("--binding", binding, "--pod", pod, "--no-check", "--reactances", "0.1", "--workers", 1)
+    assert gfor("certify", fmu, *arguments, "--out", tmp_path)[0] == 3
+    assert "as declared by the applicant" in json.loads((tmp_path / "certificate.json").read_text("utf-8"))["sentence"]
+    assert verified(gfor, tmp_path, "--files-only")[1]["faults"] == []
+
+
 @pytest.mark.parametrize(
     ("name", "change"),
     [
