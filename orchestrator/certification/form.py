@@ -50,7 +50,7 @@ class _Time(_Table):
 
 
 class _Stability(_Table):
-    stable: bool
+    stable: bool | None
     sentence: str
 
 

@@ -11,6 +11,9 @@ EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
 NOT_TRUSTED = 4
 """Exit code where the damping test is passed, and an acceptance test of the FMU failed."""
 
+DOES_NOT_HOLD = 5
+"""Exit code of a certificate whose verdict counts for nothing, as something in it does not agree."""
+
 
 def exit_code(verdict: str, *, refused: bool) -> int:
     """Of a verdict; ``refused`` where an acceptance test failed."""

@@ -3,9 +3,11 @@
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
+from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import (
     TOLERANCE,
     TOLERANCE_IDENTIFIED,
@@ -19,10 +21,16 @@ from orchestrator.certification.verification import (
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console, progress_bar
+from orchestrator.errors import INTERRUPTED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor verify``."""
+    parser.epilog = (
+        f"Exit codes: {DOES_NOT_HOLD} the certificate does not hold; 2 it cannot be read. Where it holds, that of its "
+        "verdict as with gfor certify: 0 the converter passes; 1 it fails; 3 the test is incomplete; 4 it passes, and "
+        f"an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
+    )
     parser.add_argument("certificate", type=Path, metavar="CERTIFICATE", help="its folder, or its certificate.json")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--points", type=reactances, metavar="X,X,…",
@@ -34,7 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Verify and print; 1 if something does not agree."""
+    """Verify and print.
+
+    Returns
+    -------
+    The exit code of the certificate's verdict where it holds, else 5.
+    """
     folder, content = read_certificate(options.certificate)
     console = make_console(stderr=options.json)
     wanted = [p["X_L"] for p in content["points"]] if options.all else options.points or (least_damped(content),)
@@ -53,10 +66,11 @@ def run(options: argparse.Namespace) -> int:
                 executor.close()
         found = Verification(found.faults + again.faults, found.agreed + again.agreed)
     if options.json:
-        print(json.dumps({"holds": found.holds, "faults": found.faults, "agreed": found.agreed,
-                          "computed": [p["X_L"] for p in points] if computed else []}, indent=1,
-                         ensure_ascii=False))  # fmt: skip
-        return 0 if found.holds else 1
+        said = {"holds": found.holds, "verdict": content["verdict"], "points": content["judged"],
+                "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
+                "agreed": found.agreed, "computed": [p["X_L"] for p in points] if computed else []}  # fmt: skip
+        print(json.dumps(said, indent=1, ensure_ascii=False))
+        return _exit_code(found, content)
     for text in found.agreed:
         console.print(f"[green]agrees[/]        {escape(text)}")
     for text in found.faults:
@@ -69,7 +83,25 @@ def run(options: argparse.Namespace) -> int:
                       f"({TOLERANCE_IDENTIFIED:g} of an eigenvalue with an identified converter).")  # fmt: skip
     if found.holds:
         console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
+        console.print(_verdict(content), soft_wrap=True, highlight=False)
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
-    return 0 if found.holds else 1
+    return _exit_code(found, content)
+
+
+def _exit_code(found: Verification, content: dict[str, Any]) -> int:
+    return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
+
+
+def _refused(content: dict[str, Any]) -> bool:
+    """Whether an acceptance test of the FMU failed."""
+    return content["acceptance"] is not None and not content["acceptance"]["trusted"]
+
+
+def _verdict(content: dict[str, Any]) -> str:
+    """What the certificate says of the converter, in one line."""
+    colour = "green" if content["verdict"] == PASSES and not _refused(content) else "red"
+    tail = "; acceptance tests of the FMU failed" if _refused(content) else ""
+    line = f"Its verdict: [bold {colour}]{escape(content['verdict'])}[/], "
+    return f"{line}{escape(content['judged'])} line reactances of the norm judged{tail}."

@@ -15,7 +15,7 @@ from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
 from orchestrator.certification.files import figures_hash, write_sealed
 from orchestrator.certification.point import POWER
-from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.request import REACTANCES, CertificationRequest
 from orchestrator.cli import main
 from orchestrator.errors import InputError
 from tests.certification.fabricated import rings
@@ -74,19 +74,39 @@ def a_sample(folder):
 
 def verified(gfor, folder, *arguments):
     code, text, error = gfor("verify", folder, "--json", "--workers", 1, *arguments)
-    assert code in (0, 1), error
+    assert code in (0, 1, 3, 5), error
     return code, json.loads(text)
 
 
 def test_what_nobody_touched_holds(certificate, gfor):
     for path in (certificate, certificate / "certificate.json"):
         code, found = verified(gfor, path, "--all")
-        assert (code, found["faults"], found["computed"]) == (0, [], [0.1, 0.3])
+        assert (code, found["faults"], found["computed"]) == (3, [], [0.1, 0.3])
         assert sum("the same to the last digit" in text for text in found["agreed"]) == 8
     code, text, _ = gfor("verify", certificate, "--points", "0.3", "--workers", 1)
-    assert code == 0
+    assert code == 3
     assert "X_L = 0.3 pu, with the converter: modes: the same to the last digit" in text
     assert "no proof of who made it" in text
+
+
+@pytest.mark.parametrize(
+    ("reactances", "other", "verdict", "points", "code"),
+    [("0.1,0.3", {}, "incomplete", "2 of 13", 3), ("0.1", {"power": 0.0}, "fails", "1 of 13", 1),
+     ("0.1", {"stability": {"stable": None, "sentence": "not known: it answers otherwise"}}, "fails", "1 of 13", 1),
+     (",".join(map(str, REACTANCES)), {}, "passes", "13 of 13", 0)],
+)  # fmt: skip
+def test_a_certificate_that_holds_is_no_pass(
+    tmp_path, fmu_path, gfor, monkeypatch, reactances, other, verdict, points, code
+):
+    monkeypatch.setattr(study_module, "compute_point", lambda task: replace(rings(task), **other))
+    assert gfor("certify", fmu_path("gfor"), "--no-check", "--pod", "q", "--reactances", reactances, "--workers", 1,
+                "--out", tmp_path)[0] == code  # fmt: skip
+    got, found = verified(gfor, tmp_path, "--files-only")
+    assert (got, found["holds"]) == (code, True)
+    assert (found["verdict"], found["points"], found["passes"]) == (verdict, points, code == 0)
+    got, text, _ = gfor("verify", tmp_path, "--files-only")
+    assert got == code
+    assert text.strip().splitlines()[-1] == f"Its verdict: {verdict}, {points} line reactances of the norm judged."
 
 
 @pytest.mark.parametrize("pod", ["p", "pq", "none"])
@@ -115,7 +135,7 @@ def test_what_is_only_declared_holds_as_well(tmp_path, gallery, gfor, monkeypatc
 def test_a_file_that_is_another_is_named(certificate, gfor, name, change):
     change(certificate)
     code, found = verified(gfor, certificate)
-    assert code == 1
+    assert code == 5
     assert any(text.startswith(f"{name}: ") for text in found["faults"])
     assert found["computed"] == []
 
@@ -154,21 +174,21 @@ def test_an_edited_figure_or_word_does_not_agree(certificate, gfor, change, seal
     """Also where the JSON's own hash was computed again: the words follow from the figures."""
     edited(certificate, change, sealed=sealed)
     code, found = verified(gfor, certificate, "--files-only")
-    assert code == 1
+    assert code == 5
     assert any("its own hash differs" in text for text in found["faults"]) != sealed
 
 
 def test_a_figure_without_words_is_held_by_the_hash(certificate, gfor):
     edited(certificate, drop_departures)
-    assert verified(gfor, certificate, "--files-only")[0] == 1
+    assert verified(gfor, certificate, "--files-only")[0] == 5
 
 
 @pytest.mark.parametrize(
     ("damping", "signal", "code", "said"),
     [
-        (1e-9, 1e-9, 0, "the digits differ"),
-        (1e-4, 0.0, 1, "comes out and"),
-        (0.0, 1e-3, 1, "of its range"),
+        (1e-9, 1e-9, 3, "the digits differ"),
+        (1e-4, 0.0, 5, "comes out and"),
+        (0.0, 1e-3, 5, "of its range"),
     ],
 )
 def test_points_that_come_out_otherwise(certificate, gfor, monkeypatch, damping, signal, code, said):
@@ -183,7 +203,7 @@ def test_points_that_come_out_otherwise(certificate, gfor, monkeypatch, damping,
     monkeypatch.setattr(verification, "compute_point", compute)
     got, found = verified(gfor, certificate)
     assert got == code
-    assert any(said in text for text in (found["faults"] if code else found["agreed"]))
+    assert any(said in text for text in (found["faults"] if code == 5 else found["agreed"]))
     assert len(found["computed"]) == 1
 
 
@@ -246,7 +266,7 @@ FORGED = {
 def test_no_entry_can_be_changed_and_sealed_again(certificate, gfor, name):
     edited(certificate, FORGED[name], sealed=True)
     code, found = verified(gfor, certificate, "--files-only")
-    assert code == 1
+    assert code == 5
     assert any("it was made of other figures" in text for text in found["faults"])
 
 
@@ -264,7 +284,7 @@ def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
     edited(certificate, lambda c: c["files"].update({"certificate.html": file_hash(certificate / "certificate.html")}),
            sealed=True)  # fmt: skip
     code, found = verified(gfor, certificate, "--files-only")
-    assert code == 1
+    assert code == 5
     assert not any("hash" in text or "SHA" in text for text in found["faults"])
 
 
@@ -293,7 +313,7 @@ def test_a_damaged_certificate_is_one_error(certificate, gfor, change, place):
 def test_deep_json_and_a_page_of_other_bytes_are_no_traceback(certificate, gfor):
     (certificate / "certificate.html").write_bytes(b"\xff\xff")
     code, found = verified(gfor, certificate)
-    assert (code, any(text.startswith("certificate.html") for text in found["faults"])) == (1, True)
+    assert (code, any(text.startswith("certificate.html") for text in found["faults"])) == (5, True)
     (certificate / "certificate.json").write_text("[" * 200_000, encoding="utf-8")
     code, _, error = gfor("verify", certificate)
     assert (code, "it is not JSON" in error) == (2, True)
@@ -321,7 +341,7 @@ def test_a_refused_request_leaves_a_finished_certificate_as_it_was(certificate, 
 def test_figures_of_a_point_that_come_out_otherwise(certificate, gfor, monkeypatch, other, said):
     monkeypatch.setattr(verification, "compute_point", lambda task: replace(rings(task), **other))
     code, found = verified(gfor, certificate)
-    assert (code, any(said in text for text in found["faults"])) == (1, True)
+    assert (code, any(said in text for text in found["faults"])) == (5, True)
 
 
 def test_a_name_with_a_new_line_is_escaped_in_the_case_file(tmp_path, fmu_path):
