@@ -17,6 +17,9 @@ from orchestrator.errors import AnalysisError
 FREQUENCIES = (0.1, 1.5)
 """Of the modes that are judged [Hz], both ends included."""
 
+PAIRED = (0.08, 1.875)
+"""A mode in the judged range is compared with none outside of these frequencies [Hz]."""
+
 LEAST_DAMPING = 0.05
 """Damping ratio that a judged mode needs."""
 
@@ -78,6 +81,17 @@ def is_judged(frequency_hz: float) -> bool:
     return FREQUENCIES[0] <= frequency_hz <= FREQUENCIES[1]
 
 
+def is_near(frequency_hz: float) -> bool:
+    """Whether a judged mode may have been at this frequency without the converter, or come to be there with it."""
+    return PAIRED[0] <= frequency_hz <= PAIRED[1]
+
+
+def critical_mode(modes: ModeSet) -> complex | None:
+    """The least damped oscillation of the judged range [rad/s]; None where there is none."""
+    judged = [value for value in modes.eigenvalues.tolist() if is_judged(value.imag / (2 * np.pi))]
+    return min(judged, key=damping_ratio, default=None)
+
+
 def eigenvalue_test(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
     """Judge every mode of the system with the converter, least damped first.
 
@@ -107,7 +121,7 @@ def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) ->
     """Every mode with the converter, beside what it was without."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
-        alike = similarities(having, lacking)
+        alike = np.where(_comparable(having, lacking), similarities(having, lacking), 0.0)
     partners = _partners(alike)
     left = [column for column in range(alike.shape[1]) if column not in partners.values()]
     for k, value in enumerate(having.eigenvalues.tolist()):
@@ -116,6 +130,14 @@ def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) ->
         likeness = float(alike[k, left].max(initial=0.0) if partner is None else alike[k, partner])
         accepted, reason = judge_mode(value, before)
         yield ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else "")
+
+
+def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
+    """Which pairs may be one mode: a judged one is far from none that lies outside of the judged range."""
+    judged, near = ([[f(hz) for hz in s.frequencies] for s in (having, lacking)] for f in (is_judged, is_near))
+    forbidden = np.logical_and.outer(judged[0], np.logical_not(near[1]))
+    forbidden |= np.logical_and.outer(np.logical_not(near[0]), judged[1])
+    return np.logical_not(forbidden)
 
 
 def _partners(alike: NDArray[np.float64]) -> dict[int, int]:

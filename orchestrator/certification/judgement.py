@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.arrays import Numbers
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.criteria import (
     ModalTest,
     ModeVerdict,
+    critical_mode,
     eigenvalue_test,
     modal_test,
     neighbouring_modes,
@@ -68,6 +70,8 @@ class PointVerdict:
         Why the point is not accepted; empty where it is.
     unknown
         Why the point could not be judged at all; empty where it was.
+    base_critical
+        The least damped judged mode without the converter [rad/s]; None where there is none.
     """
 
     X_L: float
@@ -77,6 +81,7 @@ class PointVerdict:
     faults: tuple[str, ...]
     neighbours: tuple[ModeVerdict, ...] = ()
     unknown: str = ""
+    base_critical: complex | None = None
 
     @property
     def judged(self) -> bool:
@@ -100,6 +105,20 @@ class PointVerdict:
         return tuple(
             m for m in every if m.before_percent is not None and m.before_percent - m.damping_percent > LOWERED
         )
+
+    def of_base_critical(self) -> str:
+        """What the converter makes of the least damped mode, in words; empty where there was none."""
+        if self.base_critical is None:
+            return ""
+        was = f"the least damped mode without the converter, {_hertz_and_percent(self.base_critical)},"
+        found = [m for m in (*self.modes, *self.neighbours) if m.before == self.base_critical]
+        if not found:
+            return f"{was} has no counterpart with the converter"
+        return f"{was} is at {_hertz_and_percent(found[0].eigenvalue)} with the converter"
+
+
+def _hertz_and_percent(value: complex) -> str:
+    return f"{value.imag / (2 * np.pi):.3f} Hz with {100 * damping_ratio(value):.2f} %"
 
 
 def watched(pod: str) -> str:
@@ -127,6 +146,7 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
         faults = [f"the study failed with the converter: {having.failure}"]
     modes: tuple[ModeVerdict, ...] = ()
     beside: tuple[ModeVerdict, ...] = ()
+    critical = None if lacking.modes is None else critical_mode(lacking.modes)
     if having.modes is not None and lacking.modes is not None:
         modes = tuple(eigenvalue_test(having.modes, lacking.modes, having.components))
         beside = tuple(neighbouring_modes(having.modes, lacking.modes, having.components))
@@ -141,7 +161,7 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
         faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
-    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside)
+    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, base_critical=critical)
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
-from orchestrator.certification.criteria import is_judged
+from orchestrator.certification.criteria import PAIRED, is_judged, is_near
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.point import COMPUTED, FREQUENCY
 from orchestrator.certification.study import Certification
@@ -81,9 +81,12 @@ def _base_modes(c: Certification, v: PointVerdict) -> str:
     rows = [
         [eigenvalue(x.real, x.imag), f"{x.imag / (2 * np.pi):.4f}", damping(100 * damping_ratio(x)), escape(words)]
         for x, words in entries
-        if is_judged(x.imag / (2 * np.pi))
+        if is_near(x.imag / (2 * np.pi))
     ]
-    return table("Without the converter", ["λ [rad/s]", "f [Hz]", "Damping [%]", "Who takes part"], rows)
+    caption = f"Without the converter, from {PAIRED[0]:g} to {PAIRED[1]:g} Hz"
+    said = v.of_base_critical()
+    note = f"<p>{escape(said[0].upper() + said[1:])}.</p>" if said else ""
+    return table(caption, ["λ [rad/s]", "f [Hz]", "Damping [%]", "Who takes part"], rows) + note
 
 
 def responses(c: Certification, figures: Figures) -> str:

@@ -102,6 +102,10 @@ def run(options: argparse.Namespace) -> int:
         print((folder / JSON).read_text(encoding="utf-8"), end="")
     else:
         console.print(_table(result), "")
+        for v in result.verdicts:
+            if said := v.of_base_critical():
+                console.print(f"X_L = {v.X_L:g} pu: {said}", soft_wrap=True, highlight=False)
+        console.print("")
         good = result.passed and not result.refused
         console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
         if result.stored:

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.certification.criteria import _partners, eigenvalue_test, modal_test, stability_fault
+from orchestrator.certification.criteria import (
+    _partners,
+    critical_mode,
+    eigenvalue_test,
+    modal_test,
+    neighbouring_modes,
+    stability_fault,
+)
+from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.point import bus_frequency
 
 
@@ -66,6 +74,29 @@ def test_one_mode_that_was_below_already_excuses_one_only():
 def test_partners_are_chosen_together():
     alike = np.array([[0.9, 0.8], [0.85, 0.1], [0.45, 0.4]])
     assert _partners(alike) == {0: 1, 1: 0}
+
+
+@pytest.mark.parametrize(("was", "same"), [(0.056, False), (0.079, False), (0.081, True), (1.87, True), (1.88, False)])
+def test_a_judged_mode_is_compared_with_none_far_from_the_judged_range(was, same):
+    having = modes((0.33, 0.04, "a"))
+    (found,) = eigenvalue_test(having, modes((was, 0.03, "a")))
+    assert (found.before is not None, found.accepted) == (same, same)
+    beside = neighbouring_modes(modes((was, 0.03, "a")), having)
+    assert all((m.before is not None) == same for m in beside)
+    (low,) = neighbouring_modes(modes((0.056, 0.9, "a")), modes((0.06, 0.9, "a")))
+    assert low.before is not None
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [("a", "0.308 Hz with 13.82 %, is at 0.209 Hz with 26.20 % with the converter"),
+     ("converter", "0.308 Hz with 13.82 %, has no counterpart with the converter")],
+)  # fmt: skip
+def test_what_becomes_of_the_least_damped_mode_is_said(state, said):
+    lacking = modes((0.3076, 0.1382, "a"), (0.05, 0.01, "b"), (0.9, 0.5, "c"))
+    found = tuple(eigenvalue_test(modes((0.209, 0.262, state)), lacking))
+    point = PointVerdict(0.3, found, None, None, (), base_critical=critical_mode(lacking))
+    assert point.of_base_critical() == f"the least damped mode without the converter, {said}"
 
 
 @pytest.mark.parametrize(("frequency", "judged"), [(0.099, False), (0.1, True), (1.5, True), (1.501, False)])
