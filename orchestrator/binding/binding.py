@@ -30,6 +30,8 @@ from orchestrator.units import to_unit
 _FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RECTANGULAR, "polar": Form.POLAR,
           "abc": Form.ABC, "power": Form.POWER}  # fmt: skip
 _FREQUENCY = ("omega", "frequency")
+_SWITCH = ".enabled"
+"""Ends our names of Boolean variables, such as ``pod_p.enabled``."""
 
 
 def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescription:
@@ -135,14 +137,14 @@ class _Reader:
         except ValueError as error:
             self._problems.append(Problem(place, str(error)))
 
-    def _variable(self, name: str, *causalities: str) -> VariableInfo:
+    def _variable(self, name: str, *causalities: str, kind: str = "Real") -> VariableInfo:
         info = self._native.variables.get(name)
         if info is None:
             raise ValueError(f"the FMU has no variable {name!r}; `gfor info {self._native.path.name}` lists them")
         if causalities and info.causality not in causalities:
             raise ValueError(f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here")
-        if info.type != "Real":
-            raise ValueError(f"{name} is of type {info.type}; Real is needed here")
+        if info.type != kind:
+            raise ValueError(f"{name} is of type {info.type}; {kind} is needed here")
         return info
 
     def _bases(self) -> Bases | None:
@@ -293,10 +295,18 @@ class _Reader:
         return found
 
     def _signal(self, name: str, table: SignalTable, bases: Bases) -> SignalMap:
+        if name.endswith(_SWITCH):
+            return self._switch(table)
         info = self._variable(table.variable)
         if name in _FREQUENCY:
             return SignalMap(info.name, 1 / bases.frequency_unit(unit_of(info, table.unit), info.name), 0.0, PER_UNIT)
         return SignalMap(info.name, 1.0, 0.0, unit_of(info, table.unit))
+
+    def _switch(self, table: SignalTable) -> SignalMap:
+        info = self._variable(table.variable, "parameter", "input", kind="Boolean")
+        if table.unit is not None or table.base is not None:
+            raise ValueError(f"{info.name} is a Boolean, which has no unit and no base; remove them")
+        return SignalMap(info.name, 1.0, 0.0, "")
 
     def _settings(self) -> dict[str, float | bool]:
         found: dict[str, float | bool] = {}

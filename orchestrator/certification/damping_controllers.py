@@ -126,7 +126,7 @@ def _is_switch(info: VariableInfo | None) -> bool:
 def _bound(description: FmuDescription, name: str) -> bool | None:
     """What the binding sets a switch to; None where it does not."""
     if isinstance(description, BoundDescription):
-        value: Value | None = description.port.settings.get(name)
+        value: Value | None = description.port.settings.get(description.natives.get(name, name))
         return None if value is None else bool(value)
     return None
 

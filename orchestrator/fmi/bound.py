@@ -181,7 +181,8 @@ class BoundComponent(Component):
             elif own or name in self._natives:
                 native = name if own else self._natives[name]
                 signal = None if own else self._port.signals.get(name)
-                self.inner.set({native: (value - signal.offset) / signal.factor if signal else value})
+                scaled = signal is not None and self.description.variables[name].type == "Real"
+                self.inner.set({native: (value - signal.offset) / signal.factor if signal and scaled else value})
             else:
                 raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
         self._scale()

@@ -70,7 +70,7 @@ class StartMap:
 
 @dataclass(frozen=True)
 class SignalMap:
-    """Another variable under a name and in a unit of ours: ``factor·x + offset``."""
+    """Another variable under a name and in a unit of ours: ``factor·x + offset``; a Boolean as it is."""
 
     variable: str
     factor: float
@@ -174,7 +174,7 @@ class BoundDescription(FmuDescription):
 def _passed(native: FmuDescription, port: PortMap, name: str, own: str, reference: int) -> VariableInfo:
     info = native.variables[own]
     signal = port.signals.get(name)
-    if signal is None:
+    if signal is None or info.type == "Boolean":
         return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
     return replace(info, name=name, reference=reference, causality="output", unit=signal.unit, start=None,
                    minimum=None, maximum=None)  # fmt: skip

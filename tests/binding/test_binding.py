@@ -230,3 +230,34 @@ def test_a_draft_of_something_else_asks_for_everything(gallery, binding):
     assert text.count("REQUIRED") >= 5
     with pytest.raises(BindingError, match="still to be filled in"):
         bind(description, binding(text))
+
+
+SWITCH = '"pod_p.enabled" = { variable = "pod_q.enabled" }\n'
+
+
+def test_a_switch_has_a_name_of_ours(binding, fmu_path):
+    """A Boolean parameter is shown under our name, and takes what is set there."""
+    found = bound_fmu(fmu_path("gfor"), binding(OURS + SWITCH))
+    info = found.variables["pod_p.enabled"]
+    assert (info.type, info.causality, found.natives["pod_p.enabled"]) == ("Boolean", "parameter", "pod_q.enabled")
+    with open_component("box", found, isolated=False) as component:
+        for value in (True, False):
+            component.set({"pod_p.enabled": value})
+            assert component.values(["pod_p.enabled"]) == {"pod_p.enabled": value}
+            assert component.inner.values(["pod_q.enabled", "pod_p.enabled"]) == {
+                "pod_q.enabled": value, "pod_p.enabled": False
+            }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ('"pod_p.enabled" = { variable = "omega" }', "omega is of causality output; parameter or input is needed"),
+        ('"pod_p.enabled" = { variable = "pod_p.K" }', "pod_p.K is of type Real; Boolean is needed here"),
+        ('"pod_p.enabled" = { variable = "pod_q.enabled", unit = "pu" }', "has no unit and no base; remove them"),
+        ('delta_p_pod = { variable = "pod_q.enabled" }', "is of type Boolean; Real is needed here"),
+    ],
+)
+def test_a_switch_is_a_boolean_that_can_be_set(binding, fmu_path, entry, said):
+    with pytest.raises(BindingError, match=said):
+        bound_fmu(fmu_path("gfor"), binding(OURS + entry))

@@ -80,6 +80,19 @@ def test_a_switch_that_the_binding_sets_must_agree(tmp_path, fmu_path):
     assert controllers(CertificationRequest(fmu_path("gfor"), binding)).pod == "q"
 
 
+def test_a_switch_of_another_name_is_set_through_the_binding(tmp_path, fmu_path):
+    binding = tmp_path / "mine.toml"
+    switch = '[signals]\n"pod_p.enabled" = { variable = "pod_q.enabled" }\n'
+    binding.write_text(BOUND.replace("[parameters]", f"{switch}[parameters]"), encoding="utf-8")  # it is set there
+    with pytest.raises(InputError, match=r"--pod none needs pod_p.enabled = false, but the binding .* = true"):
+        controllers(CertificationRequest(fmu_path("gfor"), binding, pod="none"))
+    binding.write_text(BOUND.replace('"pod_q.enabled" = true', "") + switch, encoding="utf-8")
+    found = controllers(CertificationRequest(fmu_path("gfor"), binding, pod="p"))
+    assert (found.pod, found.settings) == ("p", {"pod_p.enabled": True})
+    case = write_case(CertificationRequest(fmu_path("gfor"), binding, pod="p"), found.settings, tmp_path)
+    assert case.prepare(["with"])[0].values["converter.pod_p.enabled"] is True
+
+
 def without_outputs(description, *names):
     """The FMU's description, less some variables."""
     kept = {name: info for name, info in description.variables.items() if name not in names}
