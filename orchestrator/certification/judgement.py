@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.arrays import Numbers
 from orchestrator.analysis.modes import damping_ratio
+from orchestrator.arrays import Numbers
 from orchestrator.certification.criteria import (
     ModalTest,
     ModeVerdict,

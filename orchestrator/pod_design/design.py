@@ -3,7 +3,8 @@
 The sensitivities are finite differences between two real linearisations, and the result is checked on the closed loop.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from orchestrator.analysis.continuation import pair_at
@@ -16,7 +17,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import InputError
+from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
 from orchestrator.pod_design.lead_lag import (
@@ -166,6 +167,11 @@ class PodDesign:
         return self.after.counting(self.final.eigenvalue)
 
     @property
+    def worst_other(self) -> Mode | None:
+        """The least damped mode with the final setting but the one that counts as the target."""
+        return self.after.worst_beside(self.final.eigenvalue)
+
+    @property
     def achieved_damping(self) -> float:
         """Damping ratio that the design achieves."""
         return damping_ratio(self.achieved)
@@ -220,18 +226,32 @@ def design_pod(case: Case, request: DesignRequest, report: Report = lambda text:
         find_operating_point(master)
         loop = PodLoop(master, target.components, request.controller)
         report("modes without the controller")
-        model = loop.model(_OFF)
         examined = loop.examine(_OFF)
-        before = surroundings(model, None, naming)
-        if before.named is None:
-            low, high = ELECTROMECHANICAL_HZ
-            raise InputError(
-                f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
-                f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
+        with _with_stability(examined.stability):
+            model = loop.model(_OFF)
+            before = surroundings(model, None, naming)
+            if before.named is None:
+                low, high = ELECTROMECHANICAL_HZ
+                raise InputError(
+                    f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
+                    f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
+                )
+            off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
+            start = _Start(
+                case.name, request, target, prepared, name, off, before.without(before.named), naming, examined
             )
-        off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
-        start = _Start(case.name, request, target, prepared, name, off, before.without(before.named), naming, examined)
-        return _design(start, loop, report)
+            return _design(start, loop, report)
+
+
+@contextmanager
+def _with_stability(stability: Stability) -> Iterator[None]:
+    """An error that ends a design says as well that the system is unstable without the controller, where it is."""
+    try:
+        yield
+    except (InputError, AnalysisError) as error:
+        if stability.stable is not False:
+            raise
+        raise type(error)(f"{error}\nWithout the controller the system is {stability.sentence()}") from error
 
 
 @dataclass(frozen=True)

@@ -41,12 +41,15 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "K_non_compensated": d.gain_non_compensated,
         "K_compensated": d.gain_compensated,
         "active_bound": d.active_bound,
-        "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.after.worst)},
+        "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.worst_other)},
         "stable": d.stability.stable,
         "largest_growth_rate": d.stability.largest_growth_rate,
         "stability": {"before": d.stability_before.as_json(), "after": d.stability.as_json()},
         "warnings": list(d.warnings),
-        "largest_real_part": {"before": d.before.growth, "after": d.after.growth},
+        "largest_real_part": {
+            "before": d.stability_before.largest_growth_rate,
+            "after": d.stability.largest_growth_rate,
+        },
         "margins": _margins_json(d.margins) if d.margins else None,
         "refinement": _refinement_json(d) if d.refinement else None,
         "case": d.case,
@@ -138,6 +141,7 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
                 **filters(s.filters),
                 "points": [placed(p) for p in s.points],
                 "chosen": placed(s.chosen),
+                "unstable_gains": list(s.unstable),
             }
             for s in refinement.sweeps
         ],

@@ -31,11 +31,14 @@ class Surroundings:
         Real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows.
     named
         The mode that the case's own rule gives the target's name; normally the target itself.
+    followed
+        The target that was followed; None where it is outside of 0.1 to 2 Hz or none was.
     """
 
     others: tuple[Mode, ...]
     growth: float
     named: Mode | None
+    followed: Mode | None = None
 
     @property
     def other_named(self) -> Mode | None:
@@ -64,6 +67,14 @@ class Surroundings:
         candidates = [target, *([self.other_named.eigenvalue] if self.other_named else [])]
         return min(candidates, key=damping_ratio)
 
+    def worst_beside(self, target: complex) -> Mode | None:
+        """The least damped mode but the one that counts where ``target`` [rad/s] was followed; see `counting`."""
+        rest = self.others
+        if self.other_named is not None and self.counting(target) == self.other_named.eigenvalue:
+            followed = () if self.followed is None else (self.followed,)
+            rest = (*(m for m in rest if m is not self.other_named), *followed)
+        return min(rest, key=lambda m: m.damping_ratio, default=None)
+
     def below(self, damping: float) -> int:
         """How many modes have less than this damping ratio."""
         return sum(mode.damping_ratio < damping for mode in self.others)
@@ -72,11 +83,12 @@ class Surroundings:
 def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
     """Everything but the mode at ``target`` [rad/s]; ``naming`` finds the mode that bears the target's name."""
     spectrum = find_spectrum(model, *ELECTROMECHANICAL_HZ)
-    others = tuple(spectrum.modes)
+    others, followed = tuple(spectrum.modes), None
     if target is not None:
         others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
+        followed = next((m for m in spectrum.modes if m not in others), None)
     fastest = fastest_growth(spectrum.eigenvalues, step_map=model.step_size is not None)
-    return Surroundings(others, fastest.real if fastest else 0.0, naming(model, spectrum.modes))
+    return Surroundings(others, fastest.real if fastest else 0.0, naming(model, spectrum.modes), followed)
 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
@@ -100,6 +112,11 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
     weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
     return weakest, fastest_growth(values, step_map=model.step_size is not None)
+
+
+def is_unstable(model: LinearModel) -> bool:
+    """Whether an eigenvalue grows, at any frequency."""
+    return extremes(model)[1] is not None
 
 
 def guarded(values: Vector) -> Vector:

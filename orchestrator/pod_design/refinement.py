@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.errors import AnalysisError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop
+from orchestrator.pod_design.guard import is_unstable
 from orchestrator.pod_design.lead_lag import (
     LARGEST_TURN,
     LeadLag,
@@ -59,12 +60,15 @@ class Sweep:
         With rising gain.
     chosen
         The smallest gain that meets the requirement, else the gain of the best damping.
+    unstable
+        The gains of points with which the system is unstable [pu]; none are known beyond `MOST_STATES`.
     """
 
     why: str
     filters: LeadLag
     points: tuple[Placed, ...]
     chosen: Placed
+    unstable: tuple[float, ...] = ()
 
 
 @dataclass
@@ -183,7 +187,17 @@ def sweep(
         chosen = _crossing(loop, points[above - 1], points[above], required)
     else:
         chosen = _peak(loop, points)
-    return Sweep(why, filters, tuple(points), chosen)
+    return Sweep(why, filters, tuple(points), chosen, _unstable(loop, points))
+
+
+def _unstable(loop: PodLoop, points: Sequence[Placed]) -> tuple[float, ...]:
+    """The gains that leave the system unstable; not looked for in a system with more states than are surveyed."""
+    models = (loop.model(p.setting) for p in points)
+    return tuple(
+        p.setting.gain
+        for p, model in zip(points, models, strict=True)
+        if len(model.names) <= MOST_STATES and is_unstable(model)
+    )
 
 
 def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Placed:

@@ -7,12 +7,16 @@ from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.analysis.modes import Mode, damping_ratio
+from orchestrator.analysis.stability import Stability
 from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, angle_deg, compensation_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.refinement import Refinement
 from orchestrator.report.tables import eigenvalue_text
+
+_MARK = "†"
+"""Behind what was swept with a gain that leaves the system unstable."""
 
 LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
@@ -30,6 +34,8 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
     yield steps
     if d.refinement:
         yield _refinement(d.refinement, d.required_damping)
+        if any(s.unstable for s in d.refinement.sweeps):
+            yield f"{_MARK} the system is unstable with this gain"
     yield _result(d)
     if d.margins:
         yield _margins(d.margins, d)
@@ -85,13 +91,13 @@ def _refinement(r: Refinement, required: float) -> Table:
                    "Damping over them [%]", f"Best, or first with {percent(required)}")  # fmt: skip
     for s in r.sweeps:
         gains = [p.setting.gain for p in s.points]
-        dampings = [100 * p.damping_ratio for p in s.points]
+        dampings = [f"{100 * p.damping_ratio:.1f}{_MARK * (p.setting.gain in s.unstable)}" for p in s.points]
         table.add_row(
             s.why,
             f"{s.filters.T_S1:.4f}",
             f"{s.filters.T_S2:.4f}",
             f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-            " ".join(f"{x:.1f}" for x in dampings),
+            " ".join(dampings),
             f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
         )
     return table
@@ -103,8 +109,8 @@ def _result(d: PodDesign) -> Table:
     table.add_row("Setting", "off", f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
                                     f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s")  # fmt: skip
     table.add_row(f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved))
-    table.add_row("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.after.worst))
-    table.add_row("Largest real part of all", f"{d.before.growth:+.3g} 1/s", f"{d.after.growth:+.3g} 1/s")
+    table.add_row("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.worst_other))
+    table.add_row("Largest real part of all", *map(_growth, (d.stability_before, d.stability)))
     return table
 
 
@@ -201,6 +207,12 @@ def _setting(p: Placed) -> str:
 def mode_text(value: complex) -> str:
     """A mode with frequency and damping."""
     return f"{eigenvalue_text(value)} rad/s ({value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))})"
+
+
+def _growth(stability: Stability) -> str:
+    """The figure of the verdict's own sentence."""
+    rate = stability.largest_growth_rate
+    return stability.verdict if rate is None else f"{rate:+.4g} 1/s"
 
 
 def _other(mode: Mode | None) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -137,3 +138,43 @@ def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):
     assert code == 2
     assert "more than one scenario (gfor, second) has components with pod_p and every POD off" in err
     assert "name one with --scenario" in err
+
+
+UNSTABLE = ("--set", "sg1.exciter.K_IR=100")
+
+
+def test_a_design_that_ends_early_says_that_the_system_is_unstable(gfor, tmp_path):
+    text = load_case("two_area_rms").text
+    same = 'against = [["sg1.machine.omega"], ["sg1.machine.omega"]]'
+    (tmp_path / "early.toml").write_text(
+        text.replace('states = ["sg?.machine.omega", "sg?.machine.delta"]', same), encoding="utf-8"
+    )
+    for values, unstable in ((UNSTABLE, True), ((), False)):
+        code, _, err = gfor("design", "early.toml", "--controller", "pod_p", "--scenario", "gfor", *values)
+        assert code == 2
+        assert "shows no mode 'electromechanical'" in err
+        assert ("Without the controller the system is UNSTABLE: a mode grows at" in err) == unstable
+
+
+def test_the_largest_real_part_is_the_headlines_and_the_other_mode_another(gfor):
+    arguments = ("design", "two_area_rms", "--controller", "pod_p", "--no-margins")
+    _, out, _ = gfor(*arguments)
+    figures = re.findall(r"the largest real part of all \d+ eigenvalues is (\S+) 1/s", out)
+    (row,) = [line for line in out.splitlines() if "Largest real part of all" in line]
+    assert re.findall(r"(\S+) 1/s", row) == figures
+    _, out, _ = gfor(*arguments, "--json")
+    d = json.loads(out)
+    assert d["largest_real_part"]["after"] == d["largest_growth_rate"] < 0
+    assert d["achieved_mode"] != d["followed_mode"]  # two modes have traded places
+    assert d["worst_other_mode"]["after"]["real"] != pytest.approx(d["achieved_mode"]["real"])
+    assert d["worst_other_mode"]["after"]["damping_ratio"] >= d["achieved_damping_ratio"]
+
+
+def test_gains_that_were_unstable_are_marked(gfor):
+    arguments = ("design", "two_area_rms", "--controller", "pod_p", "--no-margins", "--refine", *UNSTABLE)
+    _, out, _ = gfor(*arguments, "--gain-bounds", "0:50", "--damping-increment", "0.01")
+    assert "† the system is unstable with this gain" in out
+    (sweep,) = re.findall(r"as designed .*", out)
+    assert "†" in sweep
+    content = json.loads((Path("two_area_rms_pod_p.json")).read_text(encoding="utf-8"))
+    assert 0.0 in content["refinement"]["sweeps"][0]["unstable_gains"]
