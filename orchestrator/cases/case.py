@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from pydantic import ValidationError
 from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.locate import place_in
+from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, Value
@@ -64,16 +66,37 @@ class Case(CaseDefinition):
         ]
         if unknown:
             raise CaseError(str(self.path), problems)
-        prepared, questions = [], []
+        prepared, questions, named = [], [], Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
             prepared.append(preparer.prepare(step_size, stop_time))
+            named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.questions if q not in questions]
+        if not problems and unmatched(self.table, named, self.place):
+            problems += self._mentions
         if problems:  # what is most unusual may well be why
             asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         return [p for p in prepared if p is not None]
+
+    @cached_property
+    def _mentions(self) -> list[Problem]:
+        """Names in ``[analysis]`` and ``[[plots]]`` that nothing has in any scenario.
+
+        Scenarios are assembled one after the other until all is found; one that cannot be leaves it open.
+        """
+        named, problems = Named(), list[Problem]()
+        for name in self.scenarios:
+            preparer = self._preparer(name, None, ())
+            preparer.assemble()
+            if preparer.problems:
+                return []
+            named.add(preparer.draft)
+            problems = unmatched(self.table, named, self.place)
+            if not problems:
+                break
+        return problems
 
     def components_of(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()

@@ -1,8 +1,10 @@
-"""Names that somebody may have meant."""
+"""Names in a case file: those of a signal, and those that somebody may have meant."""
 
 import difflib
 import re
 from collections.abc import Iterable
+
+from orchestrator.errors import InputError
 
 
 def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
@@ -15,3 +17,19 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
 
 def _parts(name: str) -> list[str]:
     return sorted(re.split(r"[_.]", name))
+
+
+def variables_of(expression: str) -> list[str]:
+    """Names of the variables in a signal's expression.
+
+    Raises
+    ------
+    InputError
+        If the expression is neither a variable nor the difference of two.
+    """
+    names = [part.strip() for part in expression.split(" - ")]
+    if not 1 <= len(names) <= 2 or not all(names):
+        raise InputError(
+            f"signal {expression!r}: write 'component.variable' or 'component.variable - component.variable'"
+        )
+    return names

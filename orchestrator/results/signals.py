@@ -3,23 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from orchestrator.errors import InputError
-
-
-def variables_of(expression: str) -> list[str]:
-    """Names of the variables in a signal's expression.
-
-    Raises
-    ------
-    InputError
-        If the expression is neither a variable nor the difference of two.
-    """
-    names = [part.strip() for part in expression.split(" - ")]
-    if not 1 <= len(names) <= 2 or not all(names):
-        raise InputError(
-            f"signal {expression!r}: write 'component.variable' or 'component.variable - component.variable'"
-        )
-    return names
+from orchestrator.cases.names import variables_of
 
 
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:

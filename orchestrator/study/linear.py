@@ -13,10 +13,10 @@ from orchestrator.analysis.stability import judge
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.arrays import Matrix
+from orchestrator.cases.names import variables_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.results.signals import variables_of
 from orchestrator.study.modes import running
 
 

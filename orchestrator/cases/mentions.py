@@ -1,0 +1,106 @@
+"""Names in ``[analysis]`` and ``[[plots]]`` that nothing has in any scenario of a case.
+
+Components may be absent from some scenarios, so that a name is wrong only where no scenario has what it names.
+"""
+
+import fnmatch
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from orchestrator.cases.draft import Draft, Place
+from orchestrator.cases.names import close_names, variables_of
+from orchestrator.cases.schema import CaseTable
+from orchestrator.errors import InputError, Problem
+
+
+@dataclass
+class Named:
+    """What there is to be named, in the scenarios that were looked at.
+
+    Attributes
+    ----------
+    components
+        Names of all components.
+    stateless
+        Foreign FMUs that declare no state: how a model that is identified for them names its own is not known.
+    homes
+        What an area may name: components and buses.
+    """
+
+    components: set[str] = field(default_factory=set)
+    states: set[str] = field(default_factory=set)
+    stateless: set[str] = field(default_factory=set)
+    outputs: set[str] = field(default_factory=set)
+    homes: set[str] = field(default_factory=set)
+
+    def add(self, draft: Draft) -> None:
+        """All of one scenario, whose components were assembled."""
+        for name, plan in draft.system.components.items():
+            fmu = plan.description
+            self.components.add(name)
+            self.homes.add(name)
+            self.states |= {f"{name}.{state}" for state in fmu.states}
+            if not fmu.states and draft.tables[name].fmu is not None:
+                self.stateless.add(name)
+            self.outputs |= {f"{name}.{v}" for v in fmu.outputs if fmu.variables[v].type == "Real"}
+            self.homes |= {v.rpartition(".")[0] for v in fmu.outputs} - {""}
+        self.homes |= set(draft.network.buses) if draft.network else set()
+
+
+def unmatched(case: CaseTable, named: Named, place: Place) -> list[Problem]:
+    """Every entry that names nothing, with its place."""
+    return [*_states(case, named, place), *_areas(case, named, place), *_signals(case, named, place)]
+
+
+def _states(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+    analysis = case.analysis
+    groups: list[tuple[str, list[str]]] = []
+    for k, mode in enumerate(analysis.modes):
+        groups.append((place("analysis", "modes", k, "states"), mode.states))
+        groups += [(place("analysis", "modes", k, "against"), side) for side in mode.against or ()]
+    if "swing" in analysis.model_fields_set:
+        groups.append((place("analysis", "swing"), analysis.swing))
+    for where, patterns in groups:
+        for pattern in patterns:
+            if not fnmatch.filter(named.states, pattern) and not _may_be_hidden(named, pattern):
+                hint = close_names(pattern, sorted(named.states), "`gfor modes --json` lists the states")
+                yield Problem(where, f"{pattern!r}: no scenario has a state component.state of that name; {hint}")
+
+
+def _may_be_hidden(named: Named, pattern: str) -> bool:
+    return "." in pattern and bool(fnmatch.filter(named.stateless, pattern.partition(".")[0]))
+
+
+def _areas(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+    for area, patterns in case.analysis.areas.items():
+        for pattern in patterns:
+            if not fnmatch.filter(named.homes, pattern):
+                hint = close_names(pattern, sorted(named.homes), "name components, or the buses that feed them")
+                yield Problem(
+                    place("analysis", "areas", area), f"{pattern!r}: no scenario has such a component or bus; {hint}"
+                )
+
+
+def _signals(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+    entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
+    entries += [
+        (place("plots", k, "panels", n, "signal"), panel.signal)
+        for k, plot in enumerate(case.plots)
+        for n, panel in enumerate(plot.panels)
+    ]
+    for where, expression in entries:
+        yield from _signal(where, expression, named.outputs)
+
+
+def _signal(where: str, expression: str, outputs: Iterable[str]) -> Iterator[Problem]:
+    try:
+        names = variables_of(expression)
+    except InputError as error:
+        yield Problem(where, str(error))
+        return
+    for name in names:
+        if name not in outputs:
+            component = name.partition(".")[0]
+            own = sorted(output for output in outputs if output.startswith(f"{component}."))
+            hint = close_names(name, own or sorted(outputs), "`gfor info` lists the outputs of an FMU")
+            yield Problem(where, f"no scenario has an output {name!r}; {hint}")
