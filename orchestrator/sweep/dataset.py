@@ -13,6 +13,7 @@ import xarray as xr
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.storage import provenance, save_table
+from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
 from orchestrator.sweep.trajectories import Place, Trajectory
@@ -26,6 +27,9 @@ _FIGURES = {
 }
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}
 """xarray's own attributes have the short names."""
+
+_SEPARATOR = "; "
+"""Between the warnings of one point."""
 
 _BEGINNINGS = "start followed refined entered broken"
 
@@ -104,6 +108,7 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
     of_components = np.full((*shape, len(samples.components)), np.nan)
     names = [[""] * longest for _ in result.scenarios]
     residual, errors = np.full(shape[:-1], np.nan), np.full(shape[:-1], "", dtype=object)
+    warnings = np.full(shape[:-1], "", dtype=object)
     growth, stable = np.full(shape[:-1], np.nan), np.full(shape[:-1], -1, dtype=np.int8)
     for s, sweep in enumerate(result.scenarios):
         for t, trajectory in enumerate(sweep.trajectories):
@@ -118,6 +123,7 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
         for place in itertools.product(*map(range, sizes)):
             residual[(s, *place)] = sweep.points[place].residual
             errors[(s, *place)] = sweep.points[place].error or ""
+            warnings[(s, *place)] = _SEPARATOR.join(sweep.points[place].warnings)
             verdict = sweep.points[place].stability
             if verdict.get("stable") is not None:
                 stable[(s, *place)] = verdict["stable"]
@@ -146,6 +152,7 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
             dims[:-1], growth, {"units": "1/s", "long_name": "Largest real part of the whole spectrum"},
         ),
         "error": (dims[:-1], errors.astype(str), {"long_name": "Why there are no modes"}),
+        "warnings": (dims[:-1], warnings.astype(str), {"long_name": "What is to be known of the point"}),
     }  # fmt: skip
     coordinates: dict[str, Any] = {
         "scenario": ("scenario", [s.prepared.name for s in result.scenarios], {"long_name": "Scenario"}),
@@ -192,8 +199,9 @@ def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
                     {"scenario": sweep.prepared.name, **setting, "trajectory": trajectory.name, **figures}
                     | {"named": int(sample["named"]), "beginning": sample["beginning"].name.lower()}
                     | {**shares, **_verdict(sweep.points[place]), "error": ""}
+                    | {"warnings": _SEPARATOR.join(sweep.points[place].warnings)}
                 )
-    empty = dict.fromkeys(rows[0] if rows else ["scenario", *units.values(), "error"], "")
+    empty = dict.fromkeys(rows[0] if rows else ["scenario", *units.values(), "error", "warnings"], "")
     for sweep, place, error in samples.result.failures():
         setting = {units[key]: value for key, value in samples.setting(place).items()}
         rows.append(empty | {"scenario": sweep.prepared.name, **setting, "error": error})
@@ -239,6 +247,11 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
                     for trajectory in sweep.trajectories
                 ],
                 "failed": failed[sweep.prepared.name],
+                "warnings": [
+                    {"values": samples.setting(place), "warnings": list(sweep.points[place].warnings)}
+                    for place in grid_places(samples.axes)
+                    if sweep.points[place].warnings
+                ],
             }
             for sweep in result.scenarios
         ],

@@ -1,5 +1,6 @@
 """A sweep: the modes of a case's scenarios over a grid of parameters, computed, kept, and followed."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -92,6 +93,10 @@ class ScenarioSweep:
         """Places of the grid where a mode grows at any frequency, the fastest first."""
         found = [place for place in grid_places(axes) if self.points[place].is_unstable]
         return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
+
+    def counts(self, axes: Sequence[Axis]) -> Counter[bool | None]:
+        """How many places of the grid are stable, are not, and have no verdict."""
+        return Counter(self.points[place].stability.get("stable") for place in grid_places(axes))
 
     @property
     def stable(self) -> bool | None:

@@ -1,6 +1,7 @@
 """A sweep on a terminal."""
 
 import math
+import re
 
 from rich.markup import escape
 from rich.table import Table
@@ -10,6 +11,7 @@ from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.trajectories import Place
 
 _FAILURES_SHOWN = 5
+_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 
 
 def trajectories(samples: Samples) -> Table:
@@ -48,15 +50,23 @@ def stability(samples: Samples) -> list[str]:
     """The verdict on every scenario over all its points, as rich markup; an unstable one first."""
     axes, lines = samples.axes, []
     order = {False: 0, None: 1, True: 2}
+    total = math.prod(len(axis.values) for axis in axes)
     for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
-        title, places = escape(sweep.prepared.title), sweep.unstable(axes)
-        total = math.prod(len(axis.values) for axis in axes)
+        title, places, known = escape(sweep.prepared.title), sweep.unstable(axes), sweep.counts(axes)
+        rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
         if places:
             worst = sweep.points[places[0]].stability["sentence"].removeprefix("UNSTABLE: ")
-            where = escape(f"at {len(places)} of {total} points; worst at {place_text(samples, places[0])}: {worst}")
+            where = escape(
+                f"at {len(places)} of {total} points{rest}; worst at {place_text(samples, places[0])}: {worst}"
+            )
             lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
+        elif sweep.stable is False:
+            lines.append(f"[bold red]UNSTABLE[/]: {title}: between two points of the grid{rest}; take more points")
+        elif known[None]:
+            what = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
+            lines.append(f"[bold yellow]not known[/]: {title}: {what}")
         elif sweep.stable is None:
-            lines.append(f"[bold yellow]not known[/]: {title}: a point without a verdict is among {total}")
+            lines.append(f"[bold yellow]not known[/]: {title}: a point between those of the grid has no verdict")
         else:
             lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
     return lines
@@ -93,7 +103,21 @@ def remarks(samples: Samples) -> list[str]:
             f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
             "(where, is marked 'refined' in sweep.csv)"
         )
-    return texts
+    return [*texts, *_warnings(samples)]
+
+
+def _warnings(samples: Samples) -> list[str]:
+    """Each kind of the points' warnings once, with how many points have it; figures make no kind of their own."""
+    asked = {str(question) for sweep in samples.result.scenarios for question in sweep.prepared.questions}
+    kinds: dict[str, tuple[str, set[tuple[str, Place]]]] = {}
+    for sweep in samples.result.scenarios:
+        for place, record in sweep.points.items():
+            for text in record.warnings:
+                if text not in asked:  # said already, before the sweep
+                    _, points = kinds.setdefault(_FIGURE.sub("#", text), (text, set()))
+                    points.add((sweep.prepared.name, place))
+    total = sum(len(sweep.points) for sweep in samples.result.scenarios)
+    return [f"at {len(points)} of {total} points: {text}" for text, points in kinds.values()]
 
 
 def _count(number: int, what: str) -> str:

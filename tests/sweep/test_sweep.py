@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -270,3 +271,31 @@ def test_a_dask_cluster_computes_what_one_process_does(tmp_path):
         together = sweep("two_area", tmp_path / "together", vary, scenarios=scenarios, executor=executor)
     assert alone.computed == together.computed == 4
     assert numbers(alone) == numbers(together)
+
+
+def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, tmp_path, monkeypatch):
+    """Two of four points are not known, and one grows; three have a warning that differs in its figure only."""
+
+    def odd(task):
+        record, gain = compute_point(task), task.overrides["a1.gain"]
+        stable = {1.0: True, 2.0: None, 3.0: False, 4.0: None}.get(gain, True)
+        texts = (f"the step hides {gain:g} %",) if gain in (2, 3, 4) else ()
+        verdict = record.stability | {"stable": stable, "largest_growth_rate": 0.1, "sentence": "UNSTABLE: grows"}
+        return replace(record, stability=verdict, warnings=texts)
+
+    monkeypatch.setattr(sweep_module, "compute_point", odd)
+    out = tmp_path / "out"
+    arguments = ("--scenario", "one", "--workers", 1, "--out", out, "--vary")
+    _, text, err = gfor(case, *arguments, "a1.gain=1,2,3,4")
+    assert re.search(r"UNSTABLE: .*: at 1 of 4 points \(1 stable, 2 not known\); worst at a1.gain = 3", text)
+    assert err.count("the step hides") == 1
+    assert re.search(r"^at 3 of \d+ points: the step hides 2 %$", err, re.MULTILINE)
+    _, text, _ = gfor(case, *arguments, "a1.gain=1,2", "--json")
+    (scenario,) = json.loads(text)["scenarios"]
+    assert scenario["warnings"] == [{"values": {"a1.gain": 2.0}, "warnings": ["the step hides 2 %"]}]
+    with xr.open_dataset(out / "sweep.nc") as data:
+        assert data["warnings"].values[0].tolist() == ["", "the step hides 2 %"]
+    with (out / "sweep.csv").open(encoding="utf-8") as file:
+        assert {row["warnings"] for row in csv.DictReader(file)} == {"", "the step hides 2 %"}
+    _, text, _ = gfor(case, *arguments, "a1.gain=1,2")
+    assert re.search(r"not known: .*: 1 of 2 points have no verdict, 1 are stable, 0 are unstable", text)
