@@ -5,6 +5,7 @@ A question is a warning: the case runs. It is answered by the key ``meant`` of t
 """
 
 import fnmatch
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -27,6 +28,9 @@ from orchestrator.fmi.port import BoundDescription
 
 _FAR = 3
 """A value that is beyond its range by less than this factor may be a slip, but not one of a thousand."""
+
+_FULL = 1.05
+"""Apparent power [pu of the rating] above which a converter's operating point is questioned."""
 
 _SHOWN = 3
 """Components that a question names; the others are counted."""
@@ -77,6 +81,27 @@ def _doubts(draft: Draft) -> Iterator[_Doubt]:
     yield from _lines(draft)
 
 
+def question_loading(draft: Draft) -> None:
+    """Ask about converters whose operating point, of the power flow where there is one, exceeds their rating."""
+    asked = {question.place for question in draft.questions}  # of a rating that is questioned already, that is enough
+    draft.questions += _merged([d for d in _overloaded(draft) if not _is_meant(draft, d.name) and d.place not in asked])
+
+
+def _overloaded(draft: Draft) -> Iterator[_Doubt]:
+    for name, plan in draft.system.components.items():
+        P, Q, S_n = (_value(plan, v) for v in ("P_0", "Q_0", "S_n"))
+        machine = any(variable.startswith("machine.") for variable in plan.description.variables)
+        if machine or P is None or Q is None or S_n is None or any(_unit(plan, v) != "pu" for v in ("P_0", "Q_0")):
+            continue
+        apparent = math.hypot(P, Q)
+        if apparent > _FULL:
+            text = (
+                f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
+                f"S_n = {S_n:g} MVA, more than the rating of the converter"
+            )
+            yield _Doubt(f"{name}.S_n", _place(draft, name, "S_n"), text)
+
+
 # -- one value ---------------------------------------------------------------------------------------
 
 
@@ -88,11 +113,11 @@ def _outside(
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
     slip = ""
     for factor, text, far in (
-        (1e-3, "too large", value > _FAR * wanted.high),
-        (1e3, "too small", value < wanted.low / _FAR),
+        (1e-3, f"{value / wanted.high:.3g} times too large", value > _FAR * wanted.high),
+        (1e3, f"{wanted.low / value if value else 0:.3g} times too small", value < wanted.low / _FAR),
     ):
         if far and wanted.low <= value * factor <= wanted.high:
-            slip = f"; it looks 1000 times {text}: check its unit and base"
+            slip = f"; it is {text}, and usual by a factor of 1000: check its unit and base"
     text = f"{variable} = {value:g}{unit} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
 

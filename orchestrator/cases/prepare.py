@@ -17,7 +17,7 @@ from orchestrator.cases.layers import value_layers
 from orchestrator.cases.native import is_native
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.plausibility import check_plausibility
+from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import ComponentTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
@@ -132,6 +132,7 @@ class Preparer:
         check_inputs(draft)
         check_plausibility(draft)
         flow = None if draft.problems else self._power_flow()
+        question_loading(draft)
         clock = self._clock(step_size)
         if clock is not None:
             tell_step(draft.system, clock.step_size)

@@ -111,7 +111,7 @@ def test_an_inertia_constant_outside_of_its_range_is_questioned_with_its_line(qu
     (question,) = questions(("machine.H = 6.5", f"machine.H = {value}"))
     assert question.startswith(f"line {H_LINE}, components.sg.parameters.machine.H: sg: machine.H = {value:g} s")
     assert "0.5 to 15 s" in question
-    assert ("1000 times too large" in question) == (value == 6500)
+    assert ("433 times too large, and usual by a factor of 1000" in question) == (value == 6500)
 
 
 @pytest.mark.parametrize(
@@ -291,3 +291,23 @@ def test_data_that_no_machine_can_have_are_refused_with_their_line(questions, li
 @pytest.mark.parametrize("line", ["machine.X_q1 = 2.046", "machine.X_q2 = 0.573", "machine.X_d2 = 0.34"])
 def test_a_machine_without_some_winding_is_data_like_any_other(questions, line):
     assert questions(machine(line)) == []
+
+
+def test_the_factor_by_which_a_value_is_too_large_is_its_own(questions):
+    (question,) = questions(("droop.R_f = 0.05", "droop.R_f = 2"))
+    assert "it is 6.67 times too large, and usual by a factor of 1000: check its unit and base" in question
+
+
+@pytest.mark.parametrize(("power", "asked"), [("0.8", None), ("1.3", "1.3")])
+def test_a_converter_that_is_loaded_beyond_its_rating_is_questioned(questions, power, asked):
+    found = questions(("P_0 = 0.8", f"P_0 = {power}"))
+    assert bool(found) == bool(asked)
+    if asked:
+        (question,) = found
+        assert question.startswith(
+            f"line {S_N_LINE}, components.vsc.parameters.S_n: vsc: the operating point, P_0 = 1.3"
+        )
+        assert "more than the rating of the converter" in question
+        assert (
+            questions(("P_0 = 0.8", f"P_0 = {power}"), ('name = "plausible"', 'name = "p"\nmeant = ["vsc.S_n"]')) == []
+        )
