@@ -66,9 +66,8 @@ def identify_modes(
     AnalysisError
         If the signal is shorter than 20 samples or constant.
     """
-    step = times[1] - times[0] if len(times) > 1 else 0.0
-    thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
-    y, interval = signal[::thin], step * thin
+    thin, interval = _thinned(times, highest_hz)
+    y = signal[::thin]
     if len(y) < _MIN_SAMPLES or np.ptp(y) == 0:
         what = "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
         raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
@@ -88,6 +87,18 @@ def identify_modes(
         if mu.imag >= 0 and abs(mu) > 1e-6
     ]
     return sorted(modes, key=lambda m: -m.amplitude)
+
+
+def _thinned(times: NDArray[np.float64], highest_hz: float) -> tuple[int, float]:
+    """Every how many samples are used, and how far apart they are [s]."""
+    step = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
+    return thin, step * thin
+
+
+def interval_used(times: NDArray[np.float64], highest_hz: float = 10.0) -> float:
+    """Time between the samples that `identify_modes` uses [s]; what swings faster than half its inverse is aliased."""
+    return _thinned(times, highest_hz)[1]
 
 
 def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:

@@ -2,13 +2,14 @@
 
 import argparse
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
-from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.cli.terminal import make_console
+from orchestrator.analysis.identification import IdentifiedMode, interval_used
+from orchestrator.cli.terminal import make_console, make_errors
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import open_trajectory, recorded, strongest_modes
 
@@ -26,8 +27,12 @@ def run(options: argparse.Namespace) -> int:
     """Write a recorded signal as a sum of modes."""
     curve = recorded(open_trajectory(options.run), options.signal, str(options.run))
     modes = strongest_modes(curve, options.start, options.stop)
+    interval = interval_used(curve["time"].sel(time=slice(options.start, options.stop)).values)
+    remarks = list(_remarks(modes, interval))
     if options.json:
         print(json.dumps([mode_json(m) for m in modes], indent=1))
+        for text in remarks:
+            make_errors().print(text, soft_wrap=True, highlight=False)
         return 0
     end = options.stop if options.stop is not None else float(curve["time"][-1])
     title = f"{options.signal} from {options.start:g} to {end:g} s (matrix pencil), strongest first"
@@ -37,8 +42,26 @@ def run(options: argparse.Namespace) -> int:
     for m in modes:
         value = f"{m.eigenvalue.real:+.4f} ± j{abs(m.eigenvalue.imag):.4f}"
         table.add_row(value, f"{m.frequency_hz:.4f}", f"{m.damping_percent:.2f}", f"{m.amplitude:.3g}")
-    make_console().print(table)
+    console = make_console()
+    console.print(table)
+    for text in remarks:
+        console.print(text, soft_wrap=True, highlight=False)
     return 0
+
+
+def _remarks(modes: Sequence[IdentifiedMode], interval: float) -> Iterator[str]:
+    """Up to which frequency samples so far apart [s] can show anything, and which modes are near it."""
+    highest = 0.5 / interval
+    yield (
+        f"The samples used, every {interval:g} s, show nothing above {highest:.4g} Hz: "
+        "a faster oscillation appears as a slower one."
+    )
+    near = [f"{m.frequency_hz:.4g} Hz" for m in modes if m.frequency_hz > highest / 2]
+    if near:
+        yield (
+            f"Above a quarter of the sampling frequency of {1 / interval:.4g} Hz, and perhaps no frequency of the "
+            f"system: {', '.join(near)}. Record more often (solver.record_interval) to be sure."
+        )
 
 
 def mode_json(mode: IdentifiedMode | None) -> dict[str, Any] | None:

@@ -1,12 +1,12 @@
 """A run: the modes of a scenario, its response to the events, what links the two, and what went wrong in it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import xarray as xr
 
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used, nearest
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.state_access import obstacle
@@ -22,6 +22,9 @@ from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 from orchestrator.watch.finding import UNSTABLE, Finding
 from orchestrator.watch.watch import Watch
+
+_COARSEST = 0.25
+"""Record interval [periods of the mode] up to which a ring-down is shown."""
 
 STEPS = (0.5, 1.0, 2.0, 5.0)
 """Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""
@@ -114,7 +117,9 @@ def run_scenario(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"interrupted at t = {master.time:.6g} s")
     dataset = trajectory_dataset(watch.recorder, prepared)
-    ring_down = None if failure else _ring_down(modes, dataset)
+    ring_down, why_none = (None, "") if failure else _ring_down(modes, dataset)
+    if why_none:
+        modes = replace(modes, warnings=(*modes.warnings, why_none))
     return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, watch.findings(failure))
 
 
@@ -137,16 +142,24 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
     return shifts
 
 
-def _ring_down(modes: ModesResult, dataset: xr.Dataset) -> IdentifiedMode | None:
+def _ring_down(modes: ModesResult, dataset: xr.Dataset) -> tuple[IdentifiedMode | None, str]:
+    """The case's first mode as the simulated response shows it; else None and why, where that is to be said."""
     table, mode = modes.prepared.case.table.analysis.ring_down, modes.electromechanical
-    if table is None or mode is None:
-        return None
-    recorded = signal(dataset, table.signal)
-    if recorded is None:
-        return None
+    recorded = None if table is None else signal(dataset, table.signal)
+    if table is None or mode is None or recorded is None:
+        return None, ""
     window = recorded.sel(time=slice(table.start, None))
+    interval, times = 0.0, window["time"].values
+    if len(times) > 1:
+        interval = interval_used(times)
+    if interval * mode.frequency_hz > _COARSEST:
+        return None, (
+            f"no ring-down is shown: {table.signal} is known every {interval:g} s, more than a quarter of the period "
+            f"of {1 / mode.frequency_hz:.3g} s of the mode at {mode.frequency_hz:.4g} Hz, which it would show at "
+            "another frequency; make solver.record_interval shorter"
+        )
     try:
-        found = identify_modes(window["time"].values, window.values)
+        found = identify_modes(times, window.values)
     except AnalysisError:
-        return None
-    return nearest(found, mode.eigenvalue)
+        return None, ""
+    return nearest(found, mode.eigenvalue), ""

@@ -1,12 +1,14 @@
 """``gfor compare`` and ``gfor identify`` on recorded runs."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from orchestrator.cli import main
+from orchestrator.study.run import _ring_down
 
 TIMES = np.arange(0, 15, 0.01)
 
@@ -64,3 +66,33 @@ def test_the_modes_of_a_signal(runs, capsys):
 def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
     assert main([a.replace("{0}", str(runs[0])) for a in arguments]) in (1, 2)
     assert word in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("interval", "near"), [(0.01, False), (1.0, True)])
+def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, near):
+    """0.5733 Hz, recorded every second, appears at 0.4267 Hz."""
+    run = str(save(tmp_path / "run", complex(-0.02, 2 * np.pi * 0.5733), times=np.arange(0, 100, interval)))
+    assert main(["identify", run, "a.omega"]) == 0
+    out = capsys.readouterr().out
+    assert ("0.4267" in out) == near
+    assert ("show nothing above 0.5 Hz" in out) == near
+    assert "show nothing above" in out
+    assert ("Above a quarter of the sampling frequency of 1 Hz" in out) == near
+    assert main(["identify", run, "a.omega", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert isinstance(json.loads(captured.out), list)
+    assert "show nothing above" in captured.err
+
+
+@pytest.mark.parametrize(("interval", "shown"), [(0.4, True), (0.45, False), (1.0, False)])
+def test_a_ring_down_that_is_recorded_too_coarsely_is_left_out(tmp_path, interval, shown):
+    value = complex(-0.02, 2 * np.pi * 0.5733)
+    folder = save(tmp_path / "run", value, times=np.arange(0, 100, interval))
+    ring_down = SimpleNamespace(signal="a.omega", start=2.0)
+    case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(ring_down=ring_down)))
+    prepared = SimpleNamespace(case=case)
+    modes = SimpleNamespace(prepared=prepared, electromechanical=SimpleNamespace(eigenvalue=value, frequency_hz=0.5733))
+    with xr.open_dataset(folder / "trajectory.nc", engine="scipy") as data:
+        seen, why = _ring_down(modes, data)
+    assert (seen is not None, "no ring-down is shown: a.omega is known every" in why) == (shown, not shown)
+    assert seen is None or seen.frequency_hz == pytest.approx(0.5733, abs=1e-3)
