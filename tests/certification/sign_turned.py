@@ -2,7 +2,8 @@
 
 The converter itself takes no negative gain. ``python -m tests.certification.sign_turned FOLDER`` writes
 ``gfor_pod_p_turned.fmu`` and ``gfor_pod_q_turned.fmu``; ``gfor certify`` on them with ``--pod p`` or ``--pod q`` gives
-the README's rows "sign turned", with ``--set pod_p.K=2000`` or ``--set pod_q.K=2000`` those of the tenfold gain.
+the rows "sign turned" of the page on the damping test, with ``--set pod_p.K=2000`` or ``--set pod_q.K=2000`` those of
+the tenfold gain.
 """
 
 import shutil

@@ -1,10 +1,10 @@
-"""``pytest tests/interop --write-table`` writes the README's table of masters from what it measures."""
+"""``pytest tests/interop --write-table`` writes the pages' table of masters from what it measures."""
 
 import pytest
 
 
 def pytest_addoption(parser):
-    parser.addoption("--write-table", action="store_true", help="write the README's table of masters")
+    parser.addoption("--write-table", action="store_true", help="write the pages' table of masters")
 
 
 @pytest.fixture(scope="session")

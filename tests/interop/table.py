@@ -1,4 +1,4 @@
-"""The README's table of masters, written from what was measured."""
+"""The table of masters on the page of validation, written from what was measured."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ from orchestrator.interop.rules import MasterRules
 from tests.interop.measurement import Outcome
 from tests.interop.systems import KINDS, SYSTEMS
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / ".docs" / "validation" / "interoperability.md"
 BEGIN, END = "<!-- interop -->", "<!-- /interop -->"
 LIMIT = 1e-9
 PRELOAD = {"ecos_executable": "libpython for Python-backed FMUs, nothing for native ones"}
@@ -67,15 +67,15 @@ def _verdict(cell: str) -> str:
         return cell
 
 
-def in_readme() -> str | None:
+def on_page() -> str | None:
     """The table that stands there."""
-    found = re.search(f"{re.escape(BEGIN)}\n(.*?)\n{re.escape(END)}", README.read_text(encoding="utf-8"), re.DOTALL)
+    found = re.search(f"{re.escape(BEGIN)}\n(.*?)\n{re.escape(END)}", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     return found.group(1) if found else None
 
 
 def write(results: Results) -> None:
-    """Put a new table between the README's markers."""
-    text = README.read_text(encoding="utf-8")
+    """Put a new table between the page's markers."""
+    text = PAGE.read_text(encoding="utf-8")
     before, _, rest = text.partition(BEGIN)
     after = rest.partition(END)[2]
-    README.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{after}", encoding="utf-8")
+    PAGE.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{after}", encoding="utf-8")

@@ -36,8 +36,8 @@ def test_every_master_says_where_its_rules_are_from():
     assert all(name == rules.name for name, rules in MASTERS.items())
 
 
-def test_the_readme_lists_every_master_with_its_schedule():
-    shown = table.in_readme()
+def test_the_page_lists_every_master_with_its_schedule():
+    shown = table.on_page()
     rows = {title: cells[0] for title, cells in table.verdicts(shown).items()}
     assert rows == {rules.title: table.in_short(rules) for rules in MASTERS.values()}
 

@@ -53,7 +53,7 @@ def test_a_host_that_is_not_python_needs_a_preload_for_python_backed_fmus(tmp_pa
         measure("ecos_executable", "Python-backed", tmp_path, preload=False)
 
 
-def test_the_readme_has_the_rows_and_verdicts_that_were_measured(results, write_table):
+def test_the_page_has_the_rows_and_verdicts_that_were_measured(results, write_table):
     """The last of this file: it needs what the others measured, and writes it where that is asked for."""
     absent = table.missing(results)
     assert not (absent and write_table), f"no table is written without {', '.join(absent)}"
@@ -61,5 +61,5 @@ def test_the_readme_has_the_rows_and_verdicts_that_were_measured(results, write_
         pytest.skip(f"not measured in this session: {'; '.join(absent)}")
     if write_table:
         table.write(results)
-    shown = table.in_readme()
+    shown = table.on_page()
     assert table.verdicts(shown) == table.verdicts(table.table(results))

@@ -1,4 +1,4 @@
-"""What terminal, page and README show, cell by cell against the figures that programs read."""
+"""What terminal, report and pages show, cell by cell against the figures that programs read."""
 
 import csv
 import json
@@ -13,7 +13,8 @@ from orchestrator.cli import main
 from tests.support.printed import eigenvalue, in_markdown, on_page, on_terminal, value
 
 SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
+VALIDATION = ROOT / ".docs" / "validation"
 
 
 @pytest.fixture(scope="module")
@@ -222,15 +223,27 @@ def test_the_file_of_modes_has_the_summarys_figures(studied, summary):
             assert float(row[heading]) == pytest.approx(mode[key], rel=1e-5), heading
 
 
-# -- the README ---------------------------------------------------------------------------------
+# -- README and pages of validation ----------------------------------------------------------------
 
 NAMES = {"Base (only SG)": "base", "SG + GFOR": "gfor", "POD-P": "pod_p", "POD-Q": "pod_q", "POD-PQ": "pod_pq"}
 
 
+def on_page_of(name):
+    """Tables of a page of validation."""
+    return in_markdown((VALIDATION / f"{name}.md").read_text(encoding="utf-8"))
+
+
+def test_the_readme_shows_the_page_of_validations_figures():
+    """The paper's and our values without saturation, row by row."""
+    (short,) = [t for t in in_markdown((ROOT / "README.md").read_text(encoding="utf-8")) if "here: λ" in str(t[0])]
+    (rows,) = [t for t in on_page_of("two-area") if "no saturation (default)" in t[0]]
+    assert short[1:] == [row[:5] for row in rows[2:]]
+
+
 @pytest.mark.parametrize(("saturated", "first"), [(False, 3), (True, 5)])
-def test_the_readmes_first_table(gfor, saturated, first):
+def test_the_table_of_the_paper(gfor, saturated, first):
     """λ and ξ of all scenarios, in the columns without and with saturation."""
-    (rows,) = [t for t in in_markdown(README.read_text(encoding="utf-8")) if "no saturation (default)" in t[0]]
+    (rows,) = [t for t in on_page_of("two-area") if "no saturation (default)" in t[0]]
     on = [f"--set={unit}.machine.saturation=true" for unit in ("sg1", "sg2")] if saturated else []
     code, out, _ = gfor("modes", "two_area", *on, "--json")
     assert code == 0
@@ -243,9 +256,9 @@ def test_the_readmes_first_table(gfor, saturated, first):
         assert value(row[first + 1]) == pytest.approx(mode["damping_percent"], abs=0.5e-2 * 1.001)
 
 
-def test_the_readmes_table_of_steps(studied):
+def test_the_table_of_steps(studied):
     """|Δλ| in 10⁻³ rad/s; the rows of the base case, which is run here."""
-    (rows,) = [t for t in in_markdown(README.read_text(encoding="utf-8")) if t[0][:2] == ["Scenario", "Schedule"]]
+    (rows,) = [t for t in on_page_of("two-area") if t[0][:2] == ["Scenario", "Schedule"]]
     known = shifts(studied[0])
     base = next(k for k, row in enumerate(rows) if row[0] == "Base")
     for row, schedule in zip(rows[base : base + 2], ("gauss-seidel", "jacobi"), strict=True):
@@ -256,8 +269,8 @@ def test_the_readmes_table_of_steps(studied):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("label", ["POD-P, ΔK = 50", "POD-Q, ΔK = 50", "POD-P, ΔK = 0.1", "POD-Q, ΔK = 0.1"])
-def test_the_readmes_table_of_designs(gfor, label):
-    (rows,) = [t for t in in_markdown(README.read_text(encoding="utf-8")) if "K before its bounds" in t[0]]
+def test_the_table_of_designs(gfor, label):
+    (rows,) = [t for t in on_page_of("pod-design") if "K before its bounds" in t[0]]
     (row,) = [r for r in rows if r[0] == label]
     controller, gain = label.split(", ΔK = ")
     arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json"]

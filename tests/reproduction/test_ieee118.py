@@ -117,7 +117,7 @@ PAPER_GOVERNOR = {
     ("scenario", "frequency", "damping"), [("base", 0.711, 6.06), ("gfor", 0.759, 7.52), ("pod_pq", 0.813, 13.97)]
 )
 def test_the_papers_own_governor_table_does_not_give_its_frequencies(scenario, frequency, damping):
-    """As the README shows it; the paper has 0.67, 0.72 and 0.77 Hz."""
+    """As the page of validation shows it; the paper has 0.67, 0.72 and 0.77 Hz."""
     values = {f"sg*.governor.{name}": value for name, value in PAPER_GOVERNOR.items()}
     result = compute_modes(prepare(scenario, values), (0.3, 1.3))
     mode, reference = result.named["1-2"], result.references["1-2"]

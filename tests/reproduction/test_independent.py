@@ -24,7 +24,7 @@ pytestmark = pytest.mark.reproduction
 FOLDER = Path(__file__).parents[1] / "reference"
 NORM = json.loads((FOLDER / "norm631.json").read_text(encoding="utf-8"))
 TWO_AREA = json.loads((FOLDER / "two_area.json").read_text(encoding="utf-8"))["independent"]
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+VALIDATION = Path(__file__).parents[2] / ".docs" / "validation"
 
 
 # -- the computation itself --------------------------------------------------------------------------
@@ -220,7 +220,7 @@ def test_the_grid_codes_figures_are_the_fmus_at_every_reactance(converter):
         check_grid_code(converter, X_L)
 
 
-# -- the README's figures ------------------------------------------------------------------------------
+# -- the pages' figures --------------------------------------------------------------------------------
 
 
 def least_damped(rows):
@@ -233,7 +233,7 @@ def least_damped(rows):
     return min(found)
 
 
-README_ROWS = {
+PAGE_ROWS = {
     "none (the base system with PSS2A)": "base",
     "ours, no POD": "gfor",
     "POD-P": "pod_p",
@@ -247,13 +247,13 @@ README_ROWS = {
 }
 
 
-@pytest.mark.parametrize("label", README_ROWS)
-def test_the_readmes_table_of_the_grid_codes_test(label):
-    table = README.partition("## The grid code's damping test")[2]
+@pytest.mark.parametrize("label", PAGE_ROWS)
+def test_the_table_of_the_grid_codes_test(label):
+    table = (VALIDATION / "damping-test.md").read_text(encoding="utf-8")
     line = next(x for x in table.splitlines() if x.startswith(f"| {label} |"))
     cell = line.split("|")[2].replace("−", "-")
     numbers = [float(x) for x in re.findall(r"-?\d+\.?\d*", cell)]
-    rows = [row for row in NORM["figures"] if row["converter"] == README_ROWS[label]]
+    rows = [row for row in NORM["figures"] if row["converter"] == PAGE_ROWS[label]]
     damping, frequency, X_L = least_damped(rows)
     assert len(rows) == 13
     assert numbers[0] == pytest.approx(damping, abs=0.1)  # the step map's, to three digits
@@ -261,7 +261,7 @@ def test_the_readmes_table_of_the_grid_codes_test(label):
     assert len(numbers) == 2 or numbers[1] == pytest.approx(frequency, abs=0.002)
 
 
-def test_what_the_readme_says_beside_the_table():
+def test_what_the_page_says_beside_the_table():
     def growing(converter):
         return [r["X_L"] for r in NORM["figures"] if r["converter"] == converter and r["growth"] > 1e-3]
 
@@ -297,8 +297,8 @@ SATURATION_TABLE = {
 
 @pytest.mark.parametrize("scenario", SATURATION_TABLE)
 @pytest.mark.parametrize("saturation", [False, True])
-def test_the_readmes_table_of_the_paper(scenario, saturation):
-    section = README.partition("## Does it reproduce the paper?")[2]
+def test_the_table_of_the_paper(scenario, saturation):
+    section = (VALIDATION / "two-area.md").read_text(encoding="utf-8")
     line = next(x for x in section.splitlines() if x.startswith(f"| {SATURATION_TABLE[scenario]} |"))
     cells = [c.replace("−", "-") for c in line.split("|")[4 + 2 * saturation : 6 + 2 * saturation]]
     real, imag = (float(x) for x in re.findall(r"-?\d+\.\d+", cells[0]))

@@ -1,9 +1,12 @@
-"""Reference trajectories of the FMU folders, integrated without any FMU: ``python -m tests.support.make_references``.
+"""Reference trajectories of the FMU folders, integrated without any FMU.
+
+``python -m tests.support.make_references [MODEL …]`` writes them, all or those of the models that are named.
 
 The models' CasADi equations are integrated by SciPy's Radau method (rtol 1e-10, atol 1e-12), from their
 steady state, with inputs that step once.
 """
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -97,11 +100,13 @@ def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
     return ["time", *(v.name for v in model.inputs), *reference.outputs], np.array(rows)
 
 
-def main() -> None:
+def main(models: list[str]) -> None:
     for reference in REFERENCES:
+        if models and reference.model not in models:
+            continue
         columns, rows = integrate(reference)
         np.savetxt(reference.path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

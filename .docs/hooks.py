@@ -1,0 +1,108 @@
+"""Hooks of MkDocs: every page is a file of the repository, and links between files become links between pages.
+
+Pages are the Markdown files of this folder, the README and the packages' own leaflets. They stay where they are, and
+their links are those that work in the repository. A link to a file that is no page (a case file, a module) becomes the
+file's path.
+"""
+
+import argparse
+import logging
+import posixpath
+import re
+from importlib import import_module
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).resolve().parents[1]
+LOG = logging.getLogger("mkdocs.hooks.gfor")
+FOLDERS = (".docs", "gfor_fmu", "fmus", "orchestrator", "tests")
+LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+FENCE = re.compile(r"^\s*(```|~~~)")
+NUMBERED = re.compile(r"\d+\. ")
+"""An item of a list. Python-Markdown wants a blank line before it, and its further lines indented by four places."""
+FILE_MARK = re.compile(r"<!-- (file|append|after|replace): ([^ ]+?)(?: \| .*?)? -->\n```(\w+)\n")
+
+
+def repository_pages() -> dict[str, str]:
+    """Path in the repository → path on the site, of every page and picture."""
+    found = {"README.md": "index.md"}
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in (".md", ".png") and "/." not in path.relative_to(ROOT / folder).as_posix():
+                name = path.relative_to(ROOT).as_posix()
+                found[name] = name.removeprefix(".docs/")
+    return found
+
+
+PAGES = repository_pages()
+ORIGIN = {site: name for name, site in PAGES.items()}
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add all pages, wherever they are in the repository."""
+    for name, site in PAGES.items():
+        files.append(File.generated(config, site, abs_src_path=str(ROOT / name)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Turn links of the repository into links of the site, and fill in what is generated."""
+    name = ORIGIN[page.file.src_uri]
+    text = markdown.replace("```sh first-run", "```sh").replace("<!-- commands -->", commands())
+    text = FILE_MARK.sub(lambda found: f'```{found[3]} title="{found[2]}"\n', text)
+    inside, listed, lines = False, False, []
+    for line in text.splitlines():
+        if NUMBERED.match(line) and listed and lines[-1].strip():
+            lines.append("")
+        listed = bool(NUMBERED.match(line)) or (listed and line[:1] in ("", " "))
+        if FENCE.match(line):
+            inside = not inside
+        shown = line if inside else LINK.sub(lambda found: _link(found, name, page.file.src_uri), line)
+        lines.append(f" {shown}" if listed and line.startswith("   ") else shown)
+    return "\n".join(lines)
+
+
+def _link(found: re.Match[str], name: str, site: str) -> str:
+    picture, text, target = found.groups()
+    if re.match(r"[a-z]+:|#", target):
+        return found.group()
+    path, _, anchor = target.partition("#")
+    wanted = posixpath.normpath(posixpath.join(posixpath.dirname(name), path))
+    if not (ROOT / wanted).exists():
+        LOG.warning("%s: the link to %s leads nowhere", name, target)
+        return found.group()
+    if wanted in PAGES:
+        relative = posixpath.relpath(PAGES[wanted], posixpath.dirname(site) or ".")
+        return f"{picture}[{text}]({relative}{'#' if anchor else ''}{anchor})"
+    return text if wanted in text or Path(wanted).name in text else f"{text} (`{wanted}`)"
+
+
+def commands() -> str:
+    """The reference of all commands, from their argument parsers."""
+    from orchestrator.cli import COMMANDS  # noqa: PLC0415 - only the page of commands needs the package
+
+    return "\n\n".join(_command(name, words) for name, words in COMMANDS.items())
+
+
+def _command(name: str, words: str) -> str:
+    parser = argparse.ArgumentParser(prog=f"gfor {name}", formatter_class=_formatter)
+    import_module(f"orchestrator.cli.{name.replace('-', '_')}").add_arguments(parser)
+    rows = ["| Argument | Meaning |", "|---|---|"]
+    for action in parser._actions:
+        shown = ", ".join(action.option_strings) or str(action.metavar or action.dest)
+        if action.option_strings and action.nargs != 0:
+            value = action.metavar or (
+                "{" + ",".join(map(str, action.choices)) + "}" if action.choices else action.dest
+            )
+            shown += f" {value}"
+        text = (action.help or "").replace("%%", "%").replace("|", "\\|").replace("<", "&lt;")
+        rows.append(f"| `{shown.replace('|', '/')}` | {text} |")
+    usage = parser.format_usage().removeprefix("usage: ").rstrip()
+    return f"## `gfor {name}`\n\n{words[0].upper()}{words[1:]}.\n\n```text\n{usage}\n```\n\n" + "\n".join(rows)
+
+
+def _formatter(prog: str) -> argparse.HelpFormatter:
+    return argparse.HelpFormatter(prog, width=100)

@@ -1,0 +1,119 @@
+"""The pages of the site as files of the repository: their fenced blocks, links and headings.
+
+A comment on the line before a fence says what a test does with the block:
+
+``<!-- not run: REASON -->``
+    it is only parsed.
+``<!-- file: PATH -->``
+    it is the whole text of a file that a guide writes.
+``<!-- append: PATH -->``
+    it is appended to a file.
+``<!-- after: PATH | TEXT -->``
+    it is inserted after the first line that holds TEXT.
+``<!-- replace: PATH | TEXT -->``
+    it stands in place of the first line that holds TEXT.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = (".docs", "gfor_fmu", "fmus", "orchestrator", "tests")
+_FENCE = re.compile(r"^(?P<indent> *)```(?P<info>.*)$")
+_MARK = re.compile(r"^ *<!-- (?P<kind>not run|file|append|after|replace): (?P<rest>.*) -->$")
+_LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^)\s]+)\)")
+
+
+def pages() -> list[Path]:
+    """README, changelog, pages of the site, leaflets of the packages."""
+    found = [ROOT / "README.md", ROOT / "CHANGELOG.md"]
+    for folder in FOLDERS:
+        found += sorted(p for p in (ROOT / folder).rglob("*.md") if "/." not in p.relative_to(ROOT / folder).as_posix())
+    return found
+
+
+def name_of(page: Path) -> str:
+    """Path in the repository."""
+    return page.relative_to(ROOT).as_posix()
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block.
+
+    Attributes
+    ----------
+    line
+        Of its first fence.
+    language
+        The first word behind it.
+    kind, path, text_of_line
+        Of the comment before it; empty where there is none.
+    """
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    kind: str = ""
+    path: str = ""
+    text_of_line: str = ""
+
+    @property
+    def place(self) -> str:
+        return f"{name_of(self.page)}:{self.line}"
+
+
+def blocks(page: Path) -> list[Block]:
+    """All fenced blocks of a page, in order."""
+    found, lines = [], page.read_text(encoding="utf-8").splitlines()
+    k = 0
+    while k < len(lines):
+        opened = _FENCE.match(lines[k])
+        if opened is None:
+            k += 1
+            continue
+        end = next(j for j in range(k + 1, len(lines)) if lines[j].strip() == "```")
+        inside = [line.removeprefix(opened["indent"]) for line in lines[k + 1 : end]]
+        mark = _MARK.match(lines[k - 1]) if k else None
+        kind, rest = (mark["kind"], mark["rest"]) if mark else ("", "")
+        path, _, text = ("", "", rest) if kind == "not run" else rest.partition(" | ")
+        language = (opened["info"].split() or [""])[0]
+        found.append(Block(page, k + 1, language, "".join(f"{line}\n" for line in inside), kind, path, text))
+        k = end + 1
+    return found
+
+
+def prose(page: Path) -> list[str]:
+    """Lines outside of fenced blocks; inside they are empty."""
+    inside, lines = False, []
+    for line in page.read_text(encoding="utf-8").splitlines():
+        fence = line.strip().startswith("```")
+        lines.append("" if inside or fence else line)
+        inside ^= fence
+    return lines
+
+
+def links(page: Path) -> list[tuple[int, str]]:
+    """Line and target of every link outside of fenced blocks."""
+    return [(k, target) for k, line in enumerate(prose(page), start=1) for target in _LINK.findall(line)]
+
+
+def anchors(page: Path) -> set[str]:
+    """What links can point at: headings, as GitHub and the site name them."""
+    found: set[str] = set()
+    for line in prose(page):
+        if heading := re.match(r"#+ +(.*)", line):
+            text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1]).strip().lower()
+            found.add(re.sub(r"[^\w\- ]", "", text).replace(" ", "-"))
+    return found
+
+
+def commands(block: Block) -> list[str]:
+    """The single commands of a shell block: without comments, and parted at ``&&``."""
+    found = []
+    for line in block.text.replace("\\\n", " ").splitlines():
+        text = re.sub(r"(^|\s)#.*", "", line).strip()
+        found += [part.strip() for part in text.split("&&") if part.strip()]
+    return found
