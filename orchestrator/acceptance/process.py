@@ -304,7 +304,7 @@ class FmuProcess:
 
 
 class HostedComponent(Component):
-    """An instance in an `FmuProcess`, used as any other; numbers that are none come through."""
+    """An instance in an `FmuProcess`, used as any other; NaN and infinite values are passed on."""
 
     def __init__(self, name: str, process: FmuProcess) -> None:
         self.name, self.description, self._process = name, process.description, process

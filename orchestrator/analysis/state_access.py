@@ -12,7 +12,7 @@ _MEASURE = (
 
 
 def obstacle(component: Component) -> str | None:
-    """Why a component can neither be perturbed and put back, nor has a linear model inside; None where it can."""
+    """The reason why a component can neither be perturbed nor brings a linear model; None if it can be linearised."""
     description = component.description
     if not description.can_save_state:
         return (

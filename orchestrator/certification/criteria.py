@@ -24,7 +24,7 @@ LEAST_DAMPING = 0.05
 """Damping ratio that a judged mode needs."""
 
 LEAST_AMPLITUDE = 0.01
-"""Components of a signal smaller than this part of its largest oscillating one are taken for what fits the rest."""
+"""Components below this fraction of a signal's largest oscillation are ignored: they fit its remainder."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,7 +109,7 @@ class PointResult:
 
     @property
     def lasting(self) -> bool:
-        """A failure is none: what was missing, a licence for one, may be there next time."""
+        """Failed points are not kept: the cause, such as a missing licence, may be gone next time."""
         return self.failure is None
 
     @classmethod

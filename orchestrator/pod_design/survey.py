@@ -29,7 +29,7 @@ _TURNS, _CENTRES, _GAINS = 17, 7, 10
 _POLISHED = 3
 _EVALUATIONS = 150
 _UNMOVED = 0.02
-"""A mode nearer than this part of its size to where it was without the controller is no concern of it."""
+"""A mode that the controller moves by less than this fraction of its size is left out of the judgement."""
 _HOPELESS = 1.0
 
 

@@ -17,7 +17,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 class PointStore:
-    """A folder with one small file for each point; what is not whole is not there."""
+    """A folder with one small file for each point. An incomplete file counts as missing."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -60,7 +60,7 @@ class Result:
     whose: Whose = Whose.NOBODY
 
     def as_dict(self) -> dict[str, Any]:
-        """As JSON has it, which knows no numbers that are none."""
+        """Plain values for JSON; NaN and infinities become text."""
         return {**asdict(self), "figures": _plain(self.figures)}
 
     @classmethod

@@ -53,7 +53,7 @@ def _answer(subject: Subject, deviation: Numbers) -> str:
 
 @check("extreme_inputs", "Does it give numbers, or an error, where its inputs are extreme?")
 def extreme_inputs(subject: Subject) -> Result:
-    """Inputs far out, each alone and all together; numbers that are none need an error to go with them."""
+    """Inputs far out, each alone and all together; a NaN or infinite output needs an error from the call."""
     if not subject.inputs:
         return not_applicable("extreme_inputs", "because there are no Real inputs")
     wild: list[str] = []

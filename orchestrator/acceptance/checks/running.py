@@ -30,7 +30,7 @@ EQUAL = 1e-10
 """Relative difference up to which two runs are equal."""
 
 
-@check("runs", "Does it run, without crash, hang, exit or numbers that are none?")
+@check("runs", "Does it run without crash, hang, exit, NaN or infinite values?")
 def runs(subject: Subject) -> Result:
     """Run to where the file says an experiment ends, at least for a while, and in reason."""
     h, ends = subject.step_size, subject.description.stop_time or 10.0
