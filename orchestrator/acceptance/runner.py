@@ -102,7 +102,7 @@ FILE_CHECKS = {
     "archive": "Can the file be unpacked and read without harm?",
     "binding": "Does the binding fit the file?",
 }
-"""What is asked before there is anything to run."""
+"""Checks that run before the FMU does: of the archive and the binding."""
 
 
 def file_hash(path: Path | None) -> str | None:

@@ -102,7 +102,7 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
 
 
 def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
-    """Why the step map of a component is none: its states do not move in a step, though they should."""
+    """Why a component has no usable step map: its states do not move in a step, though their derivatives say so."""
     for name in foreign:
         c = blocks.components[name]
         rows = np.abs(np.hstack([c.A - np.eye(len(c.A)), c.B])).max(axis=1, initial=0.0) <= _STANDS

@@ -24,7 +24,7 @@ MOVED, LOST = 0.01, 0.1
 """A step that moves a mode by the first part of its size is warned of; one by the second leaves nothing of it."""
 
 SWINGING = 0.5
-"""Damping ratio up to which a mode is compared; what is damped more is no swing."""
+"""Damping ratio up to which a mode is compared; a mode with more damping is no swing."""
 
 SLOW_HZ = 5.0
 """A lost mode below this is refused; faster ones, which only a wide range shows, are warned of."""
@@ -195,7 +195,7 @@ def _nearest(model: LinearModel) -> Callable[[complex], complex]:
 
 
 def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> float | None:
-    """The longest step tried [s] that moves none of the modes and leaves the coupling stable; None if none does."""
+    """The longest step tried [s] that moves no mode and leaves the coupling stable; None if every step fails."""
     exact = list(dict.fromkeys(pair.exact for pair in pairs))
     limit = max(0.0, float(eigenvalues(system).real.max(initial=0.0))) + _GROWTH
     shorter = [step for step in _ADVISED if step <= 0.51 * master.clock.step_size]

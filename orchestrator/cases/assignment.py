@@ -13,7 +13,7 @@ from orchestrator.fmi.description import VariableInfo
 
 
 def assign_values(draft: Draft) -> None:
-    """Give every value to its variable; a later source goes before an earlier one."""
+    """Give every value to its variable; a later source overrides an earlier one."""
     _assign_frequency(draft)
     for name, table in draft.tables.items():
         for group in ("parameters", "inputs"):

@@ -47,7 +47,7 @@ class Case(CaseDefinition):
         scenarios
             Names; all of them where empty.
         overrides
-            Values by ``component.variable`` that go before the file's and the scenario's.
+            Values by ``component.variable`` that override the file's and the scenario's.
         step_size, stop_time
             [s]; the file's where None.
         parameters

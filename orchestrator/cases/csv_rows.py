@@ -39,7 +39,7 @@ def number(row: Row, column: str) -> float:
     Raises
     ------
     InputError
-        If there is none.
+        If the column holds no number.
     """
     try:
         return float(row[column])

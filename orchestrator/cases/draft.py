@@ -1,4 +1,4 @@
-"""A scenario on its way to be ready: the case's tables, what has been made of them, and what is wrong."""
+"""A scenario in preparation: the case's tables, the results of the steps so far, and the problems found."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -50,7 +50,7 @@ class Draft:
     place
         Key path → its text with the line of the file.
     layers
-        Values from parameter files, the scenario and the command line; a later layer goes before an earlier one.
+        Values from parameter files, the scenario and the command line; a later layer overrides an earlier one.
     problems
         All that is wrong so far.
     data

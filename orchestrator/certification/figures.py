@@ -82,7 +82,7 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
 
 
 def number(value: float) -> float | None:
-    """As JSON has it, which knows no NaN."""
+    """Plain values for JSON, which has no NaN."""
     return value if math.isfinite(value) else None
 
 

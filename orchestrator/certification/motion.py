@@ -23,7 +23,7 @@ A mode of 0.1 Hz with 5 % of damping, the slowest and least damped that the norm
 def motion_faults(
     times: Numbers, signals: Mapping[str, Numbers], event_time: float, findings: Sequence[Mapping[str, Any]] = ()
 ) -> Iterator[str]:
-    """Why a response with the converter is none of a system in synchronism that comes to rest.
+    """Why a response with the converter is not accepted: lost synchronism, growth, or swings that last.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def motion_faults(
 
 
 def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -> Iterator[str]:
-    """A swing, from peak to peak, that the last third after the event still has; a straight drift is none."""
+    """A swing, from peak to peak, in the last third after the event, without a straight drift."""
     begin = float(times[-1]) - (float(times[-1]) - event_time) / 3
     first, last = (times >= event_time) & (times <= event_time + SLOWEST_PERIOD), times >= begin
     if last.sum() < 3 or not first.any() or not np.isfinite(signal).all():

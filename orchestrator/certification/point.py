@@ -126,7 +126,7 @@ class PointResult:
 
     @classmethod
     def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The result that was stored so; None if this is none."""
+        """The result that was stored in this form; None if the file has another form."""
         try:
             names, times = header.pop("names"), arrays.pop("times")
             recorded = [name for name in arrays if name.startswith(_SIGNAL)]

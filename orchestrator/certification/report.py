@@ -131,7 +131,7 @@ def _overview(c: Certification) -> str:
 
 
 def _said(v: PointVerdict) -> str:
-    """The verdict of a point, with a word where it is none of the norm's."""
+    """The verdict of a point, with a remark where the norm does not ask for this point."""
     beyond = "" if len(missing_reactances([v.X_L])) < len(missing_reactances([])) else ", beyond the norm's"
     return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
 

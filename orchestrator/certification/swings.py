@@ -25,7 +25,7 @@ SLOWEST_PERIOD = 10.0
 
 
 FASTEST = 5.0
-"""What is faster [Hz] is taken out before a signal is judged: more than three times the fastest judged mode."""
+"""Parts of a signal above this frequency [Hz] are removed before it is judged: over three times the fastest mode."""
 
 
 @dataclass(frozen=True, slots=True)

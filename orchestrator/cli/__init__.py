@@ -24,7 +24,7 @@ COMMANDS = {
     "certify": "the grid code's damping test on a converter FMU",
     "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
     "build": "build FMUs of the catalogue's models",
-    "which-master": "which schedule another tool runs, told by a pair of probe FMUs",
+    "which-master": "which schedule another tool runs, shown by a pair of probe FMUs",
     "bind": "draft a binding: what a foreign FMU's variables mean at our port",
     "check": "acceptance tests of an FMU: can it be trusted in a co-simulation?",
     "info": "show what an FMU declares",

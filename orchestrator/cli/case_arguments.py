@@ -32,7 +32,7 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=Path,
         metavar="FILE",
-        help="values from a parameter file, as `gfor design` writes it (repeatable; --set goes before it)",
+        help="values from a parameter file, as `gfor design` writes it (repeatable; --set overrides it)",
     )
     parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
     parser.add_argument(

@@ -63,7 +63,7 @@ def _add_document_arguments(parser: argparse.ArgumentParser) -> None:
     checks = parser.add_mutually_exclusive_group()
     checks.add_argument("--check", type=Path, metavar="report.json",
                         help="the FMU's acceptance tests by `gfor check --json` (default: they are run)")  # fmt: skip
-    checks.add_argument("--no-check", action="store_true", help="leave the acceptance tests away; the report says so")
+    checks.add_argument("--no-check", action="store_true", help="leave out the acceptance tests; the report says so")
     parser.add_argument(
         "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
     )

@@ -97,5 +97,5 @@ def _print(report: Report) -> None:
 
 
 def _in_one_line(text: str) -> str:
-    """What an FMU says, without what moves a terminal's cursor: it could write lines of its own otherwise."""
+    """An FMU's text with control characters made visible: they could move the cursor and forge lines."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -22,7 +22,7 @@ def compute_points(
     Parameters
     ----------
     study
-        Is given what is to be told how many points are done, of how many.
+        Computes all points; it is given a callback for how many are done, of how many.
     folder
         Keeps the points.
 

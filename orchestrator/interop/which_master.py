@@ -1,4 +1,4 @@
-"""Which schedule a tool runs, told from what the probe pair gave in it."""
+"""Which schedule a tool runs, found from the probe pair's results in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -60,7 +60,7 @@ class Verdict:
 
     @property
     def steps(self) -> int | None:
-        """How many steps were taken until the last row; None where that is not told."""
+        """How many steps were taken until the last row; None where the results do not show it."""
         (early, *others) = self.answers("early_label") or [None]
         return self.last_row + early if isinstance(early, int) and not others else None
 

@@ -7,7 +7,7 @@ from orchestrator.points.executor import Executor, WorkerLostError
 from orchestrator.points.store import Arrays, PointStore
 
 Report = Callable[[int, int], None]
-"""Is told how many points are done, of how many."""
+"""Callback: how many points are done, of how many."""
 
 
 class Keyed(Protocol):
@@ -33,7 +33,7 @@ class Keepable(Protocol):
 
     @classmethod
     def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """What was stored so; None if this is none."""
+        """The result that was stored in this form; None if the file has another form."""
         ...
 
     @classmethod

@@ -13,7 +13,7 @@ Owner = tuple[str, ...]
 """Path of a component or system below the top system; the top system is ()."""
 
 Node = tuple[Owner, str]
-"""A connector, or where there is none a variable, of an owner."""
+"""A connector of an owner, or its variable where it has no such connector."""
 
 _SENDING_INSIDE = ("input", "parameter")
 _SENDING_OUTSIDE = ("output", "calculatedParameter")
@@ -163,7 +163,7 @@ class _Reader:
     # -- values ----------------------------------------------------------------------------------
 
     def _bind(self, element: Element, owner: Owner) -> None:
-        """Give values from the inside out: bindings of an outer system go before those of an inner one."""
+        """Give values from the inside out: bindings of an outer system override those of an inner one."""
         if element.tag == tag("ssd:System"):
             for child, inner in _inside(element, owner):
                 self._bind(child, inner)

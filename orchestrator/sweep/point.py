@@ -95,7 +95,7 @@ class PointRecord:
 
     @classmethod
     def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The record that was stored so; None if this is none."""
+        """The record that was stored in this form; None if the file has another form."""
         try:
             names = tuple(header.pop("names", ()))
             modes = ModeSet(**arrays, names=names) if arrays else None

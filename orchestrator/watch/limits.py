@@ -13,7 +13,7 @@ from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
 LEAST_DURATION = 0.1
-"""A limit that acts for less than this in all [s], as in a short dip, does its work and is not told."""
+"""A limit that acts for less than this in all [s], as in a short dip, works as intended and is not reported."""
 
 AT_LIMIT = 1 - 1e-9
 """From this part of its limit on a signal is at it: what is saturated equals its limit but for the last digits."""

@@ -10,7 +10,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 
 LEAST_PERIODS = 2
-"""An oscillation is told by at least so many of its periods."""
+"""Number of periods that an oscillation needs to be recognised."""
 
 _HIGHEST_HZ = 10.0
 """A signal is thinned for frequencies up to this one, unless it turns more often."""

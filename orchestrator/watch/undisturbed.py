@@ -12,7 +12,7 @@ from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen, is_derivative, unit
 
 LEAST_GROWTH = 1e-6
-"""A growth is told once a signal is this far from its start, as a part of 1 or of the start."""
+"""A growth is reported once a signal is this far from its start, as a part of 1 or of the start."""
 
 LEAST_MOTION = 1e-4
 """The same for a motion that does not grow, such as that of a start that was no steady state."""

@@ -111,7 +111,7 @@ def _failure(error: CosimError | None) -> Sequence[Finding]:
 
 
 def _not_finite(seen: Seen) -> Sequence[Finding]:
-    """Signals that nothing is coupled to, each told once."""
+    """Signals that nothing is coupled to, each once."""
     found = []
     for name, signal in seen.values.items():
         bad = np.flatnonzero(~np.isfinite(signal))

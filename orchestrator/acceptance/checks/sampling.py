@@ -72,7 +72,7 @@ def _sample_time(subject: Subject, step_size: float) -> float | None:
 
 
 def _skipped(subject: Subject, step_size: float) -> float | None:
-    """Time of a single step in which no output moves, between steps in which they do; None where there is none."""
+    """Time of a single step in which no output moves although outputs move before and after it; else None."""
     moved = np.asarray(_changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1))
     idle = np.flatnonzero(~moved[1:-1] & moved[:-2] & moved[2:]) + 1
     if not len(idle) or moved.mean() < _MOST_MOVE:
