@@ -100,3 +100,14 @@ def test_the_readme_lists_every_command():
 def test_the_readme_is_short():
     words = (ROOT / "README.md").read_text(encoding="utf-8").split()
     assert 700 <= len([word for word in words if any(map(str.isalnum, word))]) <= 900
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if any(b.path for b in blocks(p))], ids=name_of)
+def test_lines_that_guides_name_exist(page):
+    """Quickly, where `test_guides.py` takes minutes."""
+    for block in blocks(page):
+        if block.kind in ("after", "replace"):
+            text = (ROOT / block.path).read_text(encoding="utf-8")
+            assert block.text_of_line in text, f"{block.place}: {block.path} has no line with {block.text_of_line!r}"
+        elif block.kind == "append":
+            assert (ROOT / block.path).is_file(), f"{block.place}: there is no {block.path}"
