@@ -56,12 +56,15 @@ class Report:
     ----------
     unlimited
         What could not be limited in the FMU's process, in words.
+    used_as
+        Component, scenario and operating point of the case, in words.
     """
 
     fmu: Path
     binding: Path | None
     results: list[Result] = field(default_factory=list)
     unlimited: tuple[str, ...] = ()
+    used_as: str = ""
 
     @property
     def failures(self) -> list[Result]:
@@ -94,6 +97,7 @@ class Report:
             "faults": self.faults,
             "not_supported": self.not_supported,
             "not_limited": list(self.unlimited),
+            "used_as": self.used_as,
             "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
         }
 
@@ -146,7 +150,7 @@ def check_fmu(
         raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
-    report = Report(fmu, binding)
+    report = Report(fmu, binding, used_as=use.said if use else "")
     try:
         native = read_description(fmu)
         directory = extract(fmu)

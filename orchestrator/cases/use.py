@@ -4,12 +4,16 @@ from pathlib import Path
 
 from orchestrator.acceptance.checks.subject import Point, Use
 from orchestrator.cases.case import Case, load_case
+from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 
-_START = ("P_0", "Q_0", "v_0", "theta_0")
+_START = {"P_0": 0.0, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0}
+"""Names of the start values, and what stands for one that neither the case nor the FMU gives."""
 
 
-def use_in_case(case: str, component: str | None, fmu: Path, step_size: float | None) -> tuple[Use, Path | None]:
+def use_in_case(
+    case: str, component: str | None, fmu: Path, step_size: float | None, scenario: str | None = None
+) -> tuple[Use, Path | None]:
     """Step, operating point and values that a case gives an FMU, and the file of its binding.
 
     Parameters
@@ -18,27 +22,63 @@ def use_in_case(case: str, component: str | None, fmu: Path, step_size: float | 
         Its name; the one component that is that file where None.
     step_size
         Communication step [s]; the case's where None.
+    scenario
+        Its name; the first one that has the component where None.
 
     Raises
     ------
     InputError
-        If no component is that FMU, or the case cannot be prepared.
+        If no component is that FMU, no scenario has it, or the case cannot be prepared.
     """
     loaded = load_case(case)
     name = _component(loaded, component, fmu)
     table = loaded.table.components[name]
-    scenario = next(iter(loaded.scenarios))
-    (prepared,) = loaded.prepare([scenario], step_size=step_size)
+    chosen = _scenario(loaded, name, scenario)
+    (prepared,) = loaded.prepare([chosen], step_size=step_size)
     plan = prepared.system.components[name]
     values = dict(plan.parameters)
     start = {n: float(values.pop(n)) for n in _START if n in values}
-    point = None
-    if len(start) == len(_START):
-        point = Point(start["v_0"], start["theta_0"], start["P_0"], start["Q_0"])
+    origin = f"component {name!r} in scenario {chosen!r} of {loaded.path.name}"
+    point, said = _point(plan, start)
     binding = loaded.directory / table.binding if table.binding else None
     fed = {c.target.variable for c in prepared.system.connections if c.target.component == name}
     inputs = {n: v for n, v in plan.inputs.items() if n not in fed}
-    return Use(prepared.step_size, point, values, inputs), binding
+    return Use(prepared.step_size, point, values, inputs, f"{origin}: {said}"), binding
+
+
+def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[Point | None, str]:
+    """The operating point with defaults for what the case does not give, in words as well."""
+    if not start:
+        return None, "no operating point; the checks take their own"
+    variables = plan.description.variables
+    full, words = {}, []
+    for name, default in _START.items():
+        if name in start:
+            full[name] = start[name]
+        else:
+            declared = variables[name].start if name in variables else None
+            full[name] = default if declared is None else float(declared)
+        words.append(f"{name} = {full[name]:.6g}{'' if name in start else ' (default)'}")
+    return Point(full["v_0"], full["theta_0"], full["P_0"], full["Q_0"]), ", ".join(words)
+
+
+def _scenario(case: Case, component: str, wanted: str | None) -> str:
+    """Name of a scenario that has the component."""
+    having = [name for name, table in case.scenarios.items() if component not in table.remove]
+    known = ", ".join(having) or "none"
+    if wanted is None:
+        if not having:
+            raise InputError(
+                f"{case.path}: every scenario removes component {component!r}; add one that keeps it to the case"
+            )
+        return having[0]
+    if wanted not in case.scenarios:
+        raise InputError(f"{case.path}: there is no scenario {wanted!r}; scenarios with {component!r}: {known}")
+    if wanted not in having:
+        raise InputError(
+            f"{case.path}: scenario {wanted!r} removes component {component!r}; scenarios that have it: {known}"
+        )
+    return wanted
 
 
 def _component(case: Case, wanted: str | None, fmu: Path) -> str:

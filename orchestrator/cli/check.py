@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--step", type=positive, metavar="H", help="communication step of use [s]")
     parser.add_argument("--case", metavar="CASE", help="with a case's step, operating point, values and binding")
     parser.add_argument("--component", metavar="NAME", help="which of the case's components it is")
+    parser.add_argument("--scenario", metavar="NAME", help="which of the case's scenarios (default: the first with it)")
     parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
@@ -49,10 +50,12 @@ def run(options: argparse.Namespace) -> int:
     limits = Limits(seconds=options.time_limit, memory=int(options.memory_limit * 1024**2))
     use, binding = Use(options.step), options.binding
     if options.case:
-        use, of_case = use_in_case(options.case, options.component, options.file, options.step)
+        use, of_case = use_in_case(options.case, options.component, options.file, options.step, options.scenario)
         binding = binding or of_case
     elif options.component:
         raise InputError("--component names a component of a case; give --case as well")
+    elif options.scenario:
+        raise InputError("--scenario names a scenario of a case; give --case as well")
     report = check_fmu(options.file, binding, limits, tuple(options.only), use=use)
     if options.junit:
         write_junit(report, options.junit)
@@ -76,6 +79,8 @@ def _each_once(results: list[Result]) -> list[Result]:
 
 def _print(report: Report) -> None:
     console = Console(soft_wrap=True, highlight=False, emoji=False)
+    if report.used_as:
+        console.print(f"As {escape(report.used_as)}.", end="\n\n")
     for result in _each_once(report.results):
         mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
         fault = f"[bold]{result.fault}:[/] " if result.fault else ""

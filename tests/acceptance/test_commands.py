@@ -11,7 +11,8 @@ import xarray as xr
 
 from orchestrator.acceptance.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.acceptance.checks.base import CHECKS as ENTERED
-from orchestrator.cases import two_area
+from orchestrator.acceptance.checks.subject import Point
+from orchestrator.cases import infinite_bus, two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
 from orchestrator.cli.check import _in_one_line
@@ -144,6 +145,37 @@ def test_a_check_as_a_case_uses_it(gfor, gallery, case):
     code, _, error = gfor("check", fmu, "--component", "gfor")
     assert code == 2
     assert "give --case as well" in error
+
+
+def test_the_first_scenario_that_has_the_component_is_used(gfor, gallery, case):
+    fmu, _ = gallery("converter")
+    path = case(fmu)
+    text = path.read_text(encoding="utf-8")
+    bare = '[scenarios.bare]\nremove = ["gfor"]\n'
+    path.write_text(text.replace("[scenarios.vendor]", f"{bare}[scenarios.vendor]"), encoding="utf-8")
+    code, out, error = gfor("check", fmu, "--case", path, "--only", "units")
+    assert code == 0, error
+    assert "As component 'gfor' in scenario 'vendor' of case.toml: P_0 = 0.9, " in out
+    code, _, error = gfor("check", fmu, "--case", path, "--scenario", "bare")
+    assert code == 2
+    assert "scenario 'bare' removes component 'gfor'; scenarios that have it: vendor" in error
+    code, _, error = gfor("check", fmu, "--case", path, "--scenario", "other")
+    assert "there is no scenario 'other'; scenarios with 'gfor': vendor" in error
+    path.write_text(text.replace("[scenarios.vendor]", bare), encoding="utf-8")
+    code, _, error = gfor("check", fmu, "--case", path)
+    assert code == 2
+    assert "every scenario removes component 'gfor'" in error
+
+
+def test_a_start_value_that_a_case_does_not_give_has_its_default(gallery, tmp_path):
+    """A case without a power flow gives P_0, Q_0 and v_0, and no angle."""
+    fmu, _ = gallery("converter")
+    text = (Path(infinite_bus.__file__).parent / "case.toml").read_text(encoding="utf-8")
+    path = tmp_path / "case.toml"
+    path.write_text(text.replace('model = "gfor"\n', f'fmu = "{fmu}"\n'), encoding="utf-8")
+    use, _ = use_in_case(str(path), None, fmu, None)
+    assert use.point == Point(1.0, 0.0, 0.6, 0.05)
+    assert use.said.endswith("P_0 = 0.6, Q_0 = 0.05, v_0 = 1, theta_0 = 0 (default)")
 
 
 def test_what_an_fmu_says_stays_in_its_line():

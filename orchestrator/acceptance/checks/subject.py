@@ -50,12 +50,15 @@ class Use:
         Where the power flow puts it.
     values, inputs
         Of its parameters, and of inputs that nothing feeds.
+    said
+        Where that comes from, and the operating point, in words.
     """
 
     step_size: float | None = None
     point: Point | None = None
     values: Mapping[str, float | bool] = field(default_factory=dict)
     inputs: Mapping[str, float] = field(default_factory=dict)
+    said: str = ""
 
 
 class Subject:
