@@ -138,7 +138,7 @@ def test_a_check_as_a_case_uses_it(gfor, gallery, case):
     assert found.samefile(binding)
     code, text, error = gfor("check", fmu, "--case", path, "--only", "power_balance", "--json")
     assert code == 0, error
-    assert "at 6 points" in json.loads(text)["checks"][-1]["evidence"]
+    assert "at 8 points" in json.loads(text)["checks"][-1]["evidence"]
     code, _, error = gfor("check", gallery("gain")[0], "--case", path)
     assert code == 2
     assert "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)" in error

@@ -1,5 +1,8 @@
 """Every threshold of the acceptance checks, from both sides: a defect a little above it, and one a little below."""
 
+import re
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.acceptance.runner import check_fmu
@@ -59,3 +62,16 @@ def test_a_saved_state_is_exact_or_said_not_to_be(judged, leak, verdict):
 @pytest.mark.parametrize(("noise", "verdict"), [(1e-11, ("pass", "")), (3e-9, ("fail", "not repeatable"))])
 def test_two_runs_are_equal_to_ten_digits(judged, noise, verdict):
     assert judged(slight(NOISE=noise), "repeatability") == verdict
+
+
+@pytest.mark.parametrize("check", ["power_balance", "limits"])
+def test_imported_power_that_the_file_forbids_is_not_tried_and_said(check, tmp_path):
+    """P_0 is declared to be 0 or more, and its powers would be wrong below."""
+
+    def at_least_0(text):
+        return re.sub(rb'(name="P_0".*?<Real unit="pu")', rb'\1 min="0"', text, count=1, flags=re.DOTALL)
+
+    source = replace(converter("gives_only", FAULT_IMPORTED_P=1.7, FAULT_IMPORTED_LIMIT=1), change=at_least_0)
+    report = check_fmu(build(source, tmp_path), None, LIMITS, (check,), run_for=0.2)
+    assert report.results[-1].verdict == "remark"
+    assert "P_0 = -0.5 is outside of what the FMU declares" in report.results[-1].evidence

@@ -22,6 +22,9 @@ POINTS = (
     Point(1.0, 2.0, 0.6, 0.0),
     Point(1.01, -2.5, 0.4, -0.2),
 )
+IMPORTING = (Point(1.0, 0.3, -0.5, 0.15), Point(1.02, -0.4, -0.3, -0.1))
+"""Points at which it takes power."""
+
 _BALANCE = 0.02
 """Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
 
@@ -79,6 +82,20 @@ def _points(subject: Subject) -> tuple[Point, ...]:
     return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
 
 
+def cannot_import(subject: Subject, point: Point) -> str:
+    """Why it is not tried with that power: its declared bounds of P_0 forbid it; "" where they do not."""
+    described = subject.description
+    takers = [("P_0", point.P)]
+    if isinstance(described, BoundDescription):
+        takers = [(m.variable, m.factor * point.P + m.offset) for m in described.port.start["P_0"]]
+        described = described.native
+    for name, value in takers:
+        least, most = described.variables[name].minimum, described.variables[name].maximum
+        if (least is not None and value < least) or (most is not None and value > most):
+            return f"P_0 = {point.P:g} was not tried: {name} = {value:g} is outside of what the FMU declares"
+    return ""
+
+
 @check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
 def steady_state(subject: Subject) -> Result:
     if not subject.starts:
@@ -114,33 +131,42 @@ def power_balance(subject: Subject) -> Result:
     best: Result | None = None
     settle = 0 if subject.memory.get("drift", 0.0) <= _DRIFT else affordable(subject, 20000)
     for steps in dict.fromkeys((0, settle)):
-        asked, found, voltages = _powers(subject, steps)
+        asked, found, voltages, left_out = _powers(subject, steps)
         if len(asked) < 3:
             return not_applicable(
-                "power_balance", f"because it starts at {len(asked)} of {len(_points(subject))} operating points only"
+                "power_balance",
+                f"because it starts at {len(asked)} of {len(_points(subject)) + len(IMPORTING)} operating points only",
             )
         result = _judged(asked, found, voltages, steps * subject.step_size)
-        if best is None or result.verdict == "pass":
+        if left_out and not result.fault:
+            remedy = "nothing is known of it as a load or a charging store: do not use it so, or ask how it starts"
+            result = remarked("power_balance", f"{result.evidence}; {left_out}", remedy, **result.figures)
+        if best is None or not result.fault:
             best = result
     assert best is not None
     return best
 
 
-def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex], list[complex]]:
-    """Powers asked for, found, and the voltages at which it starts."""
-    asked, found, voltages = [], [], []
-    for point in _points(subject):
+def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex], list[complex], str]:
+    """Powers asked for, found, the voltages at which it starts; why it was not tried with imported power."""
+    asked, found, voltages, left_out = [], [], [], ""
+    for point in (*_points(subject), *IMPORTING):
+        if point in IMPORTING and (reason := cannot_import(subject, point)):
+            left_out = left_out or reason
+            continue
         try:
             with subject.running(point=point) as running:
                 if steps:
                     currents(running, 0j, steps)
                 power = point.voltage * _current(running).conjugate()
-        except ComponentError:
+        except ComponentError as error:
+            if point in IMPORTING:
+                left_out = left_out or f"it does not start with P_0 = {point.P:g}: {error}"
             continue
         asked.append(complex(point.P, point.Q))
         found.append(power)
         voltages.append(point.voltage)
-    return asked, found, voltages
+    return asked, found, voltages, left_out
 
 
 def _judged(asked: Sequence[complex], found: Sequence[complex], voltages: Sequence[complex], after: float) -> Result:
@@ -167,6 +193,10 @@ def _judged(asked: Sequence[complex], found: Sequence[complex], voltages: Sequen
         return passed(
             "power_balance", f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points", **figures
         )
+    imports = s_0.real < 0
+    if (np.abs(s - s_0)[~imports] <= _BALANCE).all():
+        says = "it is as asked where it gives power, and not where it takes power"
+        return failed("power_balance", "power not as asked", f"{seen}: {says}", **figures)
     fault, says = _diagnosis(of, a, b, c, rest)
     return failed("power_balance", fault, f"{seen}: {says}", **figures)
 

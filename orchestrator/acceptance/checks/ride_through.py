@@ -9,8 +9,8 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import Result, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.port import WHY, current_limit, currents
-from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
+from orchestrator.acceptance.checks.subject import Point, Subject
 from orchestrator.errors import ComponentError
 
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
@@ -36,8 +36,8 @@ axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff
 _BACK = 0.3
 """Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
 
-_AT_LEAST = 2
-"""Runs that are made however long they take: something happens at all times, and the dip that stays."""
+_AT_LEAST = 3
+"""Runs that are made however long they take: at all times, a dip that stays, and while power flows the other way."""
 
 _PART = 1.5
 """Wall-clock time to spend, in parts of the time for which an FMU is made to run."""
@@ -45,15 +45,16 @@ _PART = 1.5
 
 @dataclass(frozen=True)
 class Event:
-    """A factor on the voltage, from a time on, for a while."""
+    """A factor on the voltage, from a time on, for a while; at an operating point of its own where not None."""
 
     name: str
     factor: complex
     at: float
     lasts: float = _LASTS
+    point: Point | None = None
 
     def __str__(self) -> str:
-        return f"the {self.name} at {self.at:g} s"
+        return f"the {self.name} at {self.at:g} s{f' from P_0 = {self.point.P:g}' if self.point else ''}"
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ def _runs() -> Iterator[list[Event]]:
     for k in range(len(kinds)):
         if k == 1:
             yield [Event(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
+            some = zip((dips[0.0], dips[0.5], jumps[-60.0]), _TIMES, strict=False)
+            yield [Event(*kind, at, point=IMPORTING[0]) for kind, at in some]
         yield [Event(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(_TIMES)]
 
 
@@ -88,9 +91,12 @@ def limits(subject: Subject) -> Result:
     begin, budget = perf_counter(), _PART * subject.memory.get("run_for", 2.0)
     answers: list[Answer] = []
     refused: list[str] = []
-    left_out = 0
+    left_out, other_way = 0, ""
     for number, run in enumerate(_runs()):
         rest = list(run)
+        if rest[0].point is not None:
+            other_way = cannot_import(subject, rest[0].point) if subject.starts else ""
+            rest = rest if subject.starts and not other_way else []
         while rest:
             if number >= _AT_LEAST and perf_counter() - begin > budget:
                 left_out += len(rest)
@@ -101,13 +107,18 @@ def limits(subject: Subject) -> Result:
                     "limits", "not a number", f"its current is no number in {bad}, and fmi2DoStep returned OK",
                     case=str(bad),
                 )  # fmt: skip
-    return _judged(subject, answers, refused, left_out)
+    result = _judged(subject, answers, refused, left_out)
+    if other_way and not result.fault:
+        remedy = result.remedy or "do not use it with imported power, or ask how it starts"
+        return remarked("limits", f"{result.evidence}; {other_way}", remedy, **result.figures)
+    return result
 
 
 def _disturbed(subject: Subject, rest: list[Event], answers: list[Answer], refused: list[str]) -> Event | None:
     """Let events happen to one instance, as long as it comes back; those that happened leave the list."""
-    normal, h = subject.start_voltage, subject.step_size
-    with subject.running() as running:
+    point, h = rest[0].point, subject.step_size
+    normal = (point or subject.point).voltage
+    with subject.running(point=point) as running:
         while rest:
             event = rest.pop(0)
             try:

@@ -38,6 +38,8 @@ class Variable:
     unit: str = "pu"
     depends: Sequence[str] | None = ()
     variability: str = "continuous"
+    type: str = "Real"
+    rate_of: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Source:
 
     Attributes
     ----------
+    settable
+        Whether it declares that its states can be set.
     change
         What is done to its description in the end.
     """
@@ -57,6 +61,7 @@ class Source:
     step_size: str | None = "1e-4"
     stop_time: str = "1"
     state: bool = True
+    settable: bool = False
     change: Callable[[bytes], bytes] | None = None
     units: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
@@ -85,6 +90,9 @@ def description(source: Source) -> bytes:
     experiment = SubElement(root, "DefaultExperiment", startTime="0", stopTime=source.stop_time)
     if source.step_size:
         experiment.set("stepSize", source.step_size)
+    if source.settable:
+        tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name="gfor-cosim")
+        SubElement(tool, "ContinuousStates", settable="true")
     _variables(root, source)
     _structure(root, source)
     indent(root)
@@ -96,28 +104,42 @@ def _variables(root, source):
     for v in source.variables:
         attributes = {"name": v.name, "valueReference": str(v.reference), "causality": v.causality}
         attributes["variability"] = v.variability
-        if v.causality == "output":
+        if v.causality in ("output", "local"):
             attributes["initial"] = "calculated"
         elif v.causality == "parameter":
             attributes["initial"] = "exact"
         element = SubElement(variables, "ScalarVariable", attributes)
+        if v.type == "Boolean":
+            SubElement(element, "Boolean", start="true" if v.start else "false")
+            continue
         real = SubElement(element, "Real")
         if v.unit:
             real.set("unit", v.unit)
         if v.start is not None and v.causality != "output":
             real.set("start", repr(float(v.start)))
+        if v.rate_of:
+            real.set("derivative", _index(source)[v.rate_of])
 
 
 def _structure(root, source):
     structure = SubElement(root, "ModelStructure")
-    index = {v.name: str(number) for number, v in enumerate(source.variables, start=1)}
+    index = _index(source)
     outputs = [v for v in source.variables if v.causality == "output"]
-    if outputs:
-        for parent in (SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")):
-            for v in outputs:
-                unknown = SubElement(parent, "Unknown", index=index[v.name])
-                if v.depends is not None and parent.tag == "Outputs":
-                    unknown.set("dependencies", " ".join(index[n] for n in v.depends))
+    rates = [v for v in source.variables if v.rate_of]
+    locals_ = [v for v in source.variables if v.causality == "local"]
+    for tag, listed in (("Outputs", outputs), ("Derivatives", rates), ("InitialUnknowns", [*outputs, *locals_])):
+        if not listed:
+            continue
+        parent = SubElement(structure, tag)
+        for v in listed:
+            unknown = SubElement(parent, "Unknown", index=index[v.name])
+            if v.depends is not None and tag == "Outputs":
+                unknown.set("dependencies", " ".join(index[n] for n in v.depends))
+
+
+def _index(source):
+    """Place of each variable in the file, as it refers to them."""
+    return {v.name: str(number) for number, v in enumerate(source.variables, start=1)}
 
 
 @cache

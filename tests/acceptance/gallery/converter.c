@@ -2,7 +2,8 @@
    one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
-enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, MEMORY };
+enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, MEMORY };
+#define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
 #define DIVERGED 1e12
 
@@ -57,7 +58,14 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, MEMO
 #ifndef OMEGA_UNIT
 #define OMEGA_UNIT 1.0
 #endif
+#ifndef OMEGA_FACTOR
+#define OMEGA_FACTOR 1.0 /* of the deviation that it shows */
+#endif
 #define OMEGA_B (2 * 3.14159265358979323846 * NOMINAL)
+
+#ifndef TURNS
+#define TURNS OMEGA_B /* rad/s by which its angle turns with 1 pu of frequency */
+#endif
 
 static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.1,
 #ifdef PORT_ABC
@@ -86,7 +94,14 @@ static phasor voltage(const double *z, double time) {
 }
 
 static void initialise(double *z, double *m) {
-    const double v = z[V_0] / V_UNIT, p = z[P_0] / P_UNIT, q = z[Q_0] / P_UNIT, t = z[THETA_0];
+    const double v = z[V_0] / V_UNIT, t = z[THETA_0];
+    double p = z[P_0] / P_UNIT, q = z[Q_0] / P_UNIT;
+#ifdef FAULT_IMPORTED_P
+    if (p < 0) p *= FAULT_IMPORTED_P;
+#endif
+#ifdef FAULT_IMPORTED_Q
+    if (p < 0) q *= FAULT_IMPORTED_Q;
+#endif
     const phasor bus = {v * cos(t), v * sin(t)};
     double drift = 0;
     /* Current from S = v·conj(i); what the shunt takes is fed as well. */
@@ -100,7 +115,38 @@ static void initialise(double *z, double *m) {
     m[E_0] = hypot(e.re, e.im);
     m[P_F] = m[P_REF] = P_MEASURED * (e.re * m[I_RE] + e.im * m[I_IM]);
     m[Q_F] = m[Q_REF] = Q_MEASURED * (e.im * m[I_RE] - e.re * m[I_IM]);
-    m[REST] = m[TICK] = m[PENDING] = 0;
+    m[REST] = m[TICK] = m[PENDING] = m[QUICK] = m[SLOW] = m[TIRED] = 0;
+}
+
+/* The voltage behind its impedance, by its droop. */
+static double emf(const double *m) {
+    double droop = Q_DROOP;
+#ifdef FAULT_ABSORBING
+    if (m[Q_F] < -0.02) droop *= FAULT_ABSORBING;
+#endif
+    return m[E_0] + droop * (m[Q_REF] - m[Q_F]);
+}
+
+/* Its frequency's deviation [pu]. */
+static double slip(const double *z, const double *m, double p_f) {
+    double wanted = m[P_REF];
+#ifdef FAULT_SWITCHED_SHARED
+    static double shared; /* one for all instances, and with the damping on only */
+    if (m[ON]) shared += 1e-3 * (m[P_F] - shared), wanted += 0.1 * shared;
+#endif
+    if (m[ON]) wanted -= 20 * (m[QUICK] - m[SLOW]);
+    const double w = z[GAIN] * (wanted - p_f);
+#ifdef FAULT_ONE_WAY
+    return w > 0 ? 0 : w; /* it never turns faster */
+#else
+    return w;
+#endif
+}
+
+/* Current [pu] where nothing limits it. */
+static double unlimited(const double *m, phasor v) {
+    const double e = emf(m);
+    return hypot(e * cos(m[DELTA]) - v.re, e * sin(m[DELTA]) - v.im) / hypot(R_PU, X_PU);
 }
 
 /* The present time is kept as REST + …: phase quantities need it, and it is part of the state. */
@@ -110,13 +156,20 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
 #else
     const double p_f = m[P_F];
 #endif
-    const double e = m[E_0] + Q_DROOP * (m[Q_REF] - m[Q_F]);
+    const double e = emf(m);
     phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
     const double p = P_MEASURED * (u.re * m[I_RE] + u.im * m[I_IM]);
     const double q = Q_MEASURED * (u.im * m[I_RE] - u.re * m[I_IM]);
     /* Current limit: the voltage behind the impedance follows the grid's where the current would be too large. */
     const double size = hypot(u.re - v.re, u.im - v.im) / hypot(R_PU, X_PU);
-    if (size > I_LIMIT) {
+    int limited = size > I_LIMIT;
+#ifdef FAULT_IMPORTED_LIMIT
+    if (m[P_REF] < 0) limited = 0;
+#endif
+#ifdef FAULT_LIMIT_TIRES
+    if (m[TIRED] > FAULT_LIMIT_TIRES) limited = 0;
+#endif
+    if (limited) {
         u.re = v.re + (u.re - v.re) * I_LIMIT / size;
         u.im = v.im + (u.im - v.im) * I_LIMIT / size;
     }
@@ -125,7 +178,7 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
 #ifdef SAMPLED
     d[DELTA] = d[P_F] = d[Q_F] = 0; /* see sample() */
 #else
-    d[DELTA] = OMEGA_B * z[GAIN] * (m[P_REF] - p_f);
+    d[DELTA] = TURNS * slip(z, m, p_f);
     d[P_F] = (p - p_f) / z[TAU];
     d[Q_F] = (q - m[Q_F]) / z[TAU];
 #endif
@@ -134,7 +187,7 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
 #ifdef SAMPLED
 /* The control, once in every sample time. */
 static void sample(const double *z, double *m, double *hidden) {
-    const double e = m[E_0] + Q_DROOP * (m[Q_REF] - m[Q_F]), share = -expm1(-SAMPLED / z[TAU]);
+    const double e = emf(m), share = -expm1(-SAMPLED / z[TAU]);
     const phasor u = {e * cos(m[DELTA]), e * sin(m[DELTA])};
     const double p = P_MEASURED * (u.re * m[I_RE] + u.im * m[I_IM]);
     const double q = Q_MEASURED * (u.im * m[I_RE] - u.re * m[I_IM]);
@@ -143,7 +196,7 @@ static void sample(const double *z, double *m, double *hidden) {
     m[DELTA] -= SAMPLED * OMEGA_B * z[GAIN] * hidden[0];
 #else
     m[P_F] += share * (p - m[P_F]);
-    m[DELTA] += SAMPLED * OMEGA_B * z[GAIN] * (m[P_REF] - m[P_F]);
+    m[DELTA] += SAMPLED * TURNS * slip(z, m, m[P_F]);
 #endif
     m[Q_F] += share * (q - m[Q_F]);
 }
@@ -162,6 +215,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #ifdef FAULT_HIDDEN
     hidden[0] += h / 6 * (k[0][P_F] + 2 * k[1][P_F] + 2 * k[2][P_F] + k[3][P_F]);
 #endif
+    m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
+    m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
+    m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
 }
 
 static double present, last_step; /* of the call that is running, not of an instance */
@@ -190,6 +246,12 @@ static void advance(double *z, double *m, double *hidden, double time, double st
 #ifdef FAULT_TIMER_CALLS
     /* A timer that counts calls instead of time. */
     if (++m[PENDING] == FAULT_TIMER_CALLS) m[E_0] += 0.1;
+#endif
+#ifdef FAULT_DRIFTS_AFTER
+    if (time > FAULT_DRIFTS_AFTER) m[P_REF] += FAULT_DRIFTS_BY * step;
+#endif
+#ifdef FAULT_LONGEST_STEP
+    if (step > FAULT_LONGEST_STEP) step = FAULT_LONGEST_STEP;
 #endif
 #ifdef FAULT_ONE_BEHIND
     /* The step that was asked for last time. */
@@ -268,5 +330,5 @@ static void outputs(double *z, double *m, const double *hidden) {
 #else
     z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
 #endif
-    z[OMEGA] = (1 + z[GAIN] * (m[P_REF] - m[P_F])) * OMEGA_UNIT;
+    z[OMEGA] = (1 + OMEGA_FACTOR * slip(z, m, m[P_F])) * OMEGA_UNIT;
 }

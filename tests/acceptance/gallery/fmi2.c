@@ -184,7 +184,13 @@ EXPORT int fmi2Reset(void *c) {
     defaults(S);
     memcpy(S->memory, kept, sizeof kept);
 #else
+#ifdef FAULT_RESET_SWITCH
+    const double on = S->memory[SWITCH];
+#endif
     defaults(S);
+#ifdef FAULT_RESET_SWITCH
+    S->memory[SWITCH] = on;
+#endif
     memset(instance->hidden, 0, sizeof instance->hidden);
 #endif
     return OK;
@@ -214,6 +220,9 @@ EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const doub
         if (references[k] >= SIZE) return ERROR;
 #ifdef FAULT_IGNORES
         if (references[k] == GAIN) continue;
+#endif
+#ifdef FAULT_IGNORES_STATE
+        if (references[k] == FAULT_IGNORES_STATE) continue;
 #endif
 #ifdef FAULT_SHARED_PARAMETERS
         if (references[k] == GAIN) shared_gain = values[k];
@@ -339,8 +348,11 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
     }
 #endif
 #ifdef FAULT_LEAK
+#ifndef FAULT_LEAK_AFTER
+#define FAULT_LEAK_AFTER 0.0
+#endif
     static void *volatile lost;
-    lost = malloc(FAULT_LEAK);
+    if (S->time > FAULT_LEAK_AFTER) lost = malloc(FAULT_LEAK);
 #endif
 #ifdef FAULT_EAT
     static void *volatile eaten;
@@ -353,6 +365,10 @@ EXPORT int fmi2CancelStep(void *c) { return ERROR; }
 EXPORT int fmi2GetFMUstate(void *c, void **state) {
     instance_t *instance = c;
     refresh(instance);
+#ifdef FAULT_ONE_BUFFER
+    static instance_t buffer; /* the same one for every state */
+    *state = &buffer;
+#endif
     if (!*state) *state = malloc(sizeof(instance_t));
     memcpy(*state, instance, sizeof(instance_t));
     ((instance_t *)*state)->s = *S;
@@ -367,7 +383,25 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
 #ifdef FAULT_STATE_TICK
     const double tick = S->memory[TICK];
 #endif
+#ifdef FAULT_STATE_SWITCH
+    const double on = S->memory[SWITCH];
+#endif
+#ifdef FAULT_STATE_OF_SWITCHED
+    const double quick = S->memory[QUICK], slow = S->memory[SLOW]; /* the damping's, which acts where it is on */
+#endif
+#ifdef FAULT_STATE_SILENT
+    const double silent = S->z[FAULT_STATE_SILENT]; /* a state that no output shows */
+#endif
     *S = saved->s;
+#ifdef FAULT_STATE_SWITCH
+    S->memory[SWITCH] = on;
+#endif
+#ifdef FAULT_STATE_OF_SWITCHED
+    S->memory[QUICK] = quick, S->memory[SLOW] = slow;
+#endif
+#ifdef FAULT_STATE_SILENT
+    S->z[FAULT_STATE_SILENT] = silent;
+#endif
 #ifdef FAULT_STATE_TICK
     S->memory[TICK] = tick;
 #endif
@@ -382,7 +416,7 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
     return OK;
 }
 EXPORT int fmi2FreeFMUstate(void *c, void **state) {
-#ifndef FAULT_LEAK_STATE
+#if !defined FAULT_LEAK_STATE && !defined FAULT_ONE_BUFFER
     free(*state);
 #endif
     *state = NULL;
@@ -416,8 +450,21 @@ EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const *cat
     EXPORT int name(void *c, const unsigned *r, size_t n, void *v) { return n ? ERROR : OK; }
 NONE(fmi2GetInteger)
 NONE(fmi2SetInteger)
+#ifdef SWITCH
+EXPORT int fmi2GetBoolean(void *c, const unsigned *r, size_t n, int *values) {
+    const instance_t *instance = c;
+    for (size_t k = 0; k < n; ++k) values[k] = S->memory[SWITCH] != 0;
+    return OK;
+}
+EXPORT int fmi2SetBoolean(void *c, const unsigned *r, size_t n, const int *values) {
+    instance_t *instance = c;
+    for (size_t k = 0; k < n; ++k) S->memory[SWITCH] = values[k] != 0, S->dirty = 1;
+    return OK;
+}
+#else
 NONE(fmi2GetBoolean)
 NONE(fmi2SetBoolean)
+#endif
 NONE(fmi2GetString)
 NONE(fmi2SetString)
 EXPORT int fmi2GetDirectionalDerivative(void *c, const unsigned *u, size_t nu, const unsigned *k, size_t nk,

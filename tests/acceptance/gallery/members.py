@@ -45,7 +45,7 @@ class Member:
 
 def converter(
     name, form="rectangular", *, units=None, depends=(), state=True, step_size="1e-4", stop_time="1",
-    omega=("omega", "pu"), **defines,
+    omega=("omega", "pu"), switch=False, **defines,
 ):  # fmt: skip
     """The converter of converter.c; ``units`` are those of voltage, current, power."""
     macro, inputs, outputs = FORMS[form]
@@ -69,6 +69,8 @@ def converter(
         i_units = [i_unit, "rad" if angle else i_unit, i_unit]
     variables += [Variable(n, 10 + k, "output", None, i_units[k], depends=depends) for k, n in enumerate(outputs)]
     variables += [Variable(omega[0], 13, "output", None, omega[1])]
+    if switch:
+        variables += [Variable("damping", 0, "parameter", 0, "", variability="tunable", type="Boolean")]
     return Source(name, "converter.c", {macro: 1, **defines}, tuple(variables), step_size, stop_time, state)
 
 
@@ -109,6 +111,14 @@ GAIN = (Variable("u", 0, "input", 0, "1"), Variable("y", 1, "output", unit="1", 
 LAG = (Variable("u", 0, "input", 0, "1"), Variable("y", 1, "output", unit="1", depends=("u",)),
        Variable("d", 2, "parameter", 0.5, "1", variability="tunable"),
        Variable("T", 3, "parameter", 0.05, "s", variability="fixed"))  # fmt: skip
+
+OPEN_LAG = (
+    *LAG,
+    Variable("x", 4, "local", unit="1"),
+    Variable("der(x)", 5, "local", unit="", rate_of="x"),
+    Variable("trail", 6, "local", unit="1"),
+    Variable("der(trail)", 7, "local", unit="", rate_of="trail"),
+)
 
 TANK = (Variable("level", 0, "output", unit="1"), Variable("relay", 1, "output", unit="1", variability="discrete"),
         Variable("q", 2, "parameter", 1, "1", variability="fixed"),
@@ -272,6 +282,7 @@ def faulty():
         *_wrong_units(),
         *_invalid(),
         *missed(),
+        *missed_by_one_point(),
         *reported(),
         *tampering(),
     ]
@@ -291,6 +302,20 @@ def missed():
                   omega=("f_meas", "Hz")),
         *carriers("no_limit", "no current limit", only=("limits",), I_LIMIT=1e9),
     ]  # fmt: skip
+
+
+def missed_by_one_point():
+    """What passed every check, since it works at the points, the step, the time or the setting that were tried."""
+
+    def one(name, fault, only, /, **options):
+        return carriers(name, fault, only=only, **options)[0]
+
+    balance = ("steady_state", "power_balance")
+    return [
+        one("imported_p", "power not as asked", balance, FAULT_IMPORTED_P=1.7),
+        one("imported_q", "power not as asked", balance, FAULT_IMPORTED_Q=-1),
+        one("imported_limit", "no current limit", ("limits",), FAULT_IMPORTED_LIMIT=1),
+    ]
 
 
 def reported():

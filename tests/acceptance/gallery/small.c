@@ -62,6 +62,20 @@ static void advance(double *z, double *m, double *hidden, double time, double st
 }
 static void outputs(double *z, double *m, const double *hidden) { z[Y] = m[0] + z[GAIN] * z[U]; }
 
+#elif defined MODEL_OPEN_LAG /* the lag with its states as variables: x, and what it was a second ago, which nothing needs */
+enum { U, Y, GAIN, T, X, DX, TRAIL, DTRAIL, SIZE };
+enum { MEMORY = 1 };
+#define IS_OUTPUT(r) ((r) == Y)
+static const double START[SIZE] = {0, 0, 0.5, 0.05};
+static void initialise(double *z, double *m) { z[X] = z[TRAIL] = 0; }
+static void advance(double *z, double *m, double *hidden, double time, double step) {
+    z[TRAIL] += (z[X] - z[TRAIL]) * -expm1(-step);
+    z[X] += (z[U] - z[X]) * -expm1(-step / z[T]);
+}
+static void outputs(double *z, double *m, const double *hidden) {
+    z[Y] = z[X] + z[GAIN] * z[U], z[DX] = (z[U] - z[X]) / z[T], z[DTRAIL] = z[X] - z[TRAIL];
+}
+
 #elif defined MODEL_TANK /* ẋ = r·q − x; a relay r that is looked at once a communication step keeps x in its band */
 enum { X, R, GAIN, STEPS, SIZE };
 enum { MEMORY = 4 };
