@@ -12,18 +12,49 @@ from orchestrator.acceptance.checks.subject import Point
 POINT = Point(1.0, 0.0, 0.7, 0.1)
 """With much active power, so that Q follows P at constant voltage and the internal voltage shows in Q."""
 
+ABSORBING = Point(1.0, 0.0, 0.7, -0.3)
+"""As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu."""
+
 VOLTAGE = 0.02
 FREQUENCY = 0.001
 """Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
 
-POINTS = (Point(1.0, 0.0, 0.2, -0.2), Point(1.0, 0.0, 0.2, 0.3), Point(1.0, 0.0, -0.5, 0.1))
-"""Further ones, with other powers."""
+_FURTHER = (Point(1.0, 0.0, 0.2, 0.02), Point(1.0, 0.0, 0.2, 0.3), Point(1.0, 0.0, -0.5, 0.1))
+_FURTHER_ABSORBING = (Point(1.0, 0.0, 0.2, -0.25), Point(1.0, 0.0, 0.2, -0.4), Point(1.0, 0.0, -0.5, -0.3))
 
 SETTLED = 1e-3
 """Power [pu, S_n] by which an answer may still move."""
 
 _GOOD = 0.2
 """Largest error of the law, in parts of what the droop does where the frequency changes."""
+
+
+def further(point: Point) -> tuple[Point, ...]:
+    """Points with other powers at which a law is looked for, all with reactive power of the same sign."""
+    return _FURTHER if point.Q >= 0 else _FURTHER_ABSORBING
+
+
+@dataclass(frozen=True)
+class Way:
+    """What a change in one direction brings.
+
+    Attributes
+    ----------
+    power
+        Change of the power in the end [pu, S_n].
+    moving
+        How much P and Q still move in the end [pu, S_n].
+    far
+        How far they go away at most [pu, S_n].
+    omega, omega_moving
+        Its frequency in the end, and how much that still moves [pu]; None for an FMU that does not say it.
+    """
+
+    power: complex
+    moving: float
+    far: float
+    omega: float | None
+    omega_moving: float
 
 
 @dataclass(frozen=True)
@@ -40,6 +71,8 @@ class Answer:
         How much P and Q still move in the end.
     far
         How far they go away at most.
+    ways
+        What the change down brings, and the one up.
     """
 
     i: complex
@@ -47,6 +80,7 @@ class Answer:
     power: complex
     moving: float
     far: float
+    ways: tuple[Way, Way]
 
 
 def droop(found: Sequence[tuple[Point, Answer, Answer]]) -> float | None:

@@ -53,6 +53,8 @@ REMEDIES = {
     "not a number stays": "look for static variables",
     # the port
     "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for",
+    "wrong frequency": "check variable, unit and sign of the binding's 'omega', and the base by which its angle turns",
+    "loses synchronism": "look for a limit that acts in one direction only; ask the author",
     "unstable": "look for a measurement of the wrong sign, or ask at which network impedance it is stable",
     "above its current limit": "ask how it limits its current in a dip, or declare the limit that it has",
     "no current limit": "have its current limited as the converter's is; a machine's binding says I_max",

@@ -6,7 +6,17 @@ from math import pi
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.droop import FREQUENCY, POINT, POINTS, SETTLED, VOLTAGE, Answer, droop
+from orchestrator.acceptance.checks.droop import (
+    ABSORBING,
+    FREQUENCY,
+    POINT,
+    SETTLED,
+    VOLTAGE,
+    Answer,
+    Way,
+    droop,
+    further,
+)
 from orchestrator.acceptance.checks.port import WHY, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Point, Subject
@@ -33,6 +43,19 @@ _SETTLED = 0.05
 _AWAY = 0.5
 """Power [pu, S_n] by which it may differ after such small changes, and be stable."""
 
+_LOST = 0.02
+"""Power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less."""
+
+_EACH = 5e-3
+"""Power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order."""
+
+_OMEGA_APART = 2e-4
+"""Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
+of the change, a frequency meter's own error far less."""
+
+_SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
+"""Of the changes of voltage and frequency."""
+
 _OMEGA = 1e-3
 _PLAIN = ("pu", "p.u.", "1")
 
@@ -40,8 +63,7 @@ _PLAIN = ("pu", "p.u.", "1")
 @check("rated_frequency", "Is its frequency 1 at rest?", needs=SAME)
 def rated_frequency(subject: Subject) -> Result:
     """An FMU for 60 Hz that is bound as one of 50 Hz has omega = 1.2."""
-    info = subject.description.variables.get("omega")
-    if not subject.port or info is None or info.causality != "output" or info.unit not in _PLAIN:
+    if not subject.port or not _shows_omega(subject):
         return not_applicable(
             "rated_frequency", "because it has no output 'omega' in pu (a binding's [signals] may name one)"
         )
@@ -60,6 +82,11 @@ def rated_frequency(subject: Subject) -> Result:
     return passed("rated_frequency", seen, omega=rest)
 
 
+def _shows_omega(subject: Subject) -> bool:
+    info = subject.description.variables.get("omega")
+    return info is not None and info.causality == "output" and info.unit in _PLAIN
+
+
 def _rated(subject: Subject) -> float:
     described = subject.description
     return described.port.f_n if isinstance(described, BoundDescription) else 50.0
@@ -67,6 +94,7 @@ def _rated(subject: Subject) -> float:
 
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
 def signs(subject: Subject) -> Result:
+    """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:
         return not_applicable("signs", WHY["no port"])
     fit = 1.0 / subject.memory.get("seconds_per_step", 1e-6)
@@ -75,18 +103,45 @@ def signs(subject: Subject) -> Result:
         return not_applicable(
             "signs", f"because {steps} steps of {subject.step_size:g} s show too little of its answer"
         )
-    try:
-        voltage, frequency = _answers(subject, steps, POINT)
-    except ComponentError as error:
-        return remarked("signs", f"small changes of voltage or frequency end with an error: {error}", "ask why")
+    places = [POINT]
+    if subject.starts:
+        places += [p for p in (subject.use.point, ABSORBING) if p is not None]
+    first: Result | None = None
+    refused = []
+    for point in places:
+        try:
+            result = _at(subject, steps, point)
+        except ComponentError as error:
+            refused.append(f"small changes of voltage or frequency at {_named(point)} end with an error: {error}")
+            continue
+        if result.fault:
+            return result
+        if first is None or (first.verdict == "pass" and result.verdict == "remark"):
+            first = result
+    if first is None:
+        return remarked("signs", refused[0], "ask why")
+    if refused:
+        return remarked("signs", "; ".join([first.evidence, *refused]), "ask why", **first.figures)
+    return first
+
+
+def _named(point: Point) -> str:
+    return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}"
+
+
+def _at(subject: Subject, steps: int, point: Point) -> Result:
+    """What small changes at one operating point say."""
+    voltage, frequency = _answers(subject, steps, point)
     figures = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
     }  # fmt: skip
     if not np.isfinite([voltage.far, frequency.far]).all():
         return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")
-    wrong = _wrong(voltage, frequency) or _wrong_droop(subject, steps, voltage, frequency)
-    said = f"{_said(voltage, frequency)}, {steps * subject.step_size:.2g} s later"
+    wrong = _wrong(point, voltage, frequency) or _wrong_droop(subject, steps, point, voltage, frequency)
+    said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
+    if subject.starts:
+        said += f", at {_named(point)}"
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
@@ -111,9 +166,11 @@ def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float,
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
     time: Numbers = np.arange(steps, dtype=np.float64) * h
-    found, far = [], 0.0
+    found, ways = [], []
     names = subject.inputs
-    for sign in (1.0, -1.0):
+    windows = [slice(round(a / h), max(round(a / h) + 1, round(b / h))) for a, b in _windows(steps * h)]
+    shown = subject.outputs.index("omega") if _shows_omega(subject) else None
+    for sign in _SIGNS:
         with subject.running(point=point if subject.starts else None) as running:
             rest = complex(*(running.rest[names.index(n)] for n in ("v_re", "v_im")))
             begin = of_current(running, running.read()[None])[0]
@@ -121,16 +178,30 @@ def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float,
             rows = np.zeros((steps, len(names)))
             for name, part in (("v_re", np.real), ("v_im", np.imag)):
                 rows[:, names.index(name)] = part(rest * (turned - 1))
-            current = of_current(running, running.hold(rows, steps, h))
+            values = running.hold(rows, steps, h)
+        current = of_current(running, values)
         power = rest * turned * current.conj() - rest * np.conj(begin)
         frame = current * np.conj(turned / np.abs(turned)) - begin
-        far = max(far, float(np.nan_to_num(np.abs(power), nan=np.inf).max()))
+        ways.append(_way(power, None if shown is None else values[:, shown], windows))
         found.append((frame * np.conj(rest) / abs(rest), power))
     half = [(a - b) / 2 for a, b in zip(*found, strict=True)]
-    early, late, later = (slice(round(a / h), max(round(a / h) + 1, round(b / h))) for a, b in _windows(steps * h))
-    i, s = ([part[window].mean() for window in (early, late, later)] for part in half)
-    moving = max(abs(s[2].real - s[1].real), abs(s[2].imag - s[1].imag))
-    return Answer(complex(i[2]), complex(s[0]), complex(s[2]), float(moving), far)
+    i, s = ([part[window].mean() for window in windows] for part in half)
+    moving, far = float(_apart(s[1], s[2])), max(way.far for way in ways)
+    return Answer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
+
+
+def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
+    """What one change brought, in the windows at the end."""
+    late, later = (complex(power[window].mean()) for window in windows[1:])
+    far = float(np.nan_to_num(np.abs(power), nan=np.inf).max())
+    if omega is None:
+        return Way(later, _apart(late, later), far, None, 0.0)
+    tail = omega[windows[1].start :]
+    return Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)))
+
+
+def _apart(a: complex, b: complex) -> float:
+    return max(abs(b.real - a.real), abs(b.imag - a.imag))
 
 
 def _windows(end: float) -> tuple[tuple[float, float], ...]:
@@ -138,32 +209,75 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
     return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 
-def _wrong(voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
+def _wrong(point: Point, voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
     """Name of a fault, and what shows it."""
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
+    if lost := _lost(voltage, frequency):
+        return "loses synchronism", lost
     steady = [a.moving < max(_SOME, _SETTLED * abs(a.power)) for a in (voltage, frequency)]
-    # Constant current or impedance takes so much with the voltage, and is no answer.
-    least = 3 * VOLTAGE * abs(POINT.Q) + _SOME
+    least = _least(point)
     if steady[0] and voltage.power.imag < -least:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
     if steady[1] and frequency.power.real < -_SOME:
         return "wrong sign", "its active power falls with the frequency, and should rise"
+    for sign, word, by_voltage, by_frequency in zip(_SIGNS, _WORDS, voltage.ways, frequency.ways, strict=True):
+        if _rests(by_voltage) and sign * by_voltage.power.imag < -least - _EACH:
+            return "wrong sign", f"its reactive power changes by {by_voltage.power.imag:+.3g} pu with {word} voltage"
+        if _rests(by_frequency) and sign * by_frequency.power.real < -_EACH:
+            return "wrong sign", f"its active power changes by {by_frequency.power.real:+.3g} pu with {word} frequency"
+    return _wrong_omega(frequency)
+
+
+def _least(point: Point) -> float:
+    """Constant current or impedance takes so much reactive power with the voltage, and is no answer."""
+    return 3 * VOLTAGE * abs(point.Q) + _SOME
+
+
+def _rests(way: Way) -> bool:
+    return way.far <= _AWAY and way.moving < max(_SOME, _SETTLED * abs(way.power))
+
+
+def _lost(*answers: Answer) -> str:
+    """Which change makes it run away, where the opposite one does not; "" where there is none."""
+    for answer, kind, size in zip(answers, ("voltage", "frequency"), (VOLTAGE, FREQUENCY), strict=True):
+        for here, there, word in zip(answer.ways, answer.ways[::-1], _WORDS, strict=True):
+            if here.far > _AWAY and here.moving > _LOST and there.far < _AWAY / 2:
+                return (
+                    f"with {100 * size:g} % {word} {kind} its power goes {here.far:.3g} pu away and does not settle; "
+                    f"the opposite change moves it by {there.far:.3g} pu"
+                )
+    return ""
+
+
+def _wrong_omega(frequency: Answer) -> tuple[str, str] | None:
+    """In synchronism its frequency is the network's, which the changes moved."""
+    for sign, way in zip(_SIGNS, frequency.ways, strict=True):
+        if way.omega is None or not _rests(way) or way.omega_moving > _OMEGA_APART / 10:
+            continue
+        network = 1 - sign * FREQUENCY
+        if abs(way.omega - network) > _OMEGA_APART:
+            return "wrong frequency", f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
     return None
 
 
-def _wrong_droop(subject: Subject, steps: int, voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
+def _wrong_droop(
+    subject: Subject, steps: int, point: Point, voltage: Answer, frequency: Answer
+) -> tuple[str, str] | None:
     """Look closer where lower voltage brings more reactive power in the end than in the first cycle."""
     if not subject.starts or voltage.power.imag < _MORE * voltage.early_power.imag or not voltage.early_power.imag > 0:
         return None
     if max(voltage.moving, frequency.moving) > SETTLED:
         steps *= 3
-    found = [] if max(voltage.moving, frequency.moving) > SETTLED else [(POINT, voltage, frequency)]
-    for point in (POINT, *POINTS)[len(found) :]:
+    found = [] if max(voltage.moving, frequency.moving) > SETTLED else [(point, voltage, frequency)]
+    for other in (point, *further(point))[len(found) :]:
         try:
-            found.append((point, *_answers(subject, steps, point)))
+            answers = _answers(subject, steps, other)
         except ComponentError:
             continue  # it may not be able to work there
+        if max(answer.moving for answer in answers) > SETTLED:
+            return None  # no law is seen in what does not settle
+        found.append((other, *answers))
     slope = droop(found) if found else None
     if slope is None or slope > 0:
         return None
@@ -171,11 +285,11 @@ def _wrong_droop(subject: Subject, steps: int, voltage: Answer, frequency: Answe
     return "wrong sign", f"{says}: look for the sign of Q in its droop"
 
 
-def _said(voltage: Answer, frequency: Answer) -> str:
+def _said(point: Point, voltage: Answer, frequency: Answer) -> str:
     q, p = voltage.power.imag, frequency.power.real
     first = f"{100 * VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
     second = f"{100 * FREQUENCY:g} % less frequency {p:+.3g} pu of active power"
-    if abs(q) < 3 * VOLTAGE * abs(POINT.Q) + _SOME:
+    if abs(q) < _least(point):
         first += " (it does not support the voltage)"
     if abs(p) < _SOME:
         second += " (it does not support the frequency)"

@@ -311,11 +311,19 @@ def missed_by_one_point():
         return carriers(name, fault, only=only, **options)[0]
 
     balance = ("steady_state", "power_balance")
+    signs = (*balance, "signs")
     return [
         one("imported_p", "power not as asked", balance, FAULT_IMPORTED_P=1.7),
         one("imported_q", "power not as asked", balance, FAULT_IMPORTED_Q=-1),
         one("imported_limit", "no current limit", ("limits",), FAULT_IMPORTED_LIMIT=1),
-    ]
+        one("absorbing_droop", "wrong sign", signs, FAULT_ABSORBING=-1.0),
+        *carriers(
+            "omega_reversed", "wrong frequency", only=signs, omega=("f_meas", "Hz"), OMEGA_UNIT=50.0, OMEGA_FACTOR=-1
+        ),
+        one("omega_by_two_pi", "wrong frequency", signs, OMEGA_FACTOR="6.2831853"),
+        one("angle_in_turns", "wrong frequency", signs, TURNS="50.0"),
+        *carriers("one_way", "loses synchronism", only=signs, FAULT_ONE_WAY=1),
+    ]  # fmt: skip
 
 
 def reported():
