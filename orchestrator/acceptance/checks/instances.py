@@ -1,12 +1,27 @@
 """Whether instances of one FMU leave each other alone, and begin anew as new ones do."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.running import EQUAL, affordable
-from orchestrator.acceptance.checks.subject import Point, Running, Stimulus, Subject, difference, elsewhere
+from orchestrator.acceptance.checks.subject import (
+    Point,
+    Running,
+    Stimulus,
+    Subject,
+    difference,
+    elsewhere,
+    settings,
+    tune,
+    with_settings,
+)
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
+
+Setting = Mapping[str, float | bool]
 
 _OTHER = Point(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 
@@ -16,42 +31,59 @@ def independence(subject: Subject) -> Result:
     """Leave an instance idle beside another one that runs; then run both, with different inputs."""
     if subject.description.one_instance:
         return not_applicable("independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess")
-    moved = _idle(subject)
+    result: Result | None = None
+    for setting in settings(subject):
+        try:
+            found = _independent(subject, setting)
+        except ComponentError:
+            if not setting:
+                raise
+            continue  # it does not work so
+        if found.fault:
+            return replace(found, evidence=f"{found.evidence}{with_settings(setting)}")
+        result = result or found
+    assert result is not None
+    return result
+
+
+def _independent(subject: Subject, setting: Setting) -> Result:
+    """Look with some parameters set."""
+    moved = _idle(subject, setting)
     if moved is not None:
         says = f"{moved} of an instance that stands still moves while another one runs"
         return failed("independence", "shared between instances", says)
     steps, h = affordable(subject, 300), subject.step_size
     stimulus = subject.steps(hold=10 * h)
-    alone, again = (subject.trajectory(steps, h, stimulus) for _ in range(2))
+    alone, again = (subject.trajectory(steps, h, stimulus, parameters=setting) for _ in range(2))
     if difference(alone, again)[0] > EQUAL:
         return passed("independence", "an instance that stands still does not move while another one runs")
-    apart, place = difference(alone, _beside(subject, steps, stimulus))
+    apart, place = difference(alone, _beside(subject, steps, stimulus, setting))
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range as soon as a second one runs beside it"
         return failed("independence", "shared between instances", says, difference=apart)
     return passed("independence", f"a second instance beside it changes nothing ({apart:.1g})", difference=apart)
 
 
-def _idle(subject: Subject) -> str | None:
+def _idle(subject: Subject, setting: Setting) -> str | None:
     """An output of a standing instance that moves while another one runs."""
     h, stimulus = subject.step_size, subject.steps(hold=7 * subject.step_size, seed=2)
-    with subject.running("idle") as idle:
+    with subject.running("idle", parameters=setting) as idle:
         idle.record(3, h, stimulus)
         before = idle.read()
-        with subject.running("busy", point=_OTHER) as busy:
+        with subject.running("busy", point=_OTHER, parameters=setting) as busy:
             busy.record(20, h, lambda t: 3 * stimulus(t))
         after = idle.read()
     apart, place = difference(before[None], after[None])
     return subject.watched[place] if apart > EQUAL else None
 
 
-def _beside(subject: Subject, steps: int, stimulus: Stimulus) -> Numbers:
+def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) -> Numbers:
     """A run of one instance, while another one that started elsewhere is fed and stepped otherwise."""
     h, other = subject.step_size, subject.steps(hold=7 * subject.step_size, seed=2)
-    with subject.running("first") as first:
+    with subject.running("first", parameters=setting) as first:
         rows = [first.read()]
-        with subject.running("second", point=_OTHER) as second:
-            _set_parameters_elsewhere(second)
+        with subject.running("second", point=_OTHER, parameters=setting) as second:
+            tune(second, elsewhere(subject, switches=False))
             for k in range(steps):
                 first.time = k * h
                 first.feed(stimulus(k * h))
@@ -65,18 +97,39 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus) -> Numbers:
 
 @check("reset", "Is it like new after fmi2Reset?", needs=SAME)
 def reset(subject: Subject) -> Result:
+    """Also with its tunable Booleans the other way: in the life before, and in the one after."""
+    result: Result | None = None
+    for setting in settings(subject):
+        try:
+            found = _like_new(subject, setting)
+        except ComponentError as error:
+            if not setting:
+                return failed("reset", "reset fails", str(error))
+            continue  # it does not work so
+        if found.fault:
+            return replace(found, evidence=f"{found.evidence}{with_settings(setting)}")
+        result = result or found
+    assert result is not None
+    return result
+
+
+def _like_new(subject: Subject, setting: Setting) -> Result:
+    """Compare a run after fmi2Reset with one of a new instance, with some parameters set."""
     steps, h = affordable(subject, 300), subject.step_size
-    stimulus = subject.steps(hold=10 * h)
-    fresh = subject.trajectory(steps, h, stimulus)
-    try:
-        with subject.running(point=_OTHER) as running:
-            _live(running, steps)
-            _set_parameters_elsewhere(running)
-            running.point = None
-            running.reset()
-            again = running.record(steps, h, stimulus)
-    except ComponentError as error:
-        return failed("reset", "reset fails", str(error))
+    stimulus, moved = subject.steps(hold=10 * h), elsewhere(subject)
+    with subject.running(parameters=setting) as new:
+        begun = new.component.values(moved)
+        fresh = new.record(steps, h, stimulus)
+    with subject.running(point=_OTHER, parameters=setting) as running:
+        _live(running, steps)
+        tune(running, moved)
+        running.point = None
+        running.reset()
+        after = running.component.values(moved)
+        again = running.record(steps, h, stimulus)
+    if left := [n for n in moved if after[n] != begun[n]]:
+        says = f"{left[0]} is {after[left[0]]:g} after fmi2Reset, and {begun[left[0]]:g} in a new instance"
+        return failed("reset", "reset leaves something", says)
     apart, place = difference(fresh, again)
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range in a run after fmi2Reset"
@@ -110,12 +163,3 @@ def _live(running: Running, steps: int) -> None:
     """Give an instance a life elsewhere."""
     elsewhere = running.subject.steps(hold=7 * running.subject.step_size, seed=3)
     running.record(steps, running.subject.step_size, lambda t: 2 * elsewhere(t))
-
-
-def _set_parameters_elsewhere(running: Running) -> None:
-    """Tunable parameters go elsewhere before the reset, which must bring them back."""
-    for name, value in elsewhere(running.subject).items():
-        try:
-            running.component.set({name: value})
-        except ComponentError:
-            return

@@ -186,7 +186,8 @@ def start_values(subject: Subject) -> Result:
 
 def _not_taken(subject: Subject) -> str | None:
     """A parameter that reads as before after it was set; None if there is none."""
-    wanted = elsewhere(subject)
+    start = subject.description.variables
+    wanted = elsewhere(subject, switches=False)
     if not wanted:
         return None
     try:
@@ -194,6 +195,5 @@ def _not_taken(subject: Subject) -> str | None:
             found = running.component.get(list(wanted))
     except ComponentError:
         return None  # it may refuse values that do not go together
-    start = subject.description.variables
     lost = [n for n, v in found.items() if v == start[n].start_number != wanted[n]]
     return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None

@@ -189,6 +189,8 @@ def good():
         Member(converter("converter_without_a_function", WITHOUT_DESERIALIZE=1, state=False)),
         Member(converter("converter_that_forbidden_calls_crash", FAULT_NO_ORDER=1)),
         Member(small("tank", "TANK", TANK, step_size="1e-2", stop_time="20")),
+        Member(converter("converter_with_damping", switch=True)),
+        Member(_open_lag("open_lag")),
     ]  # fmt: skip
     for form in ("polar", "abc", "qd", "power"):
         value, current = _si(form)
@@ -304,6 +306,10 @@ def missed():
     ]  # fmt: skip
 
 
+def _open_lag(name, **defines):
+    return small(name, "OPEN_LAG", OPEN_LAG, defines=defines, step_size="1e-3", stop_time="2", settable=True)
+
+
 def missed_by_one_point():
     """What passed every check, since it works at the points, the step, the time or the setting that were tried."""
 
@@ -312,6 +318,7 @@ def missed_by_one_point():
 
     balance = ("steady_state", "power_balance")
     signs = (*balance, "signs")
+    switched = {"switch": True}
     return [
         one("imported_p", "power not as asked", balance, FAULT_IMPORTED_P=1.7),
         one("imported_q", "power not as asked", balance, FAULT_IMPORTED_Q=-1),
@@ -323,6 +330,12 @@ def missed_by_one_point():
         one("omega_by_two_pi", "wrong frequency", signs, OMEGA_FACTOR="6.2831853"),
         one("angle_in_turns", "wrong frequency", signs, TURNS="50.0"),
         *carriers("one_way", "loses synchronism", only=signs, FAULT_ONE_WAY=1),
+        one("state_of_switch", "hidden state", ("state",), FAULT_STATE_SWITCH=1, **switched),
+        one("state_of_switched", "hidden state", ("state",), FAULT_STATE_OF_SWITCHED=1, **switched),
+        one("reset_of_switch", "reset leaves something", ("reset",), FAULT_RESET_SWITCH=1, **switched),
+        one("shared_switch", "shared between instances", ("independence",), FAULT_SWITCHED_SHARED=1, **switched),
+        one("one_state_at_a_time", "hidden state", ("state",), FAULT_ONE_BUFFER=1),
+        Member(_open_lag("state_that_nothing_shows", FAULT_STATE_SILENT="TRAIL"), "hidden state"),
     ]  # fmt: skip
 
 
