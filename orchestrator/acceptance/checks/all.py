@@ -25,7 +25,7 @@ MODULES = (
 ORDER = (
     "fmi_validity", "units", "declared_starts", "declared_dependencies", "loads",
     "runs", "start_values", "call_order", "independence", "repeatability", "reading", "reset", "reinstantiation",
-    "state", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
+    "state", "settable_states", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
     "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 

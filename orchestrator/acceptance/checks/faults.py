@@ -31,6 +31,7 @@ REMEDIES = {
     "files stay open": "what is opened must be closed with the instance; until then begin a new process now and then",
     # the same answer
     "parameter not taken": "fmi2SetReal must change what the file declares as a parameter; ask the author",
+    "state not taken": "what is declared as settable must be set: until it is, linearisation by perturbation is wrong",
     "not repeatable": "look for numbers that are never set, random numbers, or clocks",
     "reading changes it": "a getter must not change the FMU",
     "shared between instances": "static variables must become members of the instance; until then use one a process",

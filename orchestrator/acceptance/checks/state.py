@@ -67,6 +67,27 @@ def state(subject: Subject) -> Result:
     return passed("state", f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g})", difference=worst)
 
 
+@check("settable_states", "Does it take the states that it lets a master set?", needs=("reading",))
+def settable_states(subject: Subject) -> Result:
+    """Set one state after another and read it back."""
+    names = subject.description.states
+    if not (subject.description.states_are_settable and names):
+        return not_applicable("settable_states", "because the FMU does not declare that its states can be set")
+    h = subject.step_size
+    with subject.running() as running:
+        running.record(3, h, subject.steps(hold=h))
+        for name in names:
+            before = float(running.component.values([name])[name])
+            wanted = before + 1e-3 * max(1.0, abs(before))
+            running.component.set({name: wanted})
+            found = float(running.component.values([name])[name])
+            if not abs(found - wanted) <= 1e-6 * abs(wanted - before):
+                says = f"state {name} was {before:.9g}, was set to {wanted:.9g}, and reads {found:.9g}"
+                return failed("settable_states", "state not taken", says)
+            running.component.set({name: before})
+    return passed("settable_states", f"{len(names)} states read as they were set")
+
+
 @check("state_size", "How large is the state, and does it stay so?", needs=(*SAME, "reading", "state"))
 def state_size(subject: Subject) -> Result:
     if not (subject.description.can_save_state and subject.description.can_serialize_state):

@@ -335,6 +335,7 @@ def missed_by_one_point():
         one("reset_of_switch", "reset leaves something", ("reset",), FAULT_RESET_SWITCH=1, **switched),
         one("shared_switch", "shared between instances", ("independence",), FAULT_SWITCHED_SHARED=1, **switched),
         one("one_state_at_a_time", "hidden state", ("state",), FAULT_ONE_BUFFER=1),
+        Member(_open_lag("state_not_taken", FAULT_IGNORES_STATE="X"), "state not taken"),
         Member(_open_lag("state_that_nothing_shows", FAULT_STATE_SILENT="TRAIL"), "hidden state"),
     ]  # fmt: skip
 
