@@ -22,6 +22,9 @@ _LASTS = 0.15
 _LONG = (0.85, 1.0, 2.0)
 """A dip that stays: to what voltage [pu], when [s], how long [s]."""
 
+_DEEP = (0.2, 1.0, 0.5)
+"""A deep dip that outlasts a fault that is cleared in time."""
+
 _CYCLE = 0.02
 """Time [s] over which a current is averaged: what heats the semiconductors and what protection sees."""
 
@@ -36,8 +39,8 @@ axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff
 _BACK = 0.3
 """Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
 
-_AT_LEAST = 3
-"""Runs that are made however long they take: at all times, a dip that stays, and while power flows the other way."""
+_AT_LEAST = 4
+"""Runs that are made however long they take: at all times, dips that stay, and while power flows the other way."""
 
 _PART = 1.5
 """Wall-clock time to spend, in parts of the time for which an FMU is made to run."""
@@ -59,7 +62,17 @@ class Event:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an event brought: largest current, mean over its last cycle, distance afterwards [pu, S_n]."""
+    """What an event brought [pu, S_n].
+
+    Attributes
+    ----------
+    peak
+        The largest current.
+    mean
+        Over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that.
+    away
+        Distance of the current from where it was, afterwards.
+    """
 
     event: Event
     peak: float
@@ -74,10 +87,10 @@ def _runs() -> Iterator[list[Event]]:
     jumps = {a: (f"phase jump of {a:g}°", rect(1, a * pi / 180)) for a in (60.0, -60.0, 20.0)}
     kinds = [jumps[60.0], dips[0.7], swells[1.3], dips[0.9], dips[0.2],
              jumps[-60.0], dips[0.5], swells[1.1], dips[0.0], jumps[20.0]]  # fmt: skip
-    to, at, lasts = _LONG
     for k in range(len(kinds)):
         if k == 1:
-            yield [Event(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
+            for to, at, lasts in (_LONG, _DEEP):
+                yield [Event(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
             some = zip((dips[0.0], dips[0.5], jumps[-60.0]), _TIMES, strict=False)
             yield [Event(*kind, at, point=IMPORTING[0]) for kind, at in some]
         yield [Event(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(_TIMES)]
@@ -136,7 +149,9 @@ def _disturbed(subject: Subject, rest: list[Event], answers: list[Answer], refus
                 return event
             cycle = max(1, round(_CYCLE / h))
             away = abs(after[-1] - before[-1]) if len(after) else 0.0
-            answers.append(Answer(event, float(size.max()), float(np.abs(during[-cycle:]).mean()), float(away)))
+            late = np.abs(during[max(0, min(len(during), round(_LASTS / h)) - cycle) :])
+            means = np.convolve(late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid")
+            answers.append(Answer(event, float(size.max()), float(means.max()), float(away)))
             if away > _BACK:
                 return None
     return None
@@ -150,7 +165,7 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     declared = current_limit(subject)
     seen = (
         f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s: at most "
-        f"{worst.mean:.3g} pu of its rating over the last cycle in {worst.event}, "
+        f"{worst.mean:.3g} pu of its rating over a cycle, from {1000 * _LASTS:g} ms on, in {worst.event}, "
         f"peak {highest.peak:.3g} pu in {highest.event}"
     )
     seen += f"; {left_out} more were left out for time" if left_out else ""

@@ -323,6 +323,7 @@ def missed_by_one_point():
         one("imported_p", "power not as asked", balance, FAULT_IMPORTED_P=1.7),
         one("imported_q", "power not as asked", balance, FAULT_IMPORTED_Q=-1),
         one("imported_limit", "no current limit", ("limits",), FAULT_IMPORTED_LIMIT=1),
+        one("limit_tires", "no current limit", ("limits",), FAULT_LIMIT_TIRES=0.16),
         one("absorbing_droop", "wrong sign", signs, FAULT_ABSORBING=-1.0),
         *carriers(
             "omega_reversed", "wrong frequency", only=signs, omega=("f_meas", "Hz"), OMEGA_UNIT=50.0, OMEGA_FACTOR=-1
