@@ -33,6 +33,9 @@ _START_NAMES = {
 }
 
 
+_RATED_VOLTAGE = re.compile(r"^[vu]_?(n|nom|rated|base)$|rated_?volt|nominal_?volt", re.IGNORECASE)
+
+
 @dataclass(frozen=True)
 class Guess:
     """A port's form and variables, and how sure that is."""
@@ -70,7 +73,7 @@ def draft_binding(native: FmuDescription, beside: Path | None = None) -> str:
         f"file = {_quoted(file)}",
         f"guid = {_quoted(native.guid)}",
         "",
-        *_rating(starts["S_n"], native),
+        *_rating(starts["S_n"], native, voltage, current),
         "",
         *_phasor("voltage", voltage, native.inputs),
         "",
@@ -158,17 +161,29 @@ def _start(native: FmuDescription, name: str, taken: Sequence[str]) -> VariableI
 # -- text ----------------------------------------------------------------------------------------
 
 
-def _rating(S_n: VariableInfo | None, native: FmuDescription) -> list[str]:
+def _rating(S_n: VariableInfo | None, native: FmuDescription, *ports: Guess | None) -> list[str]:
     lines = ["[rating]"]
     if S_n is not None and S_n.start is not None:
         unit = S_n.unit if S_n.unit in ("MVA", "kVA", "VA", "GVA") else "MVA"
         lines.append(f'S_n = "{S_n.start_number:g} {unit}"  # GUESS: start value of {S_n.name}')
     else:
         lines.append(f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"')
-    lines.append('# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A')
+    lines.append(_rated_voltage(native, ports))
     f_n = native.variables.get("f_n")
     lines.append(f'f_n = "{50 if f_n is None or f_n.start is None else f_n.start_number:g} Hz"  # GUESS')
     return lines
+
+
+def _rated_voltage(native: FmuDescription, ports: Iterable[Guess | None]) -> str:
+    """V_n from a parameter of that name; to be filled in where the port is in volts or amperes."""
+    known = [v for v in native.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
+    named = next((v for v in known if v.unit in _VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
+    if named is not None:
+        return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
+    units = {v.unit for guess in ports if guess is not None for v in guess.variables}
+    if units & {*_VOLTS, *_AMPERES}:
+        return f'V_n = "{REQUIRED}: rated line-to-line voltage at the port, such as 690 V"'
+    return '# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A'
 
 
 def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:

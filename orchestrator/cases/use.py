@@ -56,8 +56,8 @@ def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[Point | None, 
         if name in start:
             full[name] = start[name]
         else:
-            declared = variables[name].start if name in variables else None
-            full[name] = default if declared is None else float(declared)
+            declared = variables.get(name)
+            full[name] = default if declared is None or declared.start is None else declared.start_number
         words.append(f"{name} = {full[name]:.6g}{'' if name in start else ' (default)'}")
     return Point(full["v_0"], full["theta_0"], full["P_0"], full["Q_0"]), ", ".join(words)
 

@@ -57,6 +57,7 @@ def test_a_draft_tells_what_is_left_to_fill_in(gfor, gallery, tmp_path):
     assert code == 0
     assert "to be filled in: S_n" not in text  # its S_n has a start value
     assert text.count("to be filled in: value") == 3
+    assert "to be filled in: V_n" in text  # its port is in kV and kA
     code, _, error = gfor("bind", fmu, "--out", out)
     assert code == 2
     assert "there already" in error

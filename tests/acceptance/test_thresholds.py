@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
 from tests.acceptance.gallery.build import Source, Variable, build
@@ -75,3 +76,13 @@ def test_imported_power_that_the_file_forbids_is_not_tried_and_said(check, tmp_p
     report = check_fmu(build(source, tmp_path), None, LIMITS, (check,), run_for=0.2)
     assert report.results[-1].verdict == "remark"
     assert "P_0 = -0.5 is outside of what the FMU declares" in report.results[-1].evidence
+
+
+@pytest.mark.parametrize(("declared", "verdict"), [("1e-4", "remark"), ("4e-4", "fail")])
+def test_steps_that_are_too_long_for_it_are_a_fault_where_it_declares_them(declared, verdict, tmp_path):
+    """What is beyond 300 µs is lost: 100 and 200 µs agree, 400 µs do not."""
+    source = converter("longest_step", FAULT_LONGEST_STEP="3e-4", step_size=declared)
+    report = check_fmu(build(source, tmp_path), None, LIMITS, ("step_invariance",), run_for=0.2, use=Use(1e-4))
+    assert report.results[-1].verdict == verdict
+    assert "steps of 0.0001 and 0.0002 s differ by " in report.results[-1].evidence
+    assert "0.0002 and 0.0004 s by " in report.results[-1].evidence
