@@ -61,6 +61,7 @@ REMEDIES = {
     "no current limit": "have its current limited as the converter's is; a machine's binding says I_max",
     "does not start": "it must start from a power flow within its ratings",
     "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
+    "leaves its steady state": "something in it counts time, or adds up what never ends; ask the author",
     "wrong sign": "turn 'direction', 'form', 'signs' or 'frame_angle' of the binding, or have the FMU corrected",
     "wrong base": "check unit, base and 'value' (rms or peak, phase or line) of current, voltage and start values",
     "wrong frame": "set 'frame_angle' of the binding, or 'dq' for 'qd'",

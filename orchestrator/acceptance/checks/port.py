@@ -2,16 +2,18 @@
 
 from cmath import phase
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isinf, pi, sqrt
+from time import perf_counter
 
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.running import affordable
+from orchestrator.acceptance.checks.running import LONGEST, RUN_FOR, affordable
 from orchestrator.acceptance.checks.subject import Point, Running, Subject
 from orchestrator.arrays import Complex, Numbers
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
 
@@ -30,6 +32,12 @@ _BALANCE = 0.02
 
 _DRIFT = 1e-3
 """Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
+
+_PART = 0.75
+"""Wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run."""
+
+_GOES_ON = 0.4
+"""Part of a movement that its second half has where it goes on; of a ramp it is a half."""
 
 WHY = {
     "no port": "because it has no port: give a binding with --binding (`gfor bind` drafts one)",
@@ -102,12 +110,15 @@ def steady_state(subject: Subject) -> Result:
         return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
     steps, worst = affordable(subject, 5000), 0.0
     refused = []
+    rest: _Rest | None = None
     for point in _points(subject)[:3]:
         try:
             with subject.running(point=point) as running:
                 begin = _current(running)
                 moved = np.abs(currents(running, 0j, steps) - begin)
                 worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
+                if rest is None and worst <= _DRIFT:
+                    rest = _rest(subject, running, begin, steps)
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:
@@ -118,9 +129,47 @@ def steady_state(subject: Subject) -> Result:
         return failed("steady_state", "not a number", "its current is no number at constant voltage")
     if worst > _DRIFT:
         return failed("steady_state", "no steady state", seen, drift=worst)
+    if rest is not None:
+        worst = max(worst, rest.moved)
+        seen += f", and by {rest.moved:.3g} pu in {rest.time:.3g} s"
+        seen += ", and goes on" if rest.goes_on and rest.moved > 1e-6 else ""
+    if isinf(worst):
+        return failed("steady_state", "not a number", f"{seen}: its current is no number")
+    if worst > _DRIFT:
+        return failed("steady_state", "leaves its steady state", seen, drift=worst)
+    if worst > 1e-6 and rest is not None and rest.goes_on:
+        return remarked("steady_state", seen, "it does not settle: ask what goes on in it at rest", drift=worst)
     if worst > 1e-6:
         return remarked("steady_state", seen, "let it settle before linearising", drift=worst)
     return passed("steady_state", seen, drift=worst)
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """How far the current moved at constant voltage [pu, S_n], in what time [s], and whether that goes on."""
+
+    moved: float
+    time: float
+    goes_on: bool
+
+
+def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Rest:
+    """Leave it at rest until enough was seen, it moves too much, or there is no more time."""
+    until, clock = subject.description.stop_time or 10.0, perf_counter()
+    budget = _PART * subject.memory.get("run_for", RUN_FOR)
+    ends, moved = [(0.0, begin), (running.time, _current(running))], 0.0
+    while running.time < LONGEST and moved <= _DRIFT:
+        if perf_counter() - clock > (budget if running.time >= until else 4 * budget):
+            break
+        try:
+            current = currents(running, 0j, steps)
+        except (ComponentError, EndedError):
+            break  # it may end, or refuse to go on, after its experiment
+        moved = max(moved, float(np.nan_to_num(np.abs(current - begin), nan=np.inf).max()))
+        ends.append((running.time, complex(current[-1])))
+    half = next(i for time, i in ends if time >= 0.5 * ends[-1][0])
+    goes_on = abs(ends[-1][1] - half) > _GOES_ON * moved
+    return _Rest(moved, ends[-1][0], goes_on)
 
 
 @check("power_balance", "Are sign, base and frame such that the power at its port is the power asked of it?")

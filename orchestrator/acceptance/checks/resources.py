@@ -25,12 +25,13 @@ _TOOL = 65536.0
 
 @check("memory", "Does it give back the memory that it takes?")
 def memory(subject: Subject) -> Result:
-    if not _in_use(subject):
+    if not subject.memory_in_use():
         return not_applicable("memory", "because this platform does not tell how much memory is in use")
     steps, instance = affordable(subject, 1500), _TOOL if subject.description.needs_tool else _INSTANCE
     texts, figures = [], {}
     for what, growth, least in (
         ("step", _of_steps(subject, steps), _LEAST),
+        ("later step", _of_a_long_run(subject), _LEAST),
         ("instance", _of_instances(subject, instance), instance),
         ("saved state", _of_states(subject), _INSTANCE),
         ("fmi2Reset", _of_resets(subject, instance), instance),
@@ -48,17 +49,12 @@ def memory(subject: Subject) -> Result:
     return passed("memory", ", ".join(f"{growth:.1f} bytes a {what}" for what, growth in figures.items()), **figures)
 
 
-def _in_use(subject: Subject) -> int:
-    """Bytes in use in the FMU's process, as it says; 0 where it cannot."""
-    return subject.process().number("memory in use", -1, "memory_in_use")
-
-
 def _growth(subject: Subject, block: Callable[[], None], count: int) -> float:
     """Bytes kept by every repetition: the least growth of the later blocks, so that what fills once does not count."""
     sizes = []
     for _ in range(_BLOCKS):
         block()
-        sizes.append(_in_use(subject))
+        sizes.append(subject.memory_in_use())
     return max(0.0, min(b - a for a, b in pairwise(sizes[1:])) / count)
 
 
@@ -75,6 +71,14 @@ def _of_steps(subject: Subject, steps: int) -> float | None:
             running.record(steps, subject.step_size, stimulus)
 
         return _growth(subject, block, steps)
+
+
+def _of_a_long_run(subject: Subject) -> float | None:
+    """Bytes kept by each step at the end of the run of 'runs': the lesser of its last two parts."""
+    seen: list[tuple[int, int]] = subject.memory.get("bytes", [])[-3:]
+    if len(seen) < 3 or not all(size for _, size in seen):
+        return None
+    return max(0.0, min((b - a) / (later - sooner) for (sooner, a), (later, b) in pairwise(seen)))
 
 
 def _of_instances(subject: Subject, least: float) -> float:

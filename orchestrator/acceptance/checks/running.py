@@ -20,7 +20,10 @@ _PATIENCE = 10.0
 _HELD, _ROUNDS = 50, 4
 """Steps for which inputs stay; how often they change before it is looked at the clock."""
 
-_LONGEST = 60.0
+_LOOK = 2.5
+"""Simulated time [s] from one look at its memory to the next."""
+
+LONGEST = 60.0
 """Simulated time [s] after which enough was seen."""
 
 LEAST_STEPS = 20
@@ -37,7 +40,8 @@ def runs(subject: Subject) -> Result:
     stimulus, least = subject.steps(hold=_HELD * h), subject.memory.get("run_for", RUN_FOR)
     with subject.running() as running:
         begin, k = perf_counter(), 0
-        while k * h < _LONGEST and perf_counter() - begin < (least if k * h >= ends else _PATIENCE * least):
+        sizes = subject.memory["bytes"] = []
+        while k * h < LONGEST and perf_counter() - begin < (least if k * h >= ends else _PATIENCE * least):
             steps, running.time = _HELD * _ROUNDS, k * h
             try:
                 values = running.record(steps, h, stimulus)
@@ -51,6 +55,8 @@ def runs(subject: Subject) -> Result:
                 row = int(np.argmin(np.isfinite(values).all(axis=1)))
                 return _not_finite(subject, values[row], (k + row) * h)
             k += steps
+            if k * h >= _LOOK * (len(sizes) + 1):
+                sizes.append((k, subject.memory_in_use()))
         seconds = (perf_counter() - begin) / k
     subject.memory["seconds_per_step"] = seconds
     return passed(

@@ -138,6 +138,10 @@ class Subject:
             component.close()
             raise
 
+    def memory_in_use(self) -> int:
+        """Bytes in use in the FMU's process, as it says; 0 where it cannot."""
+        return self.process().number("memory in use", -1, "memory_in_use")
+
     @property
     def ends(self) -> float | None:
         """When its experiment ends [s]: as declared, or where it was seen to end by itself; None where not known."""

@@ -229,7 +229,7 @@ def step_invariance(subject: Subject) -> Result:
     return passed("step_invariance", seen, **figures)
 
 
-def _only_switches(subject: Subject, runs: tuple[Vector, Vector, Vector], h: float) -> bool:
+def _only_switches(subject: Subject, runs: tuple[Numbers, Numbers, Numbers], h: float) -> bool:
     """Whether the longer steps differ in moments of switching only."""
     _, double, fourfold = runs
     return bool(switches_elsewhere(subject.watched, [((double, 2 * h), (fourfold, 4 * h))]))

@@ -323,6 +323,11 @@ def missed_by_one_point():
         one("imported_p", "power not as asked", balance, FAULT_IMPORTED_P=1.7),
         one("imported_q", "power not as asked", balance, FAULT_IMPORTED_Q=-1),
         one("imported_limit", "no current limit", ("limits",), FAULT_IMPORTED_LIMIT=1),
+        one("drifts_later", "leaves its steady state", ("runs", "steady_state"), FAULT_DRIFTS_AFTER=3.0,
+            FAULT_DRIFTS_BY=0.02, stop_time="5"),
+        one("ramp", "leaves its steady state", ("runs", "steady_state"), FAULT_DRIFTS_AFTER=0.0, FAULT_DRIFTS_BY=1e-3,
+            stop_time="5"),
+        one("leaking_later", "memory leak", ("runs", "memory"), FAULT_LEAK=64, FAULT_LEAK_AFTER=2.4, stop_time="10"),
         one("limit_tires", "no current limit", ("limits",), FAULT_LIMIT_TIRES=0.16),
         one("absorbing_droop", "wrong sign", signs, FAULT_ABSORBING=-1.0),
         *carriers(
