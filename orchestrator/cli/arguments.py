@@ -49,10 +49,15 @@ def count(text: str) -> int:
 
 
 def percent(text: str) -> float:
-    """Damping [%] as a ratio."""
+    """Damping [%], as ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
     number = _number(text.removesuffix("%"))
     if not 0 < number <= 90:
         raise argparse.ArgumentTypeError(f"{text!r} is not a damping in percent between 0 and 90, such as 20")
+    if number < 1 and not text.endswith("%"):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is read in percent; write {100 * number:g} for a damping ratio of {number:g}, or {text}% if so "
+            "little is meant"
+        )
     return number / 100
 
 

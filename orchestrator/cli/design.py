@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import parameter_file_text
-from orchestrator.cli.arguments import positive
+from orchestrator.cli.arguments import percent, positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters
 from orchestrator.cli.terminal import make_console, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the converter, or a pattern such as 'gfor*' for several with one setting (default: all with this POD)",
     )
     parser.add_argument("--mode", metavar="NAME", help="the case's mode to damp (default: its first)")
-    parser.add_argument("--damping", type=_ratio, metavar="ZETA", help="required damping ratio, such as 0.2 or 20%%")
+    parser.add_argument("--damping", type=percent, metavar="PERCENT", help="required damping, such as 20")
     parser.add_argument(
         "--damping-increment",
-        type=_ratio,
-        metavar="DZETA",
-        help=f"required increase of the damping ratio (default: {defaults.damping_increment:g})",
+        type=percent,
+        metavar="POINTS",
+        help=f"required increase of the damping in points (default: {100 * defaults.damping_increment:g})",
     )
     parser.add_argument(
         "--delta-gain",
@@ -60,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stages", type=int, metavar="N_S", help="lead/lag stages (default: the component's own)")
     parser.add_argument(
         "--min-damping",
-        type=_ratio,
+        type=percent,
         default=defaults.least_damping,
-        metavar="ZETA",
-        help=f"damping ratio below which no other mode may be pushed (default: {defaults.least_damping:g})",
+        metavar="PERCENT",
+        help=f"damping below which no other mode may be pushed (default: {100 * defaults.least_damping:g})",
     )
     parser.add_argument("--refine", action="store_true", help="search gain and lead/lag on the closed loop as well")
     parser.add_argument("--no-margins", action="store_true", help="leave out the margins, which take longest")
@@ -126,13 +126,13 @@ def run(options: argparse.Namespace) -> int:
 def _command_line(options: argparse.Namespace) -> str:
     """The command that was given, with all that is not left to its default."""
     words = ["gfor", "design", str(options.case), "--controller", options.controller]
-    single = {"--component": options.component, "--mode": options.mode, "--damping": options.damping,
-              "--damping-increment": options.damping_increment, "--stages": options.stages,
+    single = {"--component": options.component, "--mode": options.mode, "--damping": _in_percent(options.damping),
+              "--damping-increment": _in_percent(options.damping_increment), "--stages": options.stages,
               "--step": options.step}  # fmt: skip
     words += [word for key, value in single.items() if value is not None for word in (key, str(value))]
     low, high = options.gain_bounds
     words += ["--delta-gain", f"{options.delta_gain:g}", "--gain-bounds", f"{low:g}:{high:g}"]
-    words += ["--gain-from", options.gain_from, "--min-damping", f"{options.min_damping:g}"]
+    words += ["--gain-from", options.gain_from, "--min-damping", f"{100 * options.min_damping:g}%"]
     for name in options.scenario:
         words += ["--scenario", name]
     for key, value in options.set:
@@ -158,15 +158,9 @@ def _writable(path: Path) -> Path:
     return path
 
 
-def _ratio(text: str) -> float:
-    """A damping ratio, as a number below 1 or in percent."""
-    try:
-        value = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a damping ratio between 0 and 1, such as 0.1 or 10%")
-    return value
+def _in_percent(ratio: float | None) -> str | None:
+    """A damping ratio as the options take it."""
+    return None if ratio is None else f"{100 * ratio:g}%"
 
 
 def _bounds(text: str) -> tuple[float, float]:

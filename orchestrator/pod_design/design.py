@@ -346,11 +346,12 @@ def _required(request: DesignRequest, initial: complex) -> float:
     required = request.damping if request.damping is not None else present + request.damping_increment
     if required <= present:
         raise InputError(
-            f"--damping {required:g}: without the controller the mode has a damping ratio of {present:.4f} already; "
+            f"--damping {100 * required:g}: without the controller the mode has {100 * present:.2f} % already; "
             "ask for more, or for an increase with --damping-increment"
         )
     if required >= 1:
         raise InputError(
-            f"the required damping ratio is {required:.3f} (the mode has {present:.3f}); it must be less than 1"
+            f"{100 * required:.1f} % of damping are required (the mode has {100 * present:.1f} %); "
+            "it must be less than 100 %"
         )
     return required

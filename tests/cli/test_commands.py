@@ -436,7 +436,11 @@ def test_critical_modes_alone(gfor):
 
 @pytest.mark.parametrize(
     ("arguments", "word"),
-    [(("--critical", "120"), "between 0 and 90"), (("--critical", "--range", "0:2"), "begins above 0")],
+    [
+        (("--critical", "120"), "between 0 and 90"),
+        (("--critical", "0.1"), "read in percent; write 10 for a damping ratio of 0.1"),
+        (("--critical", "--range", "0:2"), "begins above 0"),
+    ],
 )
 def test_a_search_over_nothing_is_refused(gfor, arguments, word):
     code, _, err = gfor("modes", "two_area", *arguments)

@@ -69,7 +69,7 @@ def test_a_sweep_names_the_points_that_grow(tmp_path, capsys):
 
 
 def test_a_design_that_leaves_the_system_unstable_is_not_met(tmp_path, capsys):
-    words = ("design", "two_area", "--controller", "pod_p", "--set", "gfor.droop.R_f=10", "--damping-increment", "0.05")
+    words = ("design", "two_area", "--controller", "pod_p", "--set", "gfor.droop.R_f=10", "--damping-increment", "5")
     code, text = output(capsys, *words, "--no-margins", "--out", tmp_path / "pod.toml", "--json", "--fail-unstable")
     sheet = json.loads(text)
     assert (code, sheet["stable"], sheet["met"]) == (1, False, False)

@@ -60,7 +60,7 @@ def test_the_parameter_file_says_where_it_comes_from(design, tmp_path):
     assert list(file.values) == [f"gfor.pod_q.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
     assert file.values["gfor.pod_q.enabled"] is True
     (command,) = re.findall("^# command: (.*)$", file.text, re.MULTILINE)
-    assert command.startswith("gfor design two_area --controller pod_q --damping 0.3 ")
+    assert command.startswith("gfor design two_area --controller pod_q --damping 30% ")
     assert "--set grid.X_L=0.2" in command
 
 
@@ -104,9 +104,10 @@ def test_no_stages_leave_the_lead_lag_out(design):
         (["--scenario", "gfor", "--scenario", "pod_q"], "a design is made for one scenario, not for gfor and pod_q"),
         (["--component", "sg*"], "--component sg*: scenario 'gfor' has no component of that name with pod_p; those"),
         (["--mode", "1-2"], "--mode: the case names no mode '1-2'; it names: electromechanical"),
-        (["--damping", "0.05"], "has a damping ratio of 0.1059 already; ask for more"),
-        (["--damping", "20"], "'20' is not a damping ratio between 0 and 1, such as 0.1 or 10%"),
-        (["--damping", "0.2", "--damping-increment", "0.1"], "both say what is required; give one of them"),
+        (["--damping", "5"], "--damping 5: without the controller the mode has 10.59 % already; ask for more"),
+        (["--damping", "120"], "'120' is not a damping in percent between 0 and 90, such as 20"),
+        (["--damping", "0.2"], "'0.2' is read in percent; write 20 for a damping ratio of 0.2, or 0.2% if so"),
+        (["--damping", "20", "--damping-increment", "10"], "both say what is required; give one of them"),
         (["--gain-bounds", "400:200"], "'400:200' are no bounds; write MIN:MAX in pu"),
         (["--gain-bounds", "0:1e6"], "--gain-bounds: 1e+06 is out of range: gfor.pod_p.K takes from 0 to 100000"),
         (["--delta-gain", "0"], "'0' must be a number above 0"),
@@ -172,7 +173,7 @@ def test_the_largest_real_part_is_the_headlines_and_the_other_mode_another(gfor)
 
 def test_gains_that_were_unstable_are_marked(gfor):
     arguments = ("design", "two_area_rms", "--controller", "pod_p", "--no-margins", "--refine", *UNSTABLE)
-    _, out, _ = gfor(*arguments, "--gain-bounds", "0:50", "--damping-increment", "0.01")
+    _, out, _ = gfor(*arguments, "--gain-bounds", "0:50", "--damping-increment", "1")
     assert "† the system is unstable with this gain" in out
     (sweep,) = re.findall(r"as designed .*", out)
     assert "†" in sweep
