@@ -56,7 +56,7 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
             "case": prepared.case.name,
             "scenario": prepared.name,
             "component": name,
-            "communication_step_s": prepared.step_size,
+            "step_size_s": prepared.step_size,
             "residual_per_step": point.residual,
             "derivatives": "directional derivatives" if exact else f"central differences of {PERTURBATIONS[0]:g}",
             "fmu_guid": plan.description.guid,

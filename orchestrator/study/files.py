@@ -154,7 +154,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "share_in_fmus": stats.share_in_fmus if stats else None,
         "linear_difference": _linear_differences(result),
         "swing": {name: modes.swing_of(mode) for name, mode in modes.named.items()},
-        "step_size": modes.prepared.step_size,
+        "step_size_s": modes.prepared.step_size,
         "stop_time": modes.prepared.stop_time,
         "schedule": modes.prepared.schedule.name,
         "events": [str(event) for event in modes.prepared.events],

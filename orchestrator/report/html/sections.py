@@ -98,7 +98,7 @@ def studied(results: Results) -> str:
                      escape("; ".join(s.get("events", [])) or "none"), str(s["states"])])  # fmt: skip
     first = results.scenarios[0]
     solver = (
-        f"Coupled as FMUs with a communication step of {1e6 * first['step_size']:g} µs ({escape(first['schedule'])}), "
+        f"Coupled as FMUs with a communication step of {1e6 * first['step_size_s']:g} µs ({escape(first['schedule'])}), "
         f"simulated for {first['stop_time']:g} s. {_linearised(results)}"
     )
     source = f"<p>{escape(case.source)}</p>" if case.source else ""
