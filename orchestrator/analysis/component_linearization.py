@@ -343,28 +343,42 @@ def _differences(
     upwards = tuple(np.zeros_like(column) for column in columns[:2])
     saved = component.save_state()
     try:
-        outputs_0 = outputs.read().copy()
+        outputs_0, slopes_0 = outputs.read().copy(), slopes.read().copy()
         component.step(time, step_size)
         after_0 = after.read().copy()
         component.restore_state(saved)
         for k, place in enumerate(varied):
             perturbed, value = RealBatch(component, [names[place]]), z_0[place]
             step = size * max(1.0, abs(value))
-            for sign in (+1.0, -1.0):
+            signs = _allowed_signs(component, names[place], value, step)
+            for sign in signs:
                 perturbed.values[0] = value + sign * step
                 perturbed.write()
                 for batch, column in zip((outputs, slopes), columns[1:], strict=True):
                     column[k] += sign * batch.read()
                 component.step(time, step_size)
                 columns[0][k] += sign * after.read()
-                if sign > 0:
-                    upwards[0][k], upwards[1][k] = after.values - after_0, outputs.values - outputs_0
+                if sign == signs[0]:
+                    upwards[0][k], upwards[1][k] = sign * (after.values - after_0), sign * (outputs.values - outputs_0)
                 component.restore_state(saved)
+            if len(signs) == 1:
+                for column, at_rest in zip(columns, (after_0, outputs_0, slopes_0), strict=True):
+                    column[k] -= signs[0] * at_rest
             for column in columns:
-                column[k] /= 2 * step
+                column[k] /= len(signs) * step
             for column in upwards:
                 column[k] /= step
     finally:
         component.restore_state(saved)
         component.free_state(saved)
     return _Differences(*(column.T for column in (*columns, *upwards)))
+
+
+def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:
+    """Directions of a perturbation that stay within a parameter's declared bounds; both, where none does."""
+    info = component.description.variables[name]
+    if info.causality != "parameter":
+        return (+1.0, -1.0)
+    above = info.maximum is None or value + step <= info.maximum
+    below = info.minimum is None or value - step >= info.minimum
+    return tuple(sign for sign, within in ((+1.0, above), (-1.0, below)) if within) or (+1.0, -1.0)

@@ -71,3 +71,10 @@ def test_a_continuous_and_a_stepped_model_answer_alike():
 def test_what_cannot_be_linear_is_said(arguments, word, tmp_path, capsys):
     assert main([*arguments, "--scenario", "base", "--out", str(tmp_path)]) == 2
     assert word in capsys.readouterr().err
+
+
+def test_a_parameter_at_its_bound_is_perturbed_to_the_other_side(gfor, tmp_path):
+    """The dip's depth is 0, and may not be less."""
+    code, shown, said = gfor("linearize", "infinite_bus", "--scenario", "dip", "--out", str(tmp_path))
+    assert (code, said) == (0, "")
+    assert "1 inputs" in shown

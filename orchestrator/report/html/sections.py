@@ -98,8 +98,8 @@ def studied(results: Results) -> str:
                      escape("; ".join(s.get("events", [])) or "none"), str(s["states"])])  # fmt: skip
     first = results.scenarios[0]
     solver = (
-        f"Coupled as FMUs with a communication step of {1e6 * first['step_size_s']:g} µs ({escape(first['schedule'])}), "
-        f"simulated for {first['stop_time']:g} s. {_linearised(results)}"
+        f"Coupled as FMUs with a communication step of {1e6 * first['step_size_s']:g} µs "
+        f"({escape(first['schedule'])}), simulated for {first['stop_time']:g} s. {_linearised(results)}"
     )
     source = f"<p>{escape(case.source)}</p>" if case.source else ""
     return f"{source}<p>{solver}</p>" + table(
