@@ -17,6 +17,7 @@ from orchestrator.black_box.frequency_response import Excitation, measure
 from orchestrator.cases.case import load_case
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.description import read_description
+from orchestrator.study.linear import linear_model
 from orchestrator.study.modes import compute_modes, running
 from tests.acceptance.gallery.build import Source, Variable, build
 from tests.coupling.small_fmus import small_fmu
@@ -104,6 +105,14 @@ def test_growth_that_an_fmu_does_not_declare_leaves_the_verdict_not_known(tmp_pa
     assert "component 'device' does not answer as its linear model does" in found.stability.reason
     assert any("not known" in warning for warning in found.warnings)
     assert found.stability.largest_growth_rate < 0  # what the declared states alone say
+
+
+@pytest.mark.parametrize("as_continuous", [False, True])
+def test_a_linear_model_of_an_fmu_that_hides_growth_is_not_called_stable(tmp_path, as_continuous):
+    prepared = loop(tmp_path, device(tmp_path, "hiding", HIDDEN=1), -0.5)
+    _, _, examined = linear_model(prepared, [], ["device.y"], as_continuous=as_continuous)
+    assert examined.stability.stable is None
+    assert "component 'device' does not answer as its linear model does" in examined.stability.reason
 
 
 def test_a_state_that_stands_still_though_its_derivative_does_not_is_named(tmp_path):
