@@ -73,7 +73,7 @@ class Case(CaseDefinition):
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.questions if q not in questions]
-        if not problems and unmatched(self.table, named, self.place):
+        if not problems and self.numbered and unmatched(self.table, named, self.place):
             problems += self._mentions
         if problems:  # what is most unusual may well be why
             asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]

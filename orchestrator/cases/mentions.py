@@ -4,7 +4,7 @@ Components may be absent from some scenarios, so that a name is wrong only where
 """
 
 import fnmatch
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from orchestrator.cases.draft import Draft, Place
@@ -21,15 +21,16 @@ class Named:
     ----------
     components
         Names of all components.
-    stateless
-        Foreign FMUs that declare no state: how a model that is identified for them names its own is not known.
+    foreign
+        Components that are FMU files. One that stands for a model of the catalogue need not have all its outputs and
+        states, so that their names are not checked.
     homes
         What an area may name: components and buses.
     """
 
     components: set[str] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
-    stateless: set[str] = field(default_factory=set)
+    foreign: set[str] = field(default_factory=set)
     outputs: set[str] = field(default_factory=set)
     homes: set[str] = field(default_factory=set)
 
@@ -40,8 +41,8 @@ class Named:
             self.components.add(name)
             self.homes.add(name)
             self.states |= {f"{name}.{state}" for state in fmu.states}
-            if not fmu.states and draft.tables[name].fmu is not None:
-                self.stateless.add(name)
+            if draft.tables[name].fmu is not None:
+                self.foreign.add(name)
             self.outputs |= {f"{name}.{v}" for v in fmu.outputs if fmu.variables[v].type == "Real"}
             self.homes |= {v.rpartition(".")[0] for v in fmu.outputs} - {""}
         self.homes |= set(draft.network.buses) if draft.network else set()
@@ -62,13 +63,13 @@ def _states(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
         groups.append((place("analysis", "swing"), analysis.swing))
     for where, patterns in groups:
         for pattern in patterns:
-            if not fnmatch.filter(named.states, pattern) and not _may_be_hidden(named, pattern):
+            if not fnmatch.filter(named.states, pattern) and not _of_foreign(named, pattern):
                 hint = close_names(pattern, sorted(named.states), "`gfor modes --json` lists the states")
                 yield Problem(where, f"{pattern!r}: no scenario has a state component.state of that name; {hint}")
 
 
-def _may_be_hidden(named: Named, pattern: str) -> bool:
-    return "." in pattern and bool(fnmatch.filter(named.stateless, pattern.partition(".")[0]))
+def _of_foreign(named: Named, pattern: str) -> bool:
+    return "." in pattern and bool(fnmatch.filter(named.foreign, pattern.partition(".")[0]))
 
 
 def _areas(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
@@ -89,18 +90,18 @@ def _signals(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
         for n, panel in enumerate(plot.panels)
     ]
     for where, expression in entries:
-        yield from _signal(where, expression, named.outputs)
+        yield from _signal(where, expression, named)
 
 
-def _signal(where: str, expression: str, outputs: Iterable[str]) -> Iterator[Problem]:
+def _signal(where: str, expression: str, named: Named) -> Iterator[Problem]:
     try:
         names = variables_of(expression)
     except InputError as error:
         yield Problem(where, str(error))
         return
     for name in names:
-        if name not in outputs:
-            component = name.partition(".")[0]
-            own = sorted(output for output in outputs if output.startswith(f"{component}."))
-            hint = close_names(name, own or sorted(outputs), "`gfor info` lists the outputs of an FMU")
+        component = name.partition(".")[0]
+        if name not in named.outputs and component not in named.foreign:
+            own = sorted(output for output in named.outputs if output.startswith(f"{component}."))
+            hint = close_names(name, own or sorted(named.outputs), "`gfor info` lists the outputs of an FMU")
             yield Problem(where, f"no scenario has an output {name!r}; {hint}")

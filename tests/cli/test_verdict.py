@@ -1,5 +1,6 @@
 """What a user sees of an unstable system: on the terminal, in JSON, in files and in the exit code."""
 
+import csv
 import json
 
 import pytest
@@ -63,9 +64,10 @@ def test_a_sweep_names_the_points_that_grow(tmp_path, capsys):
     assert code == 1
     first = text.splitlines()[0]
     assert first.startswith("UNSTABLE: SG + GFOR: at 1 of 2 points; worst at gfor.droop.R_f = 10 ")
-    rows = (tmp_path / "sweep.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0].split(",")[-3:-1] == ["stable", "largest growth rate [1/s]"]
-    assert {row.split(",")[1]: row.split(",")[-3] for row in rows[1:]} == {"0.05": "true", "10.0": "false"}
+    with (tmp_path / "sweep.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["gfor.droop.R_f"]: row["stable"] for row in rows} == {"0.05": "true", "10.0": "false"}
+    assert [row["largest growth rate [1/s]"].startswith("-") for row in rows if row["stable"] == "true"]
 
 
 def test_a_design_that_leaves_the_system_unstable_is_not_met(tmp_path, capsys):
