@@ -15,6 +15,7 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
     ("orchestrator.arrays", "orchestrator.errors", "orchestrator.units"),
+    ("orchestrator.toml_files",),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),

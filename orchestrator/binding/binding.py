@@ -1,7 +1,6 @@
 """Bindings: what a foreign FMU's variables mean at our port, read from ``vendor.toml`` and checked with their units."""
 
 import math
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import cos, radians, sin
@@ -13,7 +12,7 @@ from pydantic import ValidationError
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.binding.scales import PER_UNIT, Bases, amount, unit_of
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
-from orchestrator.errors import BindingError, InputError, Problem
+from orchestrator.errors import BindingError, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 from orchestrator.fmi.port import (
     START,
@@ -25,6 +24,7 @@ from orchestrator.fmi.port import (
     SignalMap,
     StartMap,
 )
+from orchestrator.toml_files import fault_of, read_toml
 from orchestrator.units import to_unit
 
 _FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RECTANGULAR, "polar": Form.POLAR,
@@ -73,14 +73,7 @@ def read_table(path: Path) -> BindingTable:
     BindingError
         With every entry that is wrong.
     """
-    try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"{path}: the binding cannot be read: {error.strerror}; `gfor bind FILE.fmu` drafts one"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    _, raw = read_toml(path, "the binding", "`gfor bind FILE.fmu` drafts one")
     try:
         return BindingTable.model_validate(raw)
     except ValidationError as error:
@@ -89,13 +82,7 @@ def read_table(path: Path) -> BindingTable:
 
 def _problem(detail: Any) -> Problem:
     place = ".".join(str(part) for part in detail["loc"] if part not in ("StartTable", "list[StartTable]"))
-    match detail["type"]:
-        case "extra_forbidden":
-            return Problem(place, "this key is unknown; check its spelling, or remove it")
-        case "missing":
-            return Problem(place, "this key is missing; add it")
-        case _:
-            return Problem(place, str(detail["msg"]).removeprefix("Value error, "))
+    return Problem(place, fault_of(detail))
 
 
 class _Reader:

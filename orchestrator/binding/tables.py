@@ -2,16 +2,16 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from orchestrator.toml_files import Table
 
 REQUIRED = "REQUIRED"
 """What `gfor bind` writes where it cannot know; nothing with it is accepted."""
 
 
-class Table(BaseModel):
-    """A table that knows all its keys."""
-
-    model_config = ConfigDict(extra="forbid")
+class DraftedTable(Table):
+    """A table of a draft, of which nothing may be left to fill in."""
 
     @model_validator(mode="before")
     @classmethod
@@ -26,14 +26,14 @@ class Table(BaseModel):
         return values
 
 
-class FileTable(Table):
+class FileTable(DraftedTable):
     """Which FMU the binding is for."""
 
     file: str | None = None
     guid: str | None = None
 
 
-class RatingTable(Table):
+class RatingTable(DraftedTable):
     """The FMU as delivered: rating, rated line-to-line voltage at its port, rated frequency, largest current."""
 
     S_n: str | float
@@ -42,7 +42,7 @@ class RatingTable(Table):
     I_max: str | float | None = None
 
 
-class QuantityTable(Table):
+class QuantityTable(DraftedTable):
     """Unit and base of a variable; the FMU's declared unit where ``unit`` is left out."""
 
     unit: str | None = None
@@ -83,7 +83,7 @@ class SignalTable(QuantityTable):
     variable: str
 
 
-class BindingTable(Table):
+class BindingTable(DraftedTable):
     """A whole binding file."""
 
     fmu: FileTable = Field(default_factory=FileTable)

@@ -19,6 +19,7 @@ from orchestrator.cases.schema import CaseTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.ssp.reading import read_ssp
+from orchestrator.toml_files import fault_of, read_toml
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
@@ -140,11 +141,7 @@ def load_case(name_or_path: str | Path) -> Case:
         )
     if path.suffix.lower() == ".ssp":
         return _from_ssp(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-        raw = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    text, raw = read_toml(path, "the case file", "make it readable for you")
     table, problems = _validate(raw, text, path)
     return Case(table, text, path, tuple(problems), path.parent)
 
@@ -213,10 +210,8 @@ def _take_out(raw: Any, location: Sequence[str | int], fault: str) -> bool:
 
 def _schema_message(detail: Any) -> str:
     match detail["type"]:
-        case "extra_forbidden":
-            return "this key is unknown; check its spelling, or remove it"
-        case "missing":
-            return "this key is missing; add it"
+        case "extra_forbidden" | "missing":
+            return fault_of(detail)
         case "union_tag_invalid":
             return f"type {detail['ctx']['tag']!r} is unknown; choose from {detail['ctx']['expected_tags']}"
         case "union_tag_not_found":
@@ -224,4 +219,4 @@ def _schema_message(detail: Any) -> str:
         case _:
             seen = detail.get("input")
             shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""
-            return str(detail["msg"]).removeprefix("Value error, ") + shown
+            return fault_of(detail) + shown

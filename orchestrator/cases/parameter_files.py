@@ -1,6 +1,5 @@
 """Parameter files: values for a case's components, kept apart from the case, with a note where they come from."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +8,7 @@ from orchestrator.cases.locate import line_of
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import flatten
 from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.toml_files import read_toml
 
 _TABLE = "set"
 _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
@@ -43,15 +43,7 @@ def read_parameter_file(path: Path) -> ParameterFile:
     CaseError
         With all keys and values that are none.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(
-            f"{path}: the parameter file cannot be read: {error.strerror}; `gfor design` writes one"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: it is not a TOML file: {error}") from error
+    text, raw = read_toml(path, "the parameter file", "`gfor design` writes one")
     table = raw.get(_TABLE)
     if not isinstance(table, dict) or not table:
         raise InputError(

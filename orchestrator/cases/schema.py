@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from orchestrator.toml_files import Table
 from orchestrator.units import to_unit
 
 Value = bool | float | str
@@ -23,12 +24,6 @@ Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
 Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
-
-
-class Table(BaseModel):
-    """A table that knows all its keys."""
-
-    model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
 
 class SolverTable(Table):

@@ -1,14 +1,14 @@
 """For whom, by whom, when and where a test was made, from a file of the user's."""
 
 import datetime
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ConfigDict, ValidationError
 
 from orchestrator.cases.locate import line_of
-from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.errors import CaseError, Problem
+from orchestrator.toml_files import Table, read_toml
 
 TEMPLATE = """\
 # Details of a damping test, for `gfor certify FILE.fmu --details THIS.toml`.
@@ -32,8 +32,8 @@ _LABELS = {
 }
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+class _Table(Table):
+    model_config = ConfigDict(strict=True)
 
     number: str = ""
     applicant: str = ""
@@ -69,15 +69,7 @@ def read_details(path: Path) -> Details:
     CaseError
         With every entry that is wrong, and its line.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-        raw = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(
-            f"--details {path}: it cannot be read: {error.strerror}; `gfor certify --details-template` prints one"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"--details {path}: it is not a TOML file: {error}") from error
+    text, raw = read_toml(path, "it", "`gfor certify --details-template` prints one", "--details")
     try:
         table = _Table.model_validate(raw)
     except ValidationError as error:

@@ -1,0 +1,53 @@
+"""TOML files that users write: how they are read, the form of their tables, and the errors that all of them share."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from orchestrator.errors import InputError
+
+
+class Table(BaseModel):
+    """A table that knows all its keys."""
+
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+
+def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[str, dict[str, Any]]:
+    """Read a TOML file; its text, and what the text says.
+
+    Parameters
+    ----------
+    subject
+        The file in an error's words, such as "the binding".
+    remedy
+        How to get such a file; ends the error of one that cannot be read.
+    option
+        Option of the command line that named the file; errors begin with it.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it cannot be read, or it is not TOML.
+    """
+    source = f"{option} {path}".lstrip()
+    try:
+        text = path.read_text(encoding="utf-8")
+        return text, tomllib.loads(text)
+    except OSError as error:
+        raise InputError(f"{source}: {subject} cannot be read: {error.strerror}; {remedy}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{source}: it is not a TOML file: {error}") from error
+
+
+def fault_of(detail: Any) -> str:
+    """What is wrong with an entry, and the remedy, from one of pydantic's errors."""
+    match detail["type"]:
+        case "extra_forbidden":
+            return "this key is unknown; check its spelling, or remove it"
+        case "missing":
+            return "this key is missing; add it"
+        case _:
+            return str(detail["msg"]).removeprefix("Value error, ")
