@@ -29,8 +29,9 @@ from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
-from orchestrator.fmi.messages import FLOODED, texts
+from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.process_end import fault_of_exit, last_line
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _LOOK = 0.05
@@ -261,28 +262,13 @@ class FmuProcess:
 
     def _died(self, call: str) -> ProcessEndedError:
         assert self._process is not None
-        code, where, limits = self._process.wait(), self._where(call), self.limits
-        said = self._last_words()
+        fault, how = fault_of_exit(self._process.wait(), self.limits)
+        said = "" if fault == "output flood" else last_line(self._folder / "work" / "output")
         tail = f"; it wrote: {said}" if said else ""
-        if code == FLOODED:
-            fault, how = "output flood", f"more than {limits.messages} log messages in {where}"
-        elif code < 0 and -code == getattr(signal, "SIGXFSZ", None):
-            fault, how = "output flood", f"more than {limits.output} bytes written in {where}"
-        elif code < 0 or code > 0x80000000:
-            kind = signal.Signals(-code).name if code < 0 else f"code {code:#x}"
-            fault, how = "crash", f"its process died with {kind} in {where}{tail}"
-        else:
-            fault, how = "exit", f"it ended its process with exit code {code} in {where}{tail}"
+        where = self._where(call)
         self._kill()
-        self._ended = ProcessEndedError(fault, how)
+        self._ended = ProcessEndedError(fault, f"{how} in {where}{tail}")
         return self._ended
-
-    def _last_words(self) -> str:
-        """The end of what the process wrote."""
-        with (self._folder / "work" / "output").open("rb") as output:
-            output.seek(max(0, output.seek(0, 2) - 2000))
-            lines = output.read().decode("utf-8", "replace").strip().splitlines()
-        return " ".join(lines[-1:])[:300]
 
     def _kill(self) -> None:
         """End the process and what it started."""

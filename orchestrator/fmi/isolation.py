@@ -6,7 +6,6 @@ through shared memory (`mailbox.c`), one exchange for a communication step.
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -29,6 +28,7 @@ from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mailbox
 from orchestrator.fmi.messages import FLOODED, texts
+from orchestrator.fmi.process_end import fault_of_exit, last_line
 
 _ERROR = 3
 
@@ -123,28 +123,15 @@ class IsolatedComponent(Component):
             self._end = f"hang: no answer within {self._box.head.patience:g} s; its process was ended"
             return self._end
         code = process.wait()
-        if code == FLOODED:
-            self._end = f"output flood: more than {self.limits.messages} log messages in one step"
-        elif code < 0 and -code == getattr(signal, "SIGXFSZ", None):
-            self._end = f"output flood: more than {self.limits.output} bytes written"
-        elif code < 0:
-            self._end = f"crash: its process died with {signal.Signals(-code).name}"
-        elif code >= 0xC0000000:
-            self._end = f"crash: its process died with code {code:#x}"
-        else:
-            self._end = f"exit: it ended its process with exit code {code}"
+        fault, how = fault_of_exit(code, self.limits)
+        self._end = f"{fault}: {how}{' in one step' if code == FLOODED else ''}"
         return self._end
 
     def _last_words(self) -> str:
         """Its newest log messages, or the end of what it wrote."""
         if texts := self._texts():
             return "; ".join(texts)
-        try:
-            with (self._folder / "work" / "output").open("rb") as output:
-                output.seek(max(0, output.seek(0, 2) - 2000))
-                return " ".join(output.read().decode("utf-8", "replace").strip().splitlines()[-1:])[:300]
-        except OSError:
-            return ""
+        return last_line(self._folder / "work" / "output")
 
     # -- conversation ----------------------------------------------------------------------------
 

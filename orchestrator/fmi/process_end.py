@@ -1,0 +1,53 @@
+"""How the process of a foreign FMU ended, in words."""
+
+import signal
+from pathlib import Path
+
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.messages import FLOODED
+
+_WINDOWS_FAULTS = 0x80000000
+"""On Windows, a process that dies of a fault ends with that fault's status, which is at least this."""
+
+
+def fault_of_exit(code: int, limits: Limits) -> tuple[str, str]:
+    """Name of the fault that ended a process, and what happened.
+
+    Parameters
+    ----------
+    code
+        As `subprocess.Popen.wait` returns it: the negative number of a signal where one ended the process.
+    limits
+        What the process was allowed.
+
+    Examples
+    --------
+    A process that wrote to a null pointer gives ``("crash", "its process died with SIGSEGV")``.
+    """
+    if code == FLOODED:
+        return "output flood", f"more than {limits.messages} log messages"
+    if code < 0 and -code == getattr(signal, "SIGXFSZ", None):
+        return "output flood", f"more than {limits.output} bytes written"
+    if code < 0:
+        return "crash", f"its process died with {_name_of_signal(-code)}"
+    if code >= _WINDOWS_FAULTS:
+        return "crash", f"its process died with code {code:#x}"
+    return "exit", f"it ended its process with exit code {code}"
+
+
+def _name_of_signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # most real-time signals have no name
+        return f"signal {number}"
+
+
+def last_line(output: Path) -> str:
+    """The last line of what a process wrote, 300 characters at most; empty where the file cannot be read."""
+    try:
+        with output.open("rb") as file:
+            file.seek(max(0, file.seek(0, 2) - 2000))
+            lines = file.read().decode("utf-8", "replace").strip().splitlines()
+    except OSError:
+        return ""
+    return " ".join(lines[-1:])[:300]

@@ -1,0 +1,46 @@
+"""How the process of a foreign FMU ended, in words."""
+
+import signal
+
+import pytest
+
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.messages import FLOODED
+from orchestrator.fmi.process_end import fault_of_exit, last_line
+
+LIMITS = Limits(messages=100, output=2000)
+
+
+@pytest.mark.parametrize(
+    ("code", "fault", "how"),
+    [
+        (FLOODED, "output flood", "more than 100 log messages"),
+        (-getattr(signal, "SIGXFSZ", 25), "output flood", "more than 2000 bytes written"),
+        (-signal.SIGSEGV, "crash", "its process died with SIGSEGV"),
+        (-200, "crash", "its process died with signal 200"),
+        (0xC0000005, "crash", "its process died with code 0xc0000005"),  # access violation on Windows
+        (0x80000003, "crash", "its process died with code 0x80000003"),  # breakpoint on Windows
+        (0, "exit", "it ended its process with exit code 0"),
+        (255, "exit", "it ended its process with exit code 255"),
+        (0x7FFFFFFF, "exit", "it ended its process with exit code 2147483647"),
+    ],
+)
+@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="signals of POSIX")
+def test_an_exit_code_in_words(code, fault, how):
+    assert fault_of_exit(code, LIMITS) == (fault, how)
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        (b"", ""),
+        (b"first\nlast words \n\n", "last words"),
+        (b"\xff!\n", "\ufffd!"),
+        (b"a" * 5000, "a" * 300),
+        (None, ""),
+    ],
+)
+def test_the_last_line_of_an_output(tmp_path, written, words):
+    if written is not None:
+        (tmp_path / "output").write_bytes(written)
+    assert last_line(tmp_path / "output") == words
