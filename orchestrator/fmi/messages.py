@@ -39,7 +39,8 @@ def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:
     return list(dict.fromkeys(text for status, text in messages if status >= least))
 
 
-_guard: Callable[[Messages], None] | None = None
+_guards: list[Callable[[Messages], None]] = []
+"""Called for each message: none, or the one that `on_message` sets."""
 
 
 def on_message(
@@ -66,7 +67,7 @@ def on_message(
         if messages.streak > most:
             os._exit(FLOODED)
 
-    globals()["_guard"] = guard
+    _guards[:] = [guard]
 
 
 _message_lists: WeakValueDictionary[int, Messages] = WeakValueDictionary()
@@ -78,8 +79,8 @@ def _receive(environment: int | None, _instance: bytes, status: int, _category: 
     if messages is not None:
         messages.append((status, (message or b"").decode("utf-8", "replace")))
         del messages[:-_KEPT]
-        if _guard is not None:
-            _guard(messages)
+        for guard in _guards:
+            guard(messages)
 
 
 _receive_pointer = fmi2CallbackLoggerTYPE(_receive)
