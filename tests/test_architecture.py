@@ -208,7 +208,7 @@ def test_there_is_no_cycle():
         ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
         (
             "fmpy",
-            {f"orchestrator.fmi.{name}" for name in ("binary", "component", "description", "messages", "validation")},
+            {f"orchestrator.fmi.{name}" for name in ("binary", "description", "loaded", "messages", "validation")},
         ),
         ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),

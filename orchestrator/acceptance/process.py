@@ -11,27 +11,28 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from ctypes import c_uint, memmove
 from dataclasses import asdict
 from math import inf
 from pathlib import Path
 from shutil import rmtree
 from time import monotonic
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
 from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.refusal import FATAL, check_log, refusal
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _LOOK = 0.05
@@ -289,12 +290,12 @@ class FmuProcess:
         rmtree(self._folder, ignore_errors=True)
 
 
-class HostedComponent(Component):
+class HostedComponent(Derived):
     """An instance in an `FmuProcess`, used as any other; NaN and infinite values are passed on."""
 
     def __init__(self, name: str, process: FmuProcess) -> None:
         self.name, self.description, self._process = name, process.description, process
-        self._open = False
+        self._open, self._lost = False, False
         self.pointer = self.number = process.number("fmi2Instantiate", -1, "open", name)
         self._open = True
         functions: Any = (self._set_real, self._get_real, self._do_step)
@@ -302,6 +303,11 @@ class HostedComponent(Component):
 
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._process.box.read_log(), least)
+
+    def check(self, status: int, call: str, time: float | None = None) -> None:
+        if status > 1:
+            self._lost = self._lost or status == FATAL
+            raise refusal(self, self._texts, status, call, time)
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self._process.progress(self._remote("fmi2GetBooleanStatus", "progress_of_step"))
@@ -362,6 +368,17 @@ class HostedComponent(Component):
 
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
         return self._process.table(self._remote("reading", "values", list(names)))
+
+    def read(self, batch: RealBatch) -> None:
+        self._process.box.clear_log()
+        batch.read()
+        check_log(self, self._texts, "fmi2GetReal")
+
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
+        """Refuse: no check asks for derivatives."""
+        raise ComponentError(
+            self.name, "fmi2GetDirectionalDerivative", "nothing", "the acceptance tests ask no FMU for derivatives"
+        )
 
     def save_state(self) -> Any:
         return self._remote("fmi2GetFMUstate", "save_state", ask=self._process.number)

@@ -13,10 +13,12 @@ from typing import Any
 
 from orchestrator.acceptance.allocations import memory_in_use, open_files
 from orchestrator.fmi.binary import absent_functions, load, unload
+from orchestrator.fmi.bound import BoundComponent
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.isolation_worker import Worker
+from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, Served
 from orchestrator.fmi.port import BoundDescription, PortMap
 
@@ -68,8 +70,9 @@ class Host(Worker):
     def do_close(self, lost: bool) -> None:
         component = self._instances.pop(self._asked)
         self._table[self._asked] = Served()
-        inner = getattr(component, "inner", component)
-        inner._lost = inner._lost or lost  # told here, as it was found out there
+        inner = component.inner if isinstance(component, BoundComponent) else component
+        assert isinstance(inner, LoadedComponent)
+        inner.lost = inner.lost or lost  # told here, as it was found out there
         component.close()
 
     def do_memory_in_use(self) -> int:

@@ -6,15 +6,15 @@ bindings, and components without one lose no time.
 
 import ctypes
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from fmus.toolchain.compiler import compile_here
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.errors import InputError
-from orchestrator.fmi.component import Component
+from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi.component import Component, Derived, RealBatch
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.port import PORT, START, BoundDescription, PhasorMap
 
@@ -66,7 +66,7 @@ def compiled_adapter() -> Any:
         raise InputError(f"a binding is compiled, and {error}") from error
 
 
-class BoundComponent(Component):
+class BoundComponent(Derived):
     """An instance behind a binding.
 
     Parameters
@@ -98,7 +98,7 @@ class BoundComponent(Component):
             raise
 
     def _fill(self) -> None:
-        adapter, native = self._adapter, self.description_of_file.variables
+        adapter, native = self._adapter, self.description.native.variables
         adapter.component = self.inner.pointer
         for field in ("set_real", "get_real"):
             setattr(adapter, field, ctypes.cast(getattr(self.inner, field), ctypes.c_void_p))
@@ -119,7 +119,7 @@ class BoundComponent(Component):
         field.form, field.angle_factor = int(phasor.form), phasor.angle_factor
         field.matrix[:] = phasor.matrix
         for place, variable in enumerate(phasor.variables):
-            field.references[place] = self.description_of_file.variables[variable].reference
+            field.references[place] = self.description.native.variables[variable].reference
 
     def _scale(self) -> None:
         """What depends on the rating: several units in parallel, or one that was given another rating."""
@@ -128,13 +128,6 @@ class BoundComponent(Component):
         self._adapter.current.matrix[:] = [factor * element for element in current.matrix]
         self._adapter.power_scale = SYSTEM_BASE_MVA / S_n
 
-    @property
-    def description_of_file(self) -> Any:
-        """What the FMU's own file says."""
-        description = self.description
-        assert isinstance(description, BoundDescription)
-        return description.native
-
     # -- what goes to the FMU itself -------------------------------------------------------------
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
@@ -142,9 +135,6 @@ class BoundComponent(Component):
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self.inner.progress_of_step()
-
-    def _call(self, call: str, function: Any, *arguments: Any) -> Any:
-        return self.inner._call(call, function, *arguments)
 
     def setup(self, start_time: float, stop_time: float | None) -> None:
         self._send_start()
@@ -186,6 +176,18 @@ class BoundComponent(Component):
             else:
                 raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
         self._scale()
+
+    def read(self, batch: RealBatch) -> None:
+        self.inner.read(batch)
+
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
+        """Refuse: the FMU's derivatives are of its own variables, not of the port's."""
+        raise ComponentError(
+            self.name,
+            "fmi2GetDirectionalDerivative",
+            "nothing",
+            "behind a binding an FMU gives no directional derivatives; linearise by perturbation",
+        )
 
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
         found: dict[str, float | bool] = {}

@@ -9,6 +9,7 @@ from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.isolation import IsolatedComponent
+from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.port import BoundDescription
 
 
@@ -67,4 +68,4 @@ def open_component(
         return BoundComponent(open_component(name, description.native, directory, isolated=isolated), description)
     if isolated or (isolated is None and not is_ours(description.path)):
         return IsolatedComponent(name, description, directory)
-    return Component(name, description, directory)
+    return LoadedComponent(name, description, directory)

@@ -22,24 +22,23 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ComponentError, InputError, NotFiniteError, UnsupportedFmuError
 from orchestrator.fmi.archive import extract
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mailbox
 from orchestrator.fmi.messages import FLOODED, texts
 from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.refusal import check_log, refusal
 
-_ERROR = 3
 
-
-class IsolatedComponent(Component):
+class IsolatedComponent(Derived):
     """An instance of an FMU in a process of its own.
 
     Parameters
     ----------
     name, description, directory
-        As `Component`.
+        As `LoadedComponent`.
     limits
         What it may take.
     """
@@ -103,7 +102,7 @@ class IsolatedComponent(Component):
             raise KeyboardInterrupt
         if status in (DIED, HUNG):
             raise ComponentError(self.name, call, self._how_it_ended(status), self._last_words(), time)
-        super().check(status, call, time)
+        raise refusal(self, self._texts, status, call, time)
 
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._box.read_log(), least)
@@ -153,14 +152,6 @@ class IsolatedComponent(Component):
             raise ComponentError(self.name, at, how, log)
         return answer.get("result")
 
-    def _call(self, call: str, function: Any, *arguments: Any) -> Any:
-        """Call what goes through the mailbox by itself, and take the FMU at its log's word."""
-        self._box.clear_log()
-        result = function(*arguments)
-        if errors := self._texts(_ERROR):
-            raise ComponentError(self.name, call, "an error in the log", "; ".join(errors))
-        return result
-
     def setup(self, start_time: float, stop_time: float | None) -> None:
         self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
 
@@ -178,7 +169,9 @@ class IsolatedComponent(Component):
             self._remote(f"setting {', '.join(values)}", "set", dict(values))
 
     def read(self, batch: RealBatch) -> None:
-        self._call("fmi2GetReal", batch.read)
+        self._box.clear_log()
+        batch.read()
+        check_log(self, self._texts, "fmi2GetReal")
 
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
         return dict(self._remote("reading", "values", list(names)))

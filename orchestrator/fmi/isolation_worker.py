@@ -14,6 +14,7 @@ from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, apply_limits
+from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
 from orchestrator.fmi.messages import on_message
 
@@ -86,7 +87,7 @@ class Worker:
             said = f"the guid {self._request['guid']} is not that of the FMU; read its description again"
             raise ComponentError(self._request["name"], "fmi2Instantiate", "no instance", said)
         directory = Path(self._request["directory"])
-        self._component = Component(self._request["name"], self._description, directory)
+        self._component = LoadedComponent(self._request["name"], self._description, directory)
 
     def do_setup(self, start_time: float, stop_time: float | None) -> None:
         self._instance().setup(start_time, stop_time)

@@ -1,92 +1,33 @@
-"""One running FMU: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
+"""An FMU in this process: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
-from orchestrator.errors import ComponentError, EndedError, FmuFileError, InputError, UnsupportedFmuError
+from orchestrator.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load, unload
+from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path, in_words_of_3
+from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.messages import Messages, callbacks_for, texts
+from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
 
-STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-_DISCARD, _ERROR, _FATAL, _PENDING = 2, 3, 4, 5
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 """Kinds of ``fmi2Get…Status``."""
 
-_SILENT = {
-    _DISCARD: "by FMI it has no answer to this call",
-    _ERROR: "by FMI it cannot go on from here",
-    _FATAL: "by FMI all its instances in this process are lost",
-    _PENDING: "by FMI it will answer later, which this master does not wait for",
-}
-"""What a status means where an FMU says nothing."""
 
-
-class RealBatch:
-    """Real variables of one component that are read or written together, without any copying.
-
-    Attributes
-    ----------
-    component
-        Whose they are.
-    values
-        Array of shape (n,), the caller's to read or fill.
-    """
-
-    def __init__(self, component: "Component", names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
-        variables = component.description.variables
-        self.names = tuple(names)
-        unknown = [name for name in self.names if name not in variables]
-        if unknown:
-            raise InputError(
-                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor info` lists them"
-            )
-        self.values = np.zeros(len(self.names)) if values is None else values
-        self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
-        self.arguments = (
-            component.pointer,
-            ctypes.addressof(self._references),
-            len(self.names),
-            self.values.ctypes.data,
-        )
-        self.component = component
-
-    def read(self) -> NDArray[np.float64]:
-        """Fetch the values from the FMU."""
-        if self.names:
-            with calls:
-                self.component.check(self.component.get_real(*self.arguments), "fmi2GetReal")
-        return self.values
-
-    def write(self) -> None:
-        """Send the values to the FMU."""
-        if self.names:
-            with calls:
-                self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")
-
-
-def _partly(reached: float | None, time: float) -> str:
-    """What FMI says of a step that an FMU discards without a word."""
-    if reached is not None and reached > time:
-        return f"it logs no text; by FMI it computed the step up to t = {reached:.6g} s only, and a shorter one may do"
-    return "it logs no text; by FMI it did not compute the whole step, and a shorter one may do"
-
-
-class Component:
-    """An instance of an FMU; always released, also after an error.
+class LoadedComponent(Derived):
+    """An instance of an FMU that is loaded into this process; always released, also after an error.
 
     Parameters
     ----------
@@ -96,14 +37,17 @@ class Component:
         The FMU.
     directory
         Where its archive is extracted; by default a new temporary folder of its own.
-    """
 
-    _lost = False
-    """Whether it said ``fmi2Fatal``: no call is allowed any more."""
+    Attributes
+    ----------
+    lost
+        Whether it said ``fmi2Fatal``: no call is allowed any more.
+    """
 
     def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
         self.name = name
         self.description = description
+        self.lost = False
         self._messages = Messages()
         self._own_directory = None if directory else extract(description.path)
         self._callbacks = callbacks_for(self._messages)
@@ -120,7 +64,7 @@ class Component:
         except Exception as error:  # fmpy raises a bare Exception here
             said = "; ".join(self._texts()) or str(error)
             self.close()
-            raise ComponentError(name, self._in_its_words("fmi2Instantiate"), "no instance", said) from error
+            raise ComponentError(name, in_its_words(description, "fmi2Instantiate"), "no instance", said) from error
         self.pointer = self._fmu.component
         self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
         self._bind_functions()
@@ -154,7 +98,7 @@ class Component:
         return fmu
 
     def _refuse_absent(self, call: str) -> None:
-        call = self._in_its_words(call)
+        call = in_its_words(self.description, call)
         raise ComponentError(
             self.name, call, "nothing", "its binary has no such function, and its file declares no need"
         )
@@ -177,28 +121,14 @@ class Component:
     # -- errors ----------------------------------------------------------------------------------
 
     def _texts(self, least: int = 0) -> list[str]:
-        """Distinct messages of at least that status, in order, oldest first."""
         return texts(self._messages, least)
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
-        """Raise unless a call's status is OK or Warning."""
         if status > 1:
-            self._lost = self._lost or status == _FATAL
-            name = self._in_its_words(STATUS[status] if status < len(STATUS) else f"status {status}")
-            said = "; ".join(self._texts(1) or self._texts())
-            words = self._in_its_words(call)
-            if status == _DISCARD and call == "fmi2DoStep" and time is not None:
-                failed = bool(self._texts(_DISCARD))  # some say that they ended whenever a step failed
-                ended, reached = self.progress_of_step()
-                if ended and not failed:
-                    at = time if reached is None else reached
-                    raise EndedError(self.name, name, said, time, at)
-                said = said or _partly(reached, time)
-            said = said or f"it logs no text; {_SILENT.get(status, 'FMI knows no such status')}"
-            raise ComponentError(self.name, words, name, said, time)
+            self.lost = self.lost or status == FATAL
+            raise refusal(self, self._texts, status, call, time)
 
     def progress_of_step(self) -> tuple[bool, float | None]:
-        """After a step that was refused: whether the FMU ended its simulation by itself, and how far it came [s]."""
         flag, number = ctypes.c_int(0), ctypes.c_double(0.0)
         ended = self._asked("fmi2GetBooleanStatus", _TERMINATED, flag) and bool(flag.value)
         reached = self._asked("fmi2GetRealStatus", _LAST_SUCCESSFUL_TIME, number)
@@ -213,10 +143,6 @@ class Component:
             return False
         return True
 
-    def _in_its_words(self, text: str) -> str:
-        """A call or status by the name that the FMU's own version of FMI has for it."""
-        return in_words_of_3(text) if self.description.fmi_version == "3.0" else text
-
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
         """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""
         self._messages.clear()
@@ -226,9 +152,7 @@ class Component:
         except FMICallException as error:
             self.check(error.status, call)
             raise ComponentError(self.name, call, str(error), "; ".join(self._texts())) from error
-        errors = self._texts(_ERROR)
-        if errors:
-            raise ComponentError(self.name, call, "an error in the log", "; ".join(errors))
+        check_log(self, self._texts, call)
         return result
 
     # -- life cycle ------------------------------------------------------------------------------
@@ -243,20 +167,13 @@ class Component:
         self._call("fmi2ExitInitializationMode", self._fmu.exitInitializationMode)
         self._initialised = True
 
-    def step(self, time: float, step_size: float) -> None:
-        """One communication step [s]."""
-        with calls:
-            self.check(self.do_step(self.pointer, time, step_size, 1), "fmi2DoStep", time)
-
     def reset(self) -> None:
-        """Back to where it was after instantiation."""
         self._call("fmi2Reset", self._fmu.reset)
         self._initialised = False
 
     def close(self) -> None:
-        """Terminate and free the instance, and remove what was extracted for it."""
         fmu, self._fmu = self._fmu, None
-        if fmu is not None and fmu.component is not None and not self._lost:
+        if fmu is not None and fmu.component is not None and not self.lost:
             with calls:
                 try:
                     if self._initialised:
@@ -268,26 +185,9 @@ class Component:
             shutil.rmtree(self._own_directory, ignore_errors=True)
             self._own_directory = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool]) -> None:
-        """Set variables of any numeric type by name.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist or is of type String.
-        ComponentError
-            If the FMU refuses.
-        """
         for name, value in values.items():
             variable = self.description.variables.get(name)
             if variable is None:
@@ -308,16 +208,9 @@ class Component:
             self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
 
     def read(self, batch: RealBatch) -> None:
-        """Read a batch, and take the FMU at its log's word: after new parameters it may have to refuse."""
         self._call("fmi2GetReal", batch.read)
 
-    def get(self, names: Iterable[str]) -> dict[str, float]:
-        """Read Real variables by name."""
-        batch = RealBatch(self, tuple(names))
-        return dict(zip(batch.names, batch.read().tolist(), strict=True))
-
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
-        """Read variables of any numeric type by name; slower than `get`."""
         getters = {"Real": self._fmu.getReal, "Boolean": self._fmu.getBoolean}
         found: dict[str, float | bool] = {}
         for name in names:
@@ -328,18 +221,6 @@ class Component:
         return found
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
-        """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
-
-        Returns
-        -------
-        ndarray
-            Shape (unknowns, knowns).
-
-        Raises
-        ------
-        ComponentError
-            If the FMU refuses.
-        """
         variables = self.description.variables
         rows = [variables[name].reference for name in unknowns]
         columns = [
@@ -351,7 +232,6 @@ class Component:
     # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:
-        """A handle to a copy of the FMU's whole state; give it back to `restore_state`, then `free_state`."""
         return self._call("fmi2GetFMUstate", self._fmu.getFMUState)
 
     def restore_state(self, state: Any) -> None:
@@ -361,9 +241,7 @@ class Component:
         self._call("fmi2FreeFMUstate", self._fmu.freeFMUState, state)
 
     def serialize_state(self, state: Any) -> bytes:
-        """A saved state as bytes."""
         return bytes(self._call("fmi2SerializeFMUstate", self._fmu.serializeFMUState, state))
 
     def deserialize_state(self, content: bytes) -> Any:
-        """A handle to a state made from bytes; give it to `restore_state`, then to `free_state`."""
         return self._call("fmi2DeSerializeFMUstate", self._fmu.deSerializeFMUstate, content)

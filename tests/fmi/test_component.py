@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ComponentError, InputError
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 
 H = 1e-4
 
@@ -24,7 +25,7 @@ def description(fmu_path):
 
 @pytest.fixture
 def component(description):
-    with Component("converter", description) as created:
+    with LoadedComponent("converter", description) as created:
         yield created
 
 
@@ -155,7 +156,7 @@ def test_a_discarded_step_carries_status_time_and_cause(component):
 
 
 def test_components_do_not_share_their_messages(description):
-    with Component("good", description) as good, Component("bad", description) as bad:
+    with LoadedComponent("good", description) as good, LoadedComponent("bad", description) as bad:
         initialise(good)
         with pytest.raises(ComponentError, match=r"component 'bad'.*pod_p.K = -1"):
             bad.set({"pod_p.K": -1.0})
@@ -167,13 +168,13 @@ def test_components_do_not_share_their_messages(description):
 
 def test_a_wrong_binary_name_is_a_component_error(description, temporary):
     with pytest.raises(ComponentError, match=r"component 'converter': fmi2Instantiate .*nothing.so"):
-        Component("converter", replace(description, model_identifier="nothing"))
+        LoadedComponent("converter", replace(description, model_identifier="nothing"))
     assert list(temporary.iterdir()) == []
 
 
 def test_a_wrong_guid_is_a_component_error(description):
     with pytest.raises(ComponentError, match=r"fmi2Instantiate.*guid"):
-        Component("converter", replace(description, guid="{00000000-0000-0000-0000-000000000000}")).close()
+        LoadedComponent("converter", replace(description, guid="{00000000-0000-0000-0000-000000000000}")).close()
 
 
 def test_a_slave_that_cannot_start_is_reported_with_its_reason(fmu_path, tmp_path, temporary):
@@ -183,7 +184,7 @@ def test_a_slave_that_cannot_start_is_reported_with_its_reason(fmu_path, tmp_pat
             if name != "resources/model.json":
                 bad.writestr(name, good.read(name))
     with pytest.raises(ComponentError, match=r"(?s)fmi2Instantiate returned no instance: .*No such file or directory"):
-        Component("converter", read_description(path))
+        LoadedComponent("converter", read_description(path))
     assert list(temporary.iterdir()) == []
 
 
@@ -191,20 +192,20 @@ def test_a_slave_that_cannot_start_is_reported_with_its_reason(fmu_path, tmp_pat
 
 
 def test_the_extracted_folder_is_removed_on_leaving(description, temporary):
-    with Component("converter", description) as component:
+    with LoadedComponent("converter", description) as component:
         initialise(component)
         assert len(list(temporary.iterdir())) == 1
     assert list(temporary.iterdir()) == []
 
 
 def test_the_extracted_folder_is_removed_after_a_failure(description, temporary):
-    with pytest.raises(ComponentError), Component("converter", description) as component:
+    with pytest.raises(ComponentError), LoadedComponent("converter", description) as component:
         initialise(component, P_0=2.0)
     assert list(temporary.iterdir()) == []
 
 
 def test_closing_twice_is_harmless(description, temporary):
-    component = initialise(Component("converter", description))
+    component = initialise(LoadedComponent("converter", description))
     component.close()
     component.close()
     assert list(temporary.iterdir()) == []
@@ -212,7 +213,7 @@ def test_closing_twice_is_harmless(description, temporary):
 
 def test_a_given_folder_is_used_and_kept(description, tmp_path, temporary):
     folder = Path(fmpy.extract(str(description.path), str(tmp_path / "extracted")))
-    with Component("one", description, folder) as one, Component("two", description, folder) as two:
+    with LoadedComponent("one", description, folder) as one, LoadedComponent("two", description, folder) as two:
         initialise(one, P_0=0.3)
         initialise(two, P_0=0.6)
         assert one.get(["p"])["p"] == pytest.approx(0.3, abs=1e-12)

@@ -17,9 +17,9 @@ from orchestrator.analysis.state_space import read_linear_model
 from orchestrator.cases.case import load_case
 from orchestrator.cli import main
 from orchestrator.errors import FmuFileError, InputError
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.linear_model import FOLDER, NAME, read_embedded_model
+from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.study.modes import compute_modes
 
 H = 1e-4
@@ -68,7 +68,7 @@ def test_the_poles_are_those_of_the_fmu_s_own_step(fmu):
     model = read_linear_model(fmu)
     assert (model.step_size, model.inputs) == (None, ("v_re", "v_im"))
     description, inside = read_description(fmu), read_embedded_model(fmu)
-    with Component("gfor", description) as component:
+    with LoadedComponent("gfor", description) as component:
         component.set(inside.parameters)
         component.setup(0.0, None)
         component.enter_initialization_mode()

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.frames import Phasor, of_phases, phases
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 
 OMEGA_B = 2 * np.pi * 50
 S_N, V_N = 1500.0, 230.0
@@ -41,7 +41,7 @@ def three_phases(phasor, time, zero=0.0):
 
 
 def start(release, path, values, inputs):
-    device = release.enter_context(Component("device", read_description(path)))
+    device = release.enter_context(LoadedComponent("device", read_description(path)))
     device.set(values)
     device.setup(0.0, None)
     device.enter_initialization_mode()

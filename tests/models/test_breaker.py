@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 WATCHED = ("i_re", "i_im", "p", "q", "omega")
@@ -13,7 +13,7 @@ WATCHED = ("i_re", "i_im", "p", "q", "omega")
 
 def run(path, seconds, values, watched, step=1e-4):
     """The device on a held bus voltage, its breaker opened after 100 steps: columns of the watched outputs."""
-    with Component("device", read_description(path)) as device:
+    with LoadedComponent("device", read_description(path)) as device:
         device.set(values)
         device.setup(0.0, None)
         device.enter_initialization_mode()

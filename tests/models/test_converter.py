@@ -14,8 +14,9 @@ from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.droop import declare_droop, frequency, voltage_reference
 from gfor_fmu.filter import SteadyState
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 DROOP = {"droop.R_f": 0.04, "droop.R_V": 0.09, "droop.tau_P": 0.03, "droop.tau_Q": 0.22}
@@ -208,7 +209,7 @@ def dipped(path, depth, seconds, P_0, limits, after=0.0):
     """Currents and integrators of the voltage control, q and d, after every step from the dip on; then outputs."""
     values = {"P_0": P_0, "voltage_control.i_q_max": limits[0], "voltage_control.i_d_max": limits[1]}
     step = 2e-4
-    with Component("device", read_description(path)) as device:
+    with LoadedComponent("device", read_description(path)) as device:
         device.set(values)
         device.setup(0.0, None)
         device.enter_initialization_mode()

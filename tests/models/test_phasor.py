@@ -9,8 +9,8 @@ from fmus.grid.network import Line, Load, Network, Port, Shunt
 from fmus.grid.phasor_grid import phasor_grid
 from fmus.toolchain.catalogue import build_model
 from orchestrator.errors import ComponentError
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 DEVICES = ["gfor", *GENERATORS]
@@ -100,7 +100,7 @@ def test_subtransient_saliency_is_exact_in_steady_state_and_close_in_motion(name
 def run(path, seconds, step, values, voltage, watched):
     """A device on a bus voltage that changes once, right after the start; the last values of outputs."""
     with ExitStack() as release:
-        device = release.enter_context(Component("device", read_description(path)))
+        device = release.enter_context(LoadedComponent("device", read_description(path)))
         device.set(values)
         device.setup(0.0, None)
         device.enter_initialization_mode()
@@ -147,7 +147,7 @@ def test_the_current_limit_of_each_axis_is_its_own(P, Q):
 
 
 def test_a_dispatch_beyond_the_current_limit_is_refused(fmu_path):
-    with Component("device", read_description(fmu_path("gfor_phasor"))) as device:
+    with LoadedComponent("device", read_description(fmu_path("gfor_phasor"))) as device:
         device.set({"P_0": 1.3})
         device.setup(0.0, None)
         device.enter_initialization_mode()

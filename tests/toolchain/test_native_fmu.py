@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.native_fmu import cached_native, export_native
 from orchestrator.errors import ComponentError
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, running
 
 MODELS = [name for name in model_names() if not needs_arguments(name)]
@@ -45,11 +45,11 @@ def test_equal_models_give_equal_files(tmp_path):
 
 def test_a_wrong_guid_gives_no_instance_and_says_why(extracted):
     description = read_description(cached_native(build_model("gfor")))
-    with Component("good", description) as component:
+    with LoadedComponent("good", description) as component:
         assert component.get(["S_n"]) == {"S_n": 1500.0}
     object.__setattr__(description, "guid", description.guid[:-3])  # a part of the right one passes our own check
     with pytest.raises(ComponentError, match=r"the guid \S+ is not this FMU's, which is \{"):
-        Component("wrong", description)
+        LoadedComponent("wrong", description)
 
 
 # -- the same answers --------------------------------------------------------------------------

@@ -15,8 +15,9 @@ from fmus.grid.network import Line, Load, Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import cached, export
-from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.loaded import LoadedComponent
 
 NAMES = [name for name in model_names() if not needs_arguments(name)]
 STEP = 1e-4
@@ -54,7 +55,7 @@ def member_names(path):
 
 
 def initialised(path, parameters=None):
-    component = Component("device", read_description(path))
+    component = LoadedComponent("device", read_description(path))
     component.setup(0.0, None)
     component.enter_initialization_mode()
     component.set(parameters or {})
@@ -134,7 +135,9 @@ def test_initial_unknowns_are_complete_and_list_every_parameter_that_moves_them(
     computed = [v.name for v in (*model.calculated, *model.states, *model.outputs)] + [f"der({s})" for s in states]
     assert list(known) == sorted(computed, key=list(model.value_references).index)
     moved = 0
-    with Component("device", read_description(fmu_path(name))) as component:  # never initialised: computed when read
+    with LoadedComponent(
+        "device", read_description(fmu_path(name))
+    ) as component:  # never initialised: computed when read
         component.set(FED.get(name, {}))
         batch = RealBatch(component, computed)
         for parameter in model.parameters:

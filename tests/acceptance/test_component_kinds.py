@@ -1,0 +1,99 @@
+"""One FMU as each of the four kinds of component: every method of `Component` answers or refuses in words."""
+
+from contextlib import ExitStack
+from shutil import rmtree
+
+import numpy as np
+import pytest
+
+from orchestrator.acceptance.process import FmuProcess, HostedComponent
+from orchestrator.binding.binding import bind
+from orchestrator.errors import ComponentError
+from orchestrator.fmi.archive import extract
+from orchestrator.fmi.bound import BoundComponent
+from orchestrator.fmi.component import RealBatch
+from orchestrator.fmi.description import read_description
+from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.isolation import IsolatedComponent
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.loaded import LoadedComponent
+
+KINDS = [LoadedComponent, IsolatedComponent, BoundComponent, HostedComponent]
+START = {"P_0": 0.6, "Q_0": 0.15, "v_0": 1.02, "theta_0": 0.3}
+BINDING = """
+rating = { S_n = "1500 MVA" }
+voltage = { form = "rectangular", variables = ["v_re", "v_im"] }
+current = { form = "rectangular", variables = ["i_re", "i_im"], base = "100 MVA" }
+[start]
+S_n = { variable = "S_n" }
+P_0 = { variable = "P_0" }
+Q_0 = { variable = "Q_0" }
+v_0 = { variable = "v_0" }
+theta_0 = { variable = "theta_0" }
+"""
+
+
+@pytest.fixture(params=KINDS, ids=lambda kind: kind.__name__)
+def component(request, fmu_path, tmp_path):
+    """A converter at the end of its initialisation."""
+    description = read_description(fmu_path("gfor", native=True))
+    with ExitStack() as stack:
+        if request.param is HostedComponent:
+            directory = extract(description.path)
+            stack.callback(rmtree, directory)
+            process = FmuProcess(description, directory, Limits())
+            stack.callback(process.close)
+            opened = stack.enter_context(HostedComponent("box", process))
+        else:
+            if request.param is BoundComponent:
+                (tmp_path / "binding.toml").write_text(BINDING, encoding="utf-8")
+                description = bind(description, tmp_path / "binding.toml")
+            isolated = request.param is IsolatedComponent
+            opened = stack.enter_context(open_component("box", description, isolated=isolated))
+        assert type(opened) is request.param
+        opened.set(START)
+        opened.setup(0.0, None)
+        opened.enter_initialization_mode()
+        opened.set({"v_re": 1.0, "v_im": 0.2})
+        opened.exit_initialization_mode()
+        yield opened
+
+
+def test_values_are_read_by_each_of_its_ways(component):
+    batch = RealBatch(component, ["i_re", "i_im"])
+    component.read(batch)
+    found = dict(zip(batch.names, batch.values.tolist(), strict=True))
+    assert found == component.get(["i_re", "i_im"]) == component.values(["i_re", "i_im"])
+    assert abs(found["i_re"]) > 0.1
+
+
+def test_a_saved_state_comes_back_also_from_bytes(component):
+    names = ["i_re", "i_im"]
+    saved, before = component.save_state(), component.get(names)
+    content = component.serialize_state(saved)
+    component.step(0.0, 1e-4)
+    after = component.get(names)
+    assert after != before
+    component.restore_state(saved)
+    component.step(0.0, 1e-4)
+    assert component.get(names) == after
+    again = component.deserialize_state(content)
+    component.restore_state(again)
+    component.step(0.0, 1e-4)
+    assert component.get(names) == after
+    for state in (saved, again):
+        component.free_state(state)
+
+
+def test_derivatives_are_given_or_refused_in_words(component):
+    if isinstance(component, BoundComponent | HostedComponent):
+        with pytest.raises(ComponentError, match="component 'box': fmi2GetDirectionalDerivative returned nothing: "):
+            component.jacobian(["i_re"], ["v_re"])
+    else:
+        assert np.isfinite(component.jacobian(["i_re", "i_im"], ["v_re"])).tolist() == [[True], [True]]
+
+
+def test_a_refused_call_names_the_component_and_the_call(component):
+    with pytest.raises(ComponentError, match="component 'box' at t = 0 s: fmi2DoStep returned fmi2") as caught:
+        component.step(0.0, -1.0)
+    assert "step" in caught.value.log
