@@ -5,8 +5,9 @@ from functools import cache
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.native_fmu import cached_native
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.exporter import cached
+from fmus.toolchain.native_fmu import NativeFmu
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cli import main
 from tests.support.skips import Skips, in_ci
 
@@ -20,7 +21,7 @@ def pytest_configure(config):
 @pytest.fixture(scope="session")
 def fmu_path():
     """Name of a catalogue model → its built .fmu, Python-backed or native."""
-    return cache(lambda name, native=False: (cached_native if native else cached)(build_model(name)))
+    return cache(lambda name, native=False: cached((NativeFmu if native else PythonFmu)(build_model(name))))
 
 
 @pytest.fixture

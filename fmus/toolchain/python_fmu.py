@@ -1,4 +1,4 @@
-"""Export of a model as a Python-backed FMU (FMI 2.0 co-simulation) with pythonfmu's binaries.
+"""The recipe for a Python-backed FMU (FMI 2.0 co-simulation) with pythonfmu's binaries.
 
 The archive is written here and not by pythonfmu's own builder, because equal models must give equal
 files, every bundled module needs a name of its own (all Python-backed FMUs of a process share
@@ -6,16 +6,15 @@ files, every bundled module needs a name of its own (all Python-backed FMUs of a
 """
 
 import json
-from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import pythonfmu
 
-from fmus.toolchain.archive import digest_of, guid_of, write_archive
-from fmus.toolchain.cache import cache_directory
-from fmus.toolchain.compiler import ENDINGS, compile_library, host_platform, recipe
+from fmus.toolchain.archive import digest_of, guid_of
+from fmus.toolchain.compiler import ENDINGS, compile_library, recipe
 from fmus.toolchain.description import model_description
+from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
 from fmus.toolchain.python_kernel import python_source
@@ -24,88 +23,53 @@ from fmus.toolchain.wrapper import wrapper_binaries
 _SLAVE, _WRAPPER = (Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py"))
 
 
-def export(
-    model: Model,
-    destination: Path,
-    platforms: tuple[str, ...] | None = None,
-    extra: Mapping[str, bytes] | None = None,
-) -> Path:
-    """Write ``<model name>.fmu`` into a folder.
+class PythonFmu:
+    """Everything that a Python-backed FMU is made from, with one hash over all of it."""
 
-    Parameters
-    ----------
-    model
-        What to export.
-    destination
-        Folder; it is created where missing.
-    platforms
-        FMI platforms to compile the kernel for; by default this machine's. Elsewhere the FMU
-        evaluates the same equations in pure Python.
-    extra
-        Further members of the archive, by path.
-
-    Returns
-    -------
-    pathlib.Path
-        The FMU.
-
-    Raises
-    ------
-    ValueError, RuntimeError
-        As `compile_library`.
-    """
-    if platforms is None:
-        host = host_platform()
-        platforms = (host,) if host else ()
-    return write_archive(destination / f"{model.name}.fmu", _contents(model, platforms) | dict(extra or {}))
-
-
-def cached(model: Model) -> Path:
-    """Return this machine's FMU of a model, building it only if it was not built before."""
-    sources = _Sources(model)
-    folder = cache_directory("fmus") / sources.digest[:32]
-    target = folder / f"{model.name}.fmu"
-    return target if target.exists() else export(model, folder)
-
-
-class _Sources:
-    """Everything an FMU is made from, with one hash over all of it."""
+    cache_prefix = ""
 
     def __init__(self, model: Model) -> None:
-        self.c = c_source(model)
-        self.python = python_source(model)
-        self.slave = _SLAVE.read_text(encoding="utf-8")
-        self.tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
-        description = model_description(model, "", model.name, self.tool).decode()
+        self.model = model
+        self._c = c_source(model)
+        self._python = python_source(model)
+        self._slave = _SLAVE.read_text(encoding="utf-8")
+        self._tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
+        description = model_description(model, "", model.name, self._tool).decode()
         exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
-        self.digest = digest_of(self.c, self.python, self.slave, description, data, exporter, *recipe())
-        self.guid = guid_of(self.digest)
+        self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
 
+    def default_platforms(self) -> tuple[str, ...]:
+        """That of this machine."""
+        return this_machine()
 
-def _contents(model: Model, platforms: tuple[str, ...]) -> dict[str, bytes]:
-    sources = _Sources(model)
-    tag = sources.digest[:16]
-    kernel_module = f"gfor_cosim_kernel_{tag}"
-    slave_module = f"gfor_cosim_slave_{tag}"
-    contents: dict[str, bytes] = {
-        "modelDescription.xml": model_description(model, sources.guid, model.name, sources.tool),
-        "resources/slavemodule.txt": slave_module.encode(),
-        f"resources/{slave_module}.py": sources.slave.encode(),
-        f"resources/{kernel_module}.py": sources.python.encode(),
-        "resources/model.json": json.dumps(
-            _slave_data(model) | {"hash": sources.digest, "kernel_module": kernel_module}, ensure_ascii=False
-        ).encode(),
-    }
-    for platform in platforms:
-        library = compile_library(sources.c, platform)
-        contents[f"resources/kernel/{platform}/kernel{ENDINGS[platform]}"] = library.read_bytes()
-    package = Path(pythonfmu.__file__).parent
-    for file in sorted(package.glob("*.py")):
-        contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
-    for file, binary in wrapper_binaries().items():
-        contents[f"binaries/{file.parent.name}/{model.name}{file.suffix}"] = binary
-    return contents
+    def host_platforms(self) -> tuple[str, ...]:
+        """That of this machine; where there is none, the FMU evaluates its equations in pure Python."""
+        return this_machine()
+
+    def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
+        """The archive's members, with a kernel for each platform [FMI 2.0 names]."""
+        model, tag = self.model, self.digest[:16]
+        kernel_module = f"gfor_cosim_kernel_{tag}"
+        slave_module = f"gfor_cosim_slave_{tag}"
+        contents: dict[str, bytes] = {
+            "modelDescription.xml": model_description(model, guid_of(self.digest), model.name, self._tool),
+            "resources/slavemodule.txt": slave_module.encode(),
+            f"resources/{slave_module}.py": self._slave.encode(),
+            f"resources/{kernel_module}.py": self._python.encode(),
+            "resources/model.json": json.dumps(
+                _slave_data(model) | {"hash": self.digest, "kernel_module": kernel_module}, ensure_ascii=False
+            ).encode(),
+        }
+        for platform in platforms:
+            library = compile_library(self._c, platform)
+            contents[f"resources/kernel/{platform}/kernel{ENDINGS[platform]}"] = library.read_bytes()
+        package = Path(pythonfmu.__file__).parent
+        for file in sorted(package.glob("*.py")):
+            contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
+        for file, binary in wrapper_binaries().items():
+            contents[f"binaries/{file.parent.name}/{model.name}{file.suffix}"] = binary
+        return contents
 
 
 def _slave_data(model: Model) -> dict[str, object]:

@@ -80,12 +80,13 @@ def catalogue_fmu(model: str, network: Network | None = None, native: bool = Fal
         If the extra that builds FMUs is not installed.
     """
     require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
-    from fmus.toolchain.native_fmu import cached_native  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.python_fmu import cached  # noqa: PLC0415 - as above
+    from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
+    from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     arguments = {"network": network} if network is not None else {}
-    build = cached_native if native else cached
-    return read_description(build(build_model(model, **arguments)))
+    recipe = NativeFmu if native else PythonFmu
+    return read_description(cached(recipe(build_model(model, **arguments))))
 
 
 class Preparer:

@@ -31,18 +31,17 @@ def run(options: argparse.Namespace) -> int:
     if options.fmi != "2.0" and not options.native:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
-    from fmus.toolchain.native_fmu import export_native  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.python_fmu import export  # noqa: PLC0415 - as above
+    from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
+    from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     models = [_model(name) for name in names]
     extra = linear_model.extra_members(options, [model.name for model in models])
     platforms = tuple(options.platform) if options.platform else None
     for model in models:
-        if options.native:
-            print(export_native(model, options.dest, platforms, options.fmi, extra))
-        else:
-            print(export(model, options.dest, platforms, extra))
+        recipe = NativeFmu(model, options.fmi) if options.native else PythonFmu(model)
+        print(export(recipe, options.dest, platforms, extra))
     return 0
 
 

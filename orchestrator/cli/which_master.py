@@ -67,12 +67,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _build(options: argparse.Namespace) -> int:
     require("building the probe FMUs", "casadi", "ziglang")
-    from fmus.toolchain.native_fmu import export_native  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
+    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
 
     folder, host = made_folder(options.build, "--build"), host_platform()
     platforms = tuple(options.platform or ([host] if host else []))
     for name in ("probe_a", "probe_b"):
-        print(export_native(build_model(name), folder, platforms))
+        print(export(NativeFmu(build_model(name)), folder, platforms))
     path = folder / "INSTRUCTIONS.md"
     path.write_text(instructions(options.step, options.stop, platforms), encoding="utf-8")
     print(path)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.native_fmu import cached_native
+from fmus.toolchain.exporter import cached
+from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
 from tests.acceptance.gallery.hostile import HOSTILE
@@ -97,7 +98,7 @@ def test_forged_results_do_not_hide_what_is_wrong(gallery):
 def test_the_confusion_table(gallery, fmu_path, tmp_path):
     rows = [(m.name, "", "", *gallery(m.name), m.only) for m in good()]
     rows += [(f"{name} (Python-backed)", "", "", fmu_path(name), None) for name in OURS]
-    rows += [(f"{name} (native)", "", "", cached_native(build_model(name)), None) for name in OURS]
+    rows += [(f"{name} (native)", "", "", cached(NativeFmu(build_model(name))), None) for name in OURS]
     rows += [(m.name, m.fault, m.thread, *gallery(m.name), m.only) for m in faulty()]
     plain, _ = gallery("gain")
     rows += [(name, fault, "", make(tmp_path, plain), None) for name, (make, fault) in HOSTILE.items()]

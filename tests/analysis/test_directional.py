@@ -8,7 +8,8 @@ import pytest
 
 from fmus.toolchain import native_source
 from fmus.toolchain.compiler import host_platform
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.exporter import export
+from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.analysis.component_linearization import linearize_by_derivatives
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import eigenvalues
@@ -82,7 +83,7 @@ def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, set
         return functions | {"direction": ca.Function("direction", known, functions["direction"].call(scaled))}
 
     monkeypatch.setattr(native_source, "derivative_functions", wrong)
-    path = export_native(model, folder / "made", (host_platform(),))
+    path = export(NativeFmu(model), folder / "made", (host_platform(),))
     if not settable:
         closed = folder / "closed.fmu"
         with zipfile.ZipFile(path) as old, zipfile.ZipFile(closed, "w") as new:

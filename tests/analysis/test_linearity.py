@@ -4,8 +4,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import find_modes
@@ -40,7 +41,7 @@ def shaped(name):
     x = m.state("x", 0.0, "1", "Integral")
     m.derivative(x, gain * SHAPES[name](u))
     m.output("y", x, "1", "Integral")
-    return read_description(cached(m.build()))
+    return read_description(cached(PythonFmu(m.build())))
 
 
 def judged(shape):

@@ -9,7 +9,8 @@ from pathlib import Path
 from time import perf_counter
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.exporter import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.system import System
@@ -40,7 +41,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         paths = {
             "C, 5 states": build(converter("converter"), Path(folder)),
-            "gfor, Python-backed": cached(build_model("gfor")),
+            "gfor, Python-backed": cached(PythonFmu(build_model("gfor"))),
         }
         for name, path in paths.items():
             inside, _ = microseconds(path, isolated=False)

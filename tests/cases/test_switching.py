@@ -4,9 +4,10 @@ from zipfile import ZipFile
 
 import pytest
 
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.frames import current_of_power, polar
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.events import LineSwitching, LoadSwitching, UnitSwitching
@@ -123,7 +124,7 @@ def vendor_fmu(breaker=None):
     m.output("i_im", i.im, "pu", "Current", base="100 MVA")
     if breaker is not None:
         m.switch("connected", breaker, "The breaker is closed")
-    return cached(m.build())
+    return cached(PythonFmu(m.build()))
 
 
 OTHER_BASE = (

@@ -12,8 +12,9 @@ from pathlib import Path
 from unittest import mock
 
 import gfor_fmu.converter as converter_module
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.model import Model
-from fmus.toolchain.native_fmu import cached_native
+from fmus.toolchain.native_fmu import NativeFmu
 
 
 def turned(controller: str) -> Model:
@@ -31,7 +32,7 @@ def write(folder: Path) -> list[Path]:
     """Both FMUs, as files in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     return [
-        Path(shutil.copyfile(cached_native(turned(name)), folder / f"gfor_{name}_turned.fmu"))
+        Path(shutil.copyfile(cached(NativeFmu(turned(name))), folder / f"gfor_{name}_turned.fmu"))
         for name in ("pod_p", "pod_q")
     ]
 

@@ -13,8 +13,9 @@ import pytest
 import xarray as xr
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.native_fmu import cached_native
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.exporter import cached
+from fmus.toolchain.native_fmu import NativeFmu
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
@@ -264,7 +265,7 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     """A tenfold gain, a turned sign, or both; a turned POD-Q of the usual gain is weak enough to pass."""
     model = turned(controller) if sign_turned else build_model("gfor")
     values = {f"{controller}.enabled": True, f"{controller}.K": gain}
-    request = CertificationRequest(cached_native(model), values=values, reactances=reactances)
+    request = CertificationRequest(cached(NativeFmu(model)), values=values, reactances=reactances)
     result = certify(request, executor, tmp_path)
     own = {f"converter.{name}": value for name, value in values.items()}
     wanted = {X: is_bad(exact_eigenvalues(model, result.case, own, X)) for X in reactances}
@@ -283,7 +284,7 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
 def test_a_converter_that_hides_its_states_gets_the_same_verdict(tmp_path, executor, fmu_path):
     results = [
         certify(
-            CertificationRequest(cached(build_model("gfor")), reactances=(0.2,), black_box=black_box),
+            CertificationRequest(cached(PythonFmu(build_model("gfor"))), reactances=(0.2,), black_box=black_box),
             executor,
             tmp_path,
         )

@@ -5,9 +5,10 @@ from math import ceil
 
 import casadi as ca
 
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.fmi.description import FmuDescription, read_description
 
 
@@ -114,4 +115,4 @@ MODELS = {
 @cache
 def small_fmu(name: str) -> FmuDescription:
     """One of `MODELS`, built once a machine."""
-    return read_description(cached(MODELS[name]()))
+    return read_description(cached(PythonFmu(MODELS[name]())))

@@ -9,7 +9,8 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import compile_library, host_platform
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.exporter import export
+from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.cases import two_area
 from orchestrator.cases.case import load_case
@@ -54,7 +55,7 @@ def ours(tmp_path_factory):
     def build(name, version):
         if (name, version) not in built:
             folder = tmp_path_factory.mktemp(f"{name}_{version}".replace(".", "_"))
-            built[name, version] = export_native(build_model(name), folder, (host_platform(),), version)
+            built[name, version] = export(NativeFmu(build_model(name), version), folder, (host_platform(),))
         return built[name, version]
 
     return build

@@ -11,7 +11,8 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import host_platform
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.exporter import export
+from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.errors import FmuFileError, HostileFmuError
 from orchestrator.fmi import archive
 from orchestrator.fmi.archive import extract
@@ -93,7 +94,7 @@ def test_mutated_files_are_read_or_refused(plain, tmp_path):
 
 
 def test_mutated_files_of_fmi_3_are_read_or_refused(tmp_path):
-    source = export_native(build_model("infinite_bus"), tmp_path, (host_platform(),), "3.0")
+    source = export(NativeFmu(build_model("infinite_bus"), "3.0"), tmp_path, (host_platform(),))
     folder = tmp_path / "mutated"
     folder.mkdir()
     found = _fuzz(1, 300, folder, [source])

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.native_fmu import cached_native
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.native_fmu import NativeFmu
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.system import System
 from orchestrator.fmi.description import read_description
@@ -62,7 +63,7 @@ SYSTEMS = {
 def with_magnifier(system: System, record: tuple[str, ...], kind: str) -> tuple[System, list[str]]:
     """Add a component that shows what is recorded 10⁹ times larger, for a tool that writes six decimals."""
     model = _magnifier(len(record))
-    path = cached_native(model) if kind == "native" else cached(model)
+    path = cached((NativeFmu if kind == "native" else PythonFmu)(model))
     system.add("magnifier", read_description(path))
     for index, name in enumerate(record):
         system.connect(name, f"magnifier.u_{index}")

@@ -14,7 +14,8 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.exporter import export
+from fmus.toolchain.native_fmu import NativeFmu
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, drive
 
 MODELS = ["gfor", GENERATOR, "two_area_grid"]
@@ -80,7 +81,7 @@ class Host3:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmi3")
-    return {name: export_native(build_model(name), folder, ("linux64",), "3.0") for name in MODELS}
+    return {name: export(NativeFmu(build_model(name), "3.0"), folder, ("linux64",)) for name in MODELS}
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
-from fmus.toolchain.native_fmu import cached_native, export_native
+from fmus.toolchain.exporter import cached, export
+from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
@@ -39,12 +40,12 @@ def test_a_native_fmu_is_valid_and_carries_no_python(name, fmu_path, extracted):
 
 def test_equal_models_give_equal_files(tmp_path):
     model = build_model("two_area_grid")
-    first, second = (export_native(model, tmp_path / part, ("linux64",)) for part in ("a", "b"))
+    first, second = (export(NativeFmu(model), tmp_path / part, ("linux64",)) for part in ("a", "b"))
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_wrong_guid_gives_no_instance_and_says_why(extracted):
-    description = read_description(cached_native(build_model("gfor")))
+    description = read_description(cached(NativeFmu(build_model("gfor"))))
     with LoadedComponent("good", description) as component:
         assert component.get(["S_n"]) == {"S_n": 1500.0}
     object.__setattr__(description, "guid", description.guid[:-3])  # a part of the right one passes our own check

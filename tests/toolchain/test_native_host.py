@@ -12,7 +12,8 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS
-from fmus.toolchain.native_fmu import export_native
+from fmus.toolchain.exporter import export
+from fmus.toolchain.native_fmu import NativeFmu
 from tests.support.host import OK, H
 
 HOST = Path(__file__).with_name("host") / "host.c"
@@ -72,7 +73,7 @@ def test_valgrind_finds_no_leak_and_no_invalid_access(linux_host, extracted):
 @pytest.fixture(scope="module")
 def everywhere(tmp_path_factory):
     """The converter for all platforms, extracted."""
-    fmu = export_native(build_model("gfor"), tmp_path_factory.mktemp("everywhere"))
+    fmu = export(NativeFmu(build_model("gfor")), tmp_path_factory.mktemp("everywhere"))
     folder = fmpy.extract(str(fmu))
     yield Path(folder)
     shutil.rmtree(folder)
@@ -81,7 +82,7 @@ def everywhere(tmp_path_factory):
 @pytest.mark.slow
 def test_another_machine_builds_the_same_file(everywhere, tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    again = Path(fmpy.extract(str(export_native(build_model("gfor"), tmp_path))))
+    again = Path(fmpy.extract(str(export(NativeFmu(build_model("gfor")), tmp_path))))
     files = sorted(p.relative_to(everywhere) for p in everywhere.rglob("*") if p.is_file())
     assert len(files) == 4
     assert [p for p in files if (again / p).read_bytes() != (everywhere / p).read_bytes()] == []

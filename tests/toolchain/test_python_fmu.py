@@ -13,8 +13,9 @@ from fmpy.validation import validate_fmu
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+from fmus.toolchain.exporter import cached, export
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_fmu import cached, export
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
@@ -81,10 +82,10 @@ def test_fmpy_finds_nothing_to_complain_about(name, fmu_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_equal_models_give_equal_files_at_any_time(name, tmp_path, monkeypatch):
-    one = export(build_model(name), tmp_path / "one")
+    one = export(PythonFmu(build_model(name)), tmp_path / "one")
     now = time.time()
     monkeypatch.setattr(time, "time", lambda: now + 1e7)
-    two = export(build_model(name), tmp_path / "two")
+    two = export(PythonFmu(build_model(name)), tmp_path / "two")
     assert one.read_bytes() == two.read_bytes()
 
 
@@ -98,8 +99,8 @@ CHANGES = [
 
 @pytest.mark.parametrize("change", CHANGES, ids=str)
 def test_a_changed_model_has_another_guid(change, tmp_path):
-    same = [description_of(export(small(), tmp_path / n, platforms=())).get("guid") for n in "ab"]
-    changed = description_of(export(small(**change), tmp_path / "c", platforms=())).get("guid")
+    same = [description_of(export(PythonFmu(small()), tmp_path / n, platforms=())).get("guid") for n in "ab"]
+    changed = description_of(export(PythonFmu(small(**change)), tmp_path / "c", platforms=())).get("guid")
     assert same[0] == same[1] != changed
 
 
@@ -257,7 +258,7 @@ def stiff_fmu():
         )
     )
     assert model.integrator == "sdirk"
-    return cached(model)
+    return cached(PythonFmu(model))
 
 
 def drive_stiff(component, steps=100):

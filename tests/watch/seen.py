@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 
+from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_fmu import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.coupling.system import System
 from orchestrator.fmi.description import read_description
 from orchestrator.watch.seen import Seen
@@ -49,7 +50,7 @@ def unit_fmu():
     u = m.input("u", "1", "Input")
     for name, what in (("omega", "pu"), ("delta", "rad"), ("v_re", "pu"), ("v_im", "pu")):
         m.output(name, u * on, what, name, base="S_n")
-    return read_description(cached(m.build()))
+    return read_description(cached(PythonFmu(m.build())))
 
 
 def units(**ratings):

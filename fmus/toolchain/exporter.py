@@ -1,0 +1,98 @@
+"""Export of a model as an FMU, by the recipe for one kind of FMU."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+from fmus.toolchain.archive import write_archive
+from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.compiler import host_platform
+from fmus.toolchain.model import Model
+
+
+class Recipe(Protocol):
+    """What one kind of FMU is made from, for one model.
+
+    Attributes
+    ----------
+    model
+        What is exported.
+    digest
+        Hash over everything that the FMU is made from [hex].
+    cache_prefix
+        Begins the name of the folder in which this machine's FMU is kept.
+    """
+
+    model: Model
+    digest: str
+    cache_prefix: str
+
+    def default_platforms(self) -> tuple[str, ...]:
+        """Platforms to compile for where nobody names any [FMI 2.0 names]."""
+
+    def host_platforms(self) -> tuple[str, ...]:
+        """Platforms to compile for where the FMU is for this machine alone [FMI 2.0 names].
+
+        Raises
+        ------
+        RuntimeError
+            If no such FMU can be made for this machine.
+        """
+
+    def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
+        """The archive's members by path, with a library for each platform."""
+
+
+def export(
+    recipe: Recipe,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
+    extra: Mapping[str, bytes] | None = None,
+) -> Path:
+    """Write ``<model name>.fmu`` into a folder.
+
+    Parameters
+    ----------
+    recipe
+        `NativeFmu` or `PythonFmu` of a model.
+    destination
+        Folder; it is created where missing.
+    platforms
+        FMI 2.0 names of the platforms to compile for; by default all of them for a native FMU, and this machine's
+        for a Python-backed one, which elsewhere evaluates the same equations in pure Python. ``darwin64`` of a
+        native FMU holds code for both kinds of Mac.
+    extra
+        Further members of the archive, by path.
+
+    Returns
+    -------
+    pathlib.Path
+        The FMU.
+
+    Raises
+    ------
+    ValueError, RuntimeError
+        As `compile_library`.
+    """
+    chosen = recipe.default_platforms() if platforms is None else platforms
+    return write_archive(destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {}))
+
+
+def cached(recipe: Recipe) -> Path:
+    """Return this machine's FMU, building it only if it was not built before.
+
+    Raises
+    ------
+    RuntimeError
+        If no such FMU can be made for this machine.
+    """
+    platforms = recipe.host_platforms()
+    folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
+    target = folder / f"{recipe.model.name}.fmu"
+    return target if target.exists() else export(recipe, folder, platforms)
+
+
+def this_machine() -> tuple[str, ...]:
+    """The platform of this machine, or none where there is no compiler target for it."""
+    host = host_platform()
+    return (host,) if host else ()
