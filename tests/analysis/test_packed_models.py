@@ -179,6 +179,7 @@ def test_matrices_of_another_point_under_the_right_names(master, with_model, cha
         with_model(dataclasses.replace(honest, **matrices))
 
 
+@pytest.mark.slow
 def test_the_honest_model_is_used_and_said_to_be_packed(system_with, folder, capsys):
     case = load_case(system_with())
     (prepared,) = case.prepare(["pod_pq"])

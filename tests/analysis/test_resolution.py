@@ -63,6 +63,7 @@ def test_phasor_models_at_milliseconds_raise_no_question(step, scenario):
     assert modes_at(step, "two_area_rms", scenario).warnings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "scenario"), [("infinite_bus", "dip"), ("norm631", "without"), ("norm631", "with")])
 def test_built_in_cases_at_their_own_step_raise_no_question(case, scenario):
     assert modes_at(None, case, scenario).warnings == ()

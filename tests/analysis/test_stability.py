@@ -81,6 +81,7 @@ def test_a_search_finds_all_that_grows_in_a_system_too_large_for_its_spectrum(mo
     assert "rad/s were not searched" in verdict.sentence()
 
 
+@pytest.mark.slow
 def test_a_search_finds_nothing_in_a_stable_system_and_says_what_it_did_not_look_at(monkeypatch):
     monkeypatch.setattr(stability, "WHOLE", 100)
     verdict = judge(model(crowd([]), STEP))

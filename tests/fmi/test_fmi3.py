@@ -117,6 +117,7 @@ def test_both_versions_give_the_same_bits(ours, isolated):
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("directional", [False, True])
 def test_the_two_area_system_of_fmi_3(ours, tmp_path, directional):
     """The same linear blocks to the last bit; modes to the rounding of eigenvalues of a map over 100 µs."""

@@ -248,6 +248,7 @@ def foreign(fmu, tmp_path_factory):
     return rewritten(folder / "ours.ssp", folder / "foreign.ssp", {"resources/gfor.fmu": lambda _: closed.read_bytes()})
 
 
+@pytest.mark.slow
 def test_modes_of_an_fmu_that_cannot_be_perturbed(foreign):
     """They come from the model inside it, and are those that perturbation gives where it can be done."""
     results = []

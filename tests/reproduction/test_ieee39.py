@@ -21,6 +21,7 @@ def prepare(scenario, overrides=None, **arguments):
     return ready
 
 
+@pytest.mark.slow
 def test_the_voltages_are_pandapowers_but_for_the_stray_capacitances():
     net = networks.case39()
     with warnings.catch_warnings():

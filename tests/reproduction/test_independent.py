@@ -145,6 +145,7 @@ def test_every_eigenvalue_where_no_two_parameters_are_equal(seed):
     assert_same_spectrum(system, load_case("norm631"), "with", overrides, 1e-7)
 
 
+@pytest.mark.slow
 def test_one_percent_of_any_parameter_is_seen():
     """What the tolerance of the comparison is worth."""
     rng = np.random.default_rng(0)
