@@ -20,38 +20,58 @@ _NAMED = 4
 
 
 def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> None:
-    """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
-    named = [m.frequency_hz for r in results for m in r.named.values()]
-    highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
-    shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
+    """Eigenvalue map of all scenarios as a picture."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         axis = figure.subplots()
-        for index, result in enumerate(results):
-            modes = shown[id(result)]
-            axis.scatter(
-                [m.eigenvalue.real for m in modes],
-                [m.frequency_hz for m in modes],
-                marker="x",
-                s=[70 if result.name_of(m) else 30 for m in modes],
-                linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
-                color=colour(index),
-                label=result.label,
-                zorder=3,
-            )
-            for reference in result.references.values():
-                at = _real_and_hz(reference)
-                axis.scatter(*at, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
-        left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
-        axis.set_xlim(left, 0.35)
-        axis.set_ylim(0, highest_hz)
-        damping_rays(axis, left, highest_hz)
-        axis.axvline(0, color="#888888", linewidth=0.8)
-        axis.set_xlabel("Real part [1/s]")
-        axis.set_ylabel("Frequency [Hz]")
+        draw_eigenvalues(axis, results)
         axis.set_title(title, loc="left")
         add_legend(figure, *axis.get_legend_handles_labels())
         save_figure(figure, path)
+
+
+def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) -> None:
+    """Eigenvalue map with rays of equal damping; other people's figures as open circles.
+
+    Parameters
+    ----------
+    axis
+        Matplotlib Axes; where it shows a map already, the modes are added to that.
+    results
+        One for each scenario.
+    first
+        Index of the first scenario's colour: the number of scenarios that the Axes show already.
+    """
+    named = [m.frequency_hz for r in results for m in r.named.values()]
+    highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
+    if first:
+        highest_hz = max(highest_hz, axis.get_ylim()[1])
+    shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
+    for index, result in enumerate(results, start=first):
+        modes = shown[id(result)]
+        axis.scatter(
+            [m.eigenvalue.real for m in modes],
+            [m.frequency_hz for m in modes],
+            marker="x",
+            s=[70 if result.name_of(m) else 30 for m in modes],
+            linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
+            color=colour(index),
+            label=result.label,
+            zorder=3,
+        )
+        for reference in result.references.values():
+            at = _real_and_hz(reference)
+            axis.scatter(*at, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
+    left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
+    if first:
+        left = min(left, axis.get_xlim()[0])
+    axis.set_xlim(left, 0.35)
+    axis.set_ylim(0, highest_hz)
+    if not first:
+        damping_rays(axis, left, highest_hz)
+        axis.axvline(0, color="#888888", linewidth=0.8)
+    axis.set_xlabel("Real part [1/s]")
+    axis.set_ylabel("Frequency [Hz]")
 
 
 def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
@@ -81,22 +101,27 @@ def plot_participation(results: Sequence[ModesResult], path: Path) -> bool:
         figure = Figure(figsize=(7.6, 0.9 + 2.1 * len(names)), layout="constrained")
         axes = figure.subplots(len(names), 1, squeeze=False)[:, 0]
         for axis, name in zip(axes, names, strict=True):
-            shares = {k: r.named[name].by_component for k, r in enumerate(results) if name in r.named}
-            most = {c: max(s.get(c, 0.0) for s in shares.values()) for s in shares.values() for c in s}
-            components = sorted(most, key=lambda c: -most[c])[:_BARS]
-            width = 0.8 / len(results)
-            for k, share in shares.items():
-                at = np.arange(len(components)) + (k - (len(results) - 1) / 2) * width
-                heights = [100 * share.get(c, 0.0) for c in components]
-                axis.bar(at, heights, width, color=colour(k), label=results[k].prepared.title, zorder=3)
-            axis.set_xticks(range(len(components)), components)
-            axis.set_ylabel("Participation [%]")
-            axis.grid(visible=False, axis="x")
+            draw_participation(axis, results, name)
             axis.set_title(f"Mode {name}" if len(names) > 1 else f"{name.capitalize()} mode", loc="left")
         handles, labels = axes[0].get_legend_handles_labels()
         add_legend(figure, handles, labels)
         save_figure(figure, path)
     return True
+
+
+def draw_participation(axis: Any, results: Sequence[ModesResult], name: str) -> None:
+    """Bars of the components that take part most in a named mode, on Matplotlib Axes."""
+    shares = {k: r.named[name].by_component for k, r in enumerate(results) if name in r.named}
+    most = {c: max(s.get(c, 0.0) for s in shares.values()) for s in shares.values() for c in s}
+    components = sorted(most, key=lambda c: -most[c])[:_BARS]
+    width = 0.8 / len(results)
+    for k, share in shares.items():
+        at = np.arange(len(components)) + (k - (len(results) - 1) / 2) * width
+        heights = [100 * share.get(c, 0.0) for c in components]
+        axis.bar(at, heights, width, color=colour(k), label=results[k].prepared.title, zorder=3)
+    axis.set_xticks(range(len(components)), components)
+    axis.set_ylabel("Participation [%]")
+    axis.grid(visible=False, axis="x")
 
 
 def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
@@ -111,7 +136,7 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
         for row, name in enumerate(names):
             for column, result in enumerate(results):
                 axis = axes[row, column]
-                _compass(axis, result, name, colour(column))
+                draw_mode_shape(axis, result, name, colour(column))
                 mode = result.named.get(name)
                 figures = f"\n{mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %" if mode else "\nnone in range"
                 axis.set_title(f"{name}: {result.prepared.title}{figures}", fontsize=8.5)
@@ -119,7 +144,8 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
     return True
 
 
-def _compass(axis: Any, result: ModesResult, name: str, shade: str) -> None:
+def draw_mode_shape(axis: Any, result: ModesResult, name: str, shade: str) -> None:
+    """Arrows of the states that swing in a named mode, on polar Matplotlib Axes."""
     axis.set_ylim(0, 1.08)
     axis.spines["polar"].set_visible(False)
     axis.set_yticks([0.5, 1.0], [])

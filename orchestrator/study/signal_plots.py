@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -14,26 +15,14 @@ from orchestrator.study.run import RunResult
 
 def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> bool:
     """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded."""
-    drawn = [(p, [(k, r, signal(r.dataset, p.signal)) for k, r in enumerate(results)]) for p in table.panels]
-    if all(data is None for _, curves in drawn for _, _, data in curves):
+    if all(signal(r.dataset, panel.signal) is None for panel in table.panels for r in results):
         return False
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 1.3 + 1.9 * len(table.panels)), layout="constrained")
         axes = figure.subplots(len(table.panels), 1, sharex=True, squeeze=False)[:, 0]
-        for axis, (panel, curves) in zip(axes, drawn, strict=True):
-            for index, result, data in curves:
-                if data is not None:
-                    axis.plot(
-                        data["time"],
-                        panel.scale * data,
-                        color=colour(index),
-                        label=result.modes.label,
-                    )
-                follows = signal(result.linear, panel.signal) if result.linear is not None else None
-                if follows is not None:
-                    axis.plot(follows["time"], panel.scale * follows, color="black", linewidth=0.8, linestyle="--")
+        for axis, panel in zip(axes, table.panels, strict=True):
+            draw_signal(axis, results, panel.signal, panel.scale)
             axis.set_ylabel(panel.label)
-            axis.margins(x=0)
         dashed = "; dashed: linear model" if any(r.linear is not None for r in results) else ""
         axes[0].set_title(f"{table.title}{dashed}", loc="left")
         axes[-1].set_xlabel("Time [s]")
@@ -41,3 +30,29 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
         add_legend(figure, handles, labels)
         save_figure(figure, path)
     return True
+
+
+def draw_signal(axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0) -> None:
+    """One signal of all runs that recorded it; dashed, the linear model's response where there is one.
+
+    Parameters
+    ----------
+    axis
+        Matplotlib Axes.
+    results
+        One for each scenario.
+    expression
+        ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
+    scale
+        Factor on the values.
+    first
+        Index of the first run's colour: the number of runs that the Axes show already.
+    """
+    for index, result in enumerate(results, start=first):
+        data = signal(result.dataset, expression)
+        if data is not None:
+            axis.plot(data["time"], scale * data, color=colour(index), label=result.modes.label)
+        follows = signal(result.linear, expression) if result.linear is not None else None
+        if follows is not None:
+            axis.plot(follows["time"], scale * follows, color="black", linewidth=0.8, linestyle="--")
+    axis.margins(x=0)

@@ -44,7 +44,19 @@ def _rows(curve: Curve) -> Iterator[Curve]:
 
 
 def plot_trajectories(samples: Samples, path: Path) -> bool:
-    """Complex plane with rays of equal damping; a circle where each trajectory starts."""
+    """Complex plane with rays of equal damping as a picture; False where no mode is in it."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 6.2), layout="constrained")
+        axis = figure.subplots()
+        if not draw_trajectories(axis, samples):
+            return False
+        figure.legend(loc="outside lower center", ncols=3)
+        save_figure(figure, path)
+    return True
+
+
+def draw_trajectories(axis: Any, samples: Samples) -> bool:
+    """Complex plane with rays of equal damping; a circle where each trajectory starts; False where no mode is in it."""
     drawn: list[tuple[int, Trajectory, Curve]] = []
     for k, sweep in enumerate(samples.result.scenarios):
         for trajectory in sweep.trajectories:
@@ -57,34 +69,29 @@ def plot_trajectories(samples: Samples, path: Path) -> bool:
     left = min(-1.0, 1.05 * min(p["real"] for p in points))
     right = max(0.35, 1.2 * max(p["real"] for p in points))
     highest = 1.08 * max(p["frequency"] for p in points)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 6.2), layout="constrained")
-        axis = figure.subplots()
-        for k, trajectory, curve in drawn:
-            strong = trajectory.carries is not None
-            for piece in _rows(curve):
-                at = [s["real"] for _, s in piece], [s["frequency"] for _, s in piece]
-                axis.plot(*at, color=colour(k), linewidth=1.8 if strong else 0.9, alpha=1.0 if strong else 0.7)
-                axis.plot(*at, ".", color=colour(k), markersize=4.5 if strong else 2.5)
-                axis.plot(at[0][0], at[1][0], "o", color=colour(k), markerfacecolor="white", markersize=6, zorder=4)
-            if strong:
-                ends = [(s["real"], s["frequency"]) for _, s in curve]
-                number = trajectory.name.removeprefix(trajectory.carries or "").strip()
-                axis.annotate(number, ends[-1], xytext=(5, 3), textcoords="offset points", color=colour(k), fontsize=9)
-        for k, sweep in enumerate(samples.result.scenarios):
-            unstable = len(sweep.unstable(samples.axes))
-            words = f": UNSTABLE at {unstable} of its points" if unstable else ""
-            axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
-        axis.set_xlim(left, right)
-        axis.set_ylim(0, highest)
-        damping_rays(axis, left, highest)
-        axis.axvline(0, color="#888888", linewidth=0.8)
-        axis.set_xlabel("Real part [1/s]")
-        axis.set_ylabel("Frequency [Hz]")
-        title = "\n".join(f"{axis_label(a)} from {a.values[0]:g} to {a.values[-1]:g}" for a in samples.axes)
-        axis.set_title(f"{title} (circle: start; thick: named modes)", loc="left")
-        figure.legend(loc="outside lower center", ncols=3)
-        save_figure(figure, path)
+    for k, trajectory, curve in drawn:
+        strong = trajectory.carries is not None
+        for piece in _rows(curve):
+            at = [s["real"] for _, s in piece], [s["frequency"] for _, s in piece]
+            axis.plot(*at, color=colour(k), linewidth=1.8 if strong else 0.9, alpha=1.0 if strong else 0.7)
+            axis.plot(*at, ".", color=colour(k), markersize=4.5 if strong else 2.5)
+            axis.plot(at[0][0], at[1][0], "o", color=colour(k), markerfacecolor="white", markersize=6, zorder=4)
+        if strong:
+            ends = [(s["real"], s["frequency"]) for _, s in curve]
+            number = trajectory.name.removeprefix(trajectory.carries or "").strip()
+            axis.annotate(number, ends[-1], xytext=(5, 3), textcoords="offset points", color=colour(k), fontsize=9)
+    for k, sweep in enumerate(samples.result.scenarios):
+        unstable = len(sweep.unstable(samples.axes))
+        words = f": UNSTABLE at {unstable} of its points" if unstable else ""
+        axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
+    axis.set_xlim(left, right)
+    axis.set_ylim(0, highest)
+    damping_rays(axis, left, highest)
+    axis.axvline(0, color="#888888", linewidth=0.8)
+    axis.set_xlabel("Real part [1/s]")
+    axis.set_ylabel("Frequency [Hz]")
+    title = "\n".join(f"{axis_label(a)} from {a.values[0]:g} to {a.values[-1]:g}" for a in samples.axes)
+    axis.set_title(f"{title} (circle: start; thick: named modes)", loc="left")
     return True
 
 
