@@ -1,1 +1,43 @@
-"""The master: couples FMUs, finds their common operating point, linearises around it, and reports."""
+"""Co-simulation of grid-forming converters: ``import orchestrator as gfor``.
+
+A name is imported where it is first used, so that ``import orchestrator`` takes no time; ``__init__.pyi`` says the
+same to type checkers.
+
+Examples
+--------
+>>> import orchestrator as gfor
+>>> scenario = gfor.load("two_area").scenario("pod_p", {"grid.X_L": 0.3})
+>>> axes = scenario.modes().plot()
+"""
+
+from importlib import import_module
+
+_HOMES = {
+    "Case": "api.case",
+    "CosimError": "errors",
+    "Modes": "api.results",
+    "Run": "api.results",
+    "Scenario": "api.scenario",
+    "build": "api.models",
+    "built_in_cases": "api.case",
+    "check": "api.acceptance",
+    "compare": "api.comparison",
+    "load": "api.case",
+    "open_fmu": "api.fmu",
+    "read_linear_model": "api.linear",
+}
+"""Name → module of this package that defines it."""
+
+__all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(_HOMES)}")
+    value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -3,10 +3,10 @@
 import argparse
 from pathlib import Path
 
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.extras import require
-from fmus.toolchain.model import Model
+from orchestrator.api.models import build, catalogue_model
 from orchestrator.cli import linear_model
 from orchestrator.errors import InputError
 
@@ -31,25 +31,12 @@ def run(options: argparse.Namespace) -> int:
     if options.fmi != "2.0" and not options.native:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
-    from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
-    from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
-
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
-    models = [_model(name) for name in names]
+    models = [catalogue_model(name) for name in names]
     extra = linear_model.extra_members(options, [model.name for model in models])
-    platforms = tuple(options.platform) if options.platform else None
     for model in models:
-        recipe = NativeFmu(model, options.fmi) if options.native else PythonFmu(model)
-        print(export(recipe, options.dest, platforms, extra))
-    return 0
-
-
-def _model(name: str) -> Model:
-    if name not in model_names():
-        raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
-    if needs_arguments(name):
-        raise InputError(
-            f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
+        built = build(
+            model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra
         )
-    return build_model(name)
+        print(built)
+    return 0

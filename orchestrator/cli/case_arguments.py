@@ -3,7 +3,8 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.cases.case import load_case
+from orchestrator.api.case import load
+from orchestrator.api.scenario import Scenario
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import assignment, seconds
@@ -44,13 +45,19 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
+def choose(options: argparse.Namespace) -> list[Scenario]:
     """The scenarios of a case, as the options have them."""
-    case = load_case(options.case)
     stop = getattr(options, "stop", None)
-    scenarios = case.prepare(options.scenario, dict(options.set), options.step, stop, parameters(options))
-    print_questions(scenarios)
+    scenarios = load(options.case).choose(
+        options.scenario, dict(options.set), step=options.step, stop=stop, parameters=options.parameters
+    )
+    print_questions([scenario.prepared for scenario in scenarios])
     return scenarios
+
+
+def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
+    """The same, ready to run."""
+    return [scenario.prepared for scenario in choose(options)]
 
 
 def parameters(options: argparse.Namespace) -> list[ParameterFile]:

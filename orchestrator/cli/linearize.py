@@ -4,11 +4,10 @@ import argparse
 from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.case_arguments import add_case_arguments, choose
 from orchestrator.cli.terminal import made_folder, make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linearised import exceptions_in_words
-from orchestrator.study.linear import default_inputs, default_outputs, linear_model
 from orchestrator.study.linear_model_files import save_linear_model
 
 
@@ -34,20 +33,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Linearise every scenario and write its model."""
-    scenarios = prepare(options)
-    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_linear")
+    scenarios = choose(options)
+    folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear")
     verdicts: dict[str, Stability] = {}
     lines = []
-    for prepared in scenarios:
-        inputs = options.input or default_inputs(prepared)
-        outputs = options.output or default_outputs(prepared)
-        model, point, examined = linear_model(prepared, inputs, outputs, as_continuous=options.continuous)
-        verdicts[prepared.title] = examined.stability
-        warn(prepared.name, examined.warnings)
-        paths = save_linear_model(model, point, verdicts[prepared.title], prepared, folder / prepared.name)
+    for scenario in scenarios:
+        model = scenario.linearize(options.input or (), options.output or (), continuous=options.continuous)
+        verdicts[scenario.title] = model.stability
+        warn(scenario.name, model.warnings)
+        paths = save_linear_model(
+            model, model.operating_point, model.stability, scenario.prepared, folder / scenario.name
+        )
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
-        lines.append(f"{prepared.name}: {kind}, {size}: {', '.join(map(str, paths))}")
+        lines.append(f"{scenario.name}: {kind}, {size}: {', '.join(map(str, paths))}")
         if exceptions := exceptions_in_words(model.sources):
             lines.append(exceptions)
     print_stability(make_console(), verdicts)

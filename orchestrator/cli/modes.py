@@ -5,14 +5,13 @@ import json
 from pathlib import Path
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import frequency_range, percent
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.case_arguments import add_case_arguments, choose
 from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_sources, print_warnings
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.study import tables
-from orchestrator.study.modes import ModesResult, compute_modes, modes_json, running
+from orchestrator.study.modes import modes_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,11 +49,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for."""
-    scenarios = prepare(options)
+    scenarios = choose(options)
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = made_folder(options.out) if options.out else None
-    results = [_modes(prepared, options) for prepared in scenarios]
+    if options.black_box and options.directional:
+        raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
+    results = [
+        scenario.modes(
+            options.range, options.critical, directional=options.directional, black_box=options.black_box
+        ).result
+        for scenario in scenarios
+    ]
     written = []
     if folder:
         from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
@@ -74,14 +80,3 @@ def run(options: argparse.Namespace) -> int:
     if folder:
         console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
     return exit_code(options, [r.stability for r in results])
-
-
-def _modes(prepared: PreparedScenario, options: argparse.Namespace) -> ModesResult:
-    if not options.black_box:
-        return compute_modes(prepared, options.range, options.critical, directional=options.directional)
-    from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - fitting: a second to import
-
-    if options.directional:
-        raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
-    with running(prepared) as master:
-        return modes_with_boxes(prepared, master, options.range, options.critical)

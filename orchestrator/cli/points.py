@@ -7,9 +7,10 @@ from typing import TypeVar
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.cli.terminal import make_errors, progress_bar
+from orchestrator.cli.terminal import make_errors
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import Report
+from orchestrator.report.progress import progress_bar
 
 Result = TypeVar("Result")
 

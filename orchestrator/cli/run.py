@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,10 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.api.scenario import RunEndedWarning
 from orchestrator.cli import like
 from orchestrator.cli.arguments import seconds
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.case_arguments import add_case_arguments, choose
 from orchestrator.cli.terminal import (
     made_folder,
     make_console,
@@ -20,14 +22,14 @@ from orchestrator.cli.terminal import (
     print_named_modes,
     print_sources,
     print_warnings,
-    progress_bar,
 )
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, RunInterruptedError
+from orchestrator.report.progress import progress_bar
 from orchestrator.study import tables
 from orchestrator.study.files import save_run, save_study, summary_of
-from orchestrator.study.run import RunResult, run_scenario
+from orchestrator.study.run import RunResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,33 +46,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the scenarios one after the other; each is written as soon as it is done."""
     rules = like.rules_of(options)
-    scenarios = prepare(options)
+    scenarios = choose(options)
     if rules is not None:
-        return like.run(scenarios, rules, options)
-    folder = made_folder(options.out or Path("results") / scenarios[0].case.name)
+        return like.run([scenario.prepared for scenario in scenarios], rules, options)
+    folder = made_folder(options.out or Path("results") / scenarios[0].prepared.case.name)
     console = make_console(stderr=options.json)
     results: list[RunResult] = []
     stopped: tuple[str, BaseException] | None = None
     with progress_bar(console) as bar:
-        for prepared in scenarios:
-            task = bar.add_task(prepared.title, total=None)
+        for scenario in scenarios:
+            task = bar.add_task(scenario.title, total=None)
 
             def report(done: int, total: int, task: Any = task) -> None:
                 bar.update(task, completed=done, total=total)
 
             try:
-                result = run_scenario(prepared, observers=[Progress(report)], linear=options.linear)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
+                    result = scenario.run(linear=options.linear, observers=[Progress(report)]).result
             except (CosimError, KeyboardInterrupt) as error:
                 if not results:
                     raise
-                stopped = (prepared.name, error)
+                stopped = (scenario.name, error)
                 break
             results.append(result)
             save_run(result, folder)
             print_warnings([result.modes])
             print_findings([result])
             if result.failure:
-                stopped = (prepared.name, result.failure)
+                stopped = (scenario.name, result.failure)
                 break
     plots = save_study(results, folder)
     if options.json:

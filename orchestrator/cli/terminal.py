@@ -5,8 +5,6 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as ProgressBar
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
@@ -25,17 +23,6 @@ def make_console(*, stderr: bool = False) -> Console:
 def make_errors() -> Console:
     """Standard error, one line for each message."""
     return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
-
-
-def progress_bar(console: Console) -> ProgressBar:
-    """A bar on a terminal; elsewhere nothing."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
-    return ProgressBar(*columns, console=console, disable=not console.is_terminal, transient=True)
 
 
 def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:

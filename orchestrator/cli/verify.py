@@ -20,8 +20,9 @@ from orchestrator.certification.verification import (
 )
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.terminal import make_console, progress_bar
+from orchestrator.cli.terminal import make_console
 from orchestrator.errors import INTERRUPTED
+from orchestrator.report.progress import progress_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

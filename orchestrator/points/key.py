@@ -16,7 +16,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 
 _ROOT = Path(__file__).parents[1]
-_SHOWING = ("acceptance", "cli", "interop", "report")
+_SHOWING = ("acceptance", "api", "cli", "interop", "report")
 """Rooms whose code no point's result depends on; a test holds that no code of a point imports them."""
 
 

@@ -8,6 +8,7 @@ import xarray as xr
 from orchestrator.cli import run as command
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import AnalysisError
+from orchestrator.study import run as study
 from orchestrator.study.run import run_scenario
 
 WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--stop", "2")
@@ -51,7 +52,7 @@ def test_between_two_scenarios(gfor, monkeypatch, tmp_path, error, code, said):
             raise error
         return run_scenario(prepared, **options)
 
-    monkeypatch.setattr(command, "run_scenario", only_one)
+    monkeypatch.setattr(study, "run_scenario", only_one)
     ended, _, text = gfor(*WORDS, "--out", tmp_path)
     assert ended == code
     assert text.startswith(f"{said}\nWhat was computed until then is in ")
@@ -62,5 +63,5 @@ def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
     def none(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "run_scenario", none)
+    monkeypatch.setattr(study, "run_scenario", none)
     assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")

@@ -1,0 +1,1 @@
+"""The Python face: what ``import orchestrator as gfor`` gives. The command line is written on it as well."""

@@ -1,0 +1,254 @@
+"""Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.design import ControllerDesign, design_controller
+from orchestrator.api.scenario import Scenario
+from orchestrator.api.show import page
+from orchestrator.api.sweep import ParameterSweep, sweep_parameters
+from orchestrator.api.values import Time, in_seconds, parameter_files, plain
+from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.case import built_in_cases as names_of_cases
+from orchestrator.cases.case import load_case
+from orchestrator.errors import InputError
+
+
+def built_in_cases() -> tuple[str, ...]:
+    """Names of the built-in cases.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.built_in_cases()
+    ('ieee118', 'ieee39', 'infinite_bus', 'norm631', 'two_area', 'two_area_rms')
+    """
+    return names_of_cases()
+
+
+def load(case: str | Path) -> "Case":
+    """Load a built-in case by name, or a case file or an SSP archive by path.
+
+    Raises
+    ------
+    InputError
+        If there is neither, or the file cannot be read.
+    CaseError
+        If the file lacks what nothing can be checked without.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.load("infinite_bus").scenarios
+    ('dip', 'load_step')
+    """
+    return Case(load_case(case))
+
+
+class Case:
+    """A case: its scenarios, and the studies that concern all of it. `load` makes one.
+
+    Attributes
+    ----------
+    file
+        The case file, read.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> case = gfor.load("two_area")
+    >>> case.scenarios
+    ('base', 'gfor', 'pod_p', 'pod_q', 'pod_pq')
+    >>> case
+    <Case two_area: base, gfor, pod_p, pod_q, pod_pq>
+    """
+
+    def __init__(self, file: CaseFile) -> None:
+        self.file = file
+
+    @property
+    def name(self) -> str:
+        """The case's name."""
+        return self.file.name
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        """Names of the scenarios."""
+        return tuple(self.file.scenarios)
+
+    def scenario(
+        self,
+        name: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        parameters: Iterable[str | Path] = (),
+    ) -> Scenario:
+        """One scenario, checked and ready to run; FMUs that are missing are built.
+
+        Parameters
+        ----------
+        name
+            Of the scenario; may be left out where the case has one only.
+        values
+            Values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as ``"1350 MW"``.
+        step
+            Communication step [s]; the case's by default.
+        parameters
+            Parameter files, as ``gfor design`` writes them; ``values`` go before them.
+
+        Raises
+        ------
+        CaseError
+            With every problem of the case and of the values.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> case = gfor.load("two_area")
+        >>> case.scenario("pod_p", {"grid.X_L": 0.3}).values["grid.X_L"]
+        0.3
+        """
+        if name is None and len(self.scenarios) != 1:
+            raise InputError(
+                f"{self.name}: the case has {len(self.scenarios)} scenarios; choose one of: {', '.join(self.scenarios)}"
+            )
+        (chosen,) = self.choose([name] if name else [], values, step=step, parameters=parameters)
+        return chosen
+
+    def choose(
+        self,
+        names: Sequence[str] = (),
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        stop: Time | None = None,
+        parameters: Iterable[str | Path] = (),
+    ) -> list[Scenario]:
+        """Several scenarios, or all; the mistakes of all are reported together.
+
+        Parameters
+        ----------
+        names
+            Of the scenarios; all of them where empty.
+        values, step, parameters
+            As for `scenario`.
+        stop
+            Time at which runs end [s]; the case's by default.
+
+        Raises
+        ------
+        CaseError
+            With every problem of the case and of the values.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> [scenario.title for scenario in gfor.load("two_area").choose(["gfor", "pod_p"])]
+        ['SG + GFOR', 'SG + GFOR POD-P']
+        """
+        files = parameter_files(parameters)
+        chosen, step_size, stop_time = plain(values), in_seconds(step, "step"), in_seconds(stop, "stop")
+        prepared = self.file.prepare(names, chosen, step_size, stop_time, files)
+        return [Scenario(one, self.file, chosen, step_size, files) for one in prepared]
+
+    def sweep(
+        self,
+        vary: Mapping[str, Iterable[Any]] | Iterable[str],
+        scenarios: Sequence[str] = (),
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        workers: int = 1,
+        folder: str | Path | None = None,
+        progress: bool = False,
+    ) -> ParameterSweep:
+        """Modes over a grid of parameters, followed from point to point.
+
+        Parameters
+        ----------
+        vary
+            Values by ``component.parameter``, or texts as with ``--vary``: ``"grid.X_L=0.1:0.5:9"``. Modes are
+            followed along the last one.
+        scenarios
+            Names; all of them where empty.
+        values, step
+            As for `scenario`.
+        frequencies
+            Modes from the first to the second are followed [Hz].
+        workers
+            Processes to compute in.
+        folder
+            Keeps the points, so that none is computed twice; they are forgotten where None.
+        progress
+            Show a bar.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> sweep = gfor.load("two_area").sweep({"grid.X_L": [0.1, 0.2]}, ["gfor"])
+        >>> named = sweep.table().query("named")
+        >>> named[["grid.X_L", "frequency_hz", "damping_percent"]].round(2)
+           grid.X_L  frequency_hz  damping_percent
+        0       0.1          0.58            10.59
+        1       0.2          0.43            18.01
+        """
+        return sweep_parameters(
+            self.file, vary, scenarios, plain(values), in_seconds(step, "step"), frequencies, workers, folder,
+            progress=progress,
+        )  # fmt: skip
+
+    def design(
+        self,
+        controller: str,
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        parameters: Iterable[str | Path] = (),
+        **wanted: Any,
+    ) -> ControllerDesign:
+        """Design a POD controller by eigenvalue sensitivity, and check it on the closed loop.
+
+        Parameters
+        ----------
+        controller
+            ``"pod_p"`` or ``"pod_q"``.
+        scenario
+            Its name; by default the one without this controller.
+        values, step, parameters
+            As for `scenario`.
+        wanted
+            What else `orchestrator.pod_design.design.DesignRequest` holds: ``damping`` or ``damping_increment``
+            (ratios: 0.2 is 20 %), ``component``, ``mode``, ``gain_bounds`` [pu], ``stages``, ``refine``, ``margins``.
+
+        Raises
+        ------
+        InputError
+            If scenario, component, mode or requirement cannot be found or make no sense.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> design = gfor.load("two_area").design("pod_p", margins=False)
+        >>> design.met
+        True
+        >>> design.parameters["gfor.pod_p.K"]
+        200.0
+        """
+        files = parameter_files(parameters)
+        step_size = in_seconds(step, "step")
+        return design_controller(self.file, controller, scenario, plain(values), step_size, files, wanted)
+
+    def __repr__(self) -> str:
+        return f"<Case {self.name}: {', '.join(self.scenarios)}>"
+
+    def _repr_html_(self) -> str:
+        titles = [table.title or name for name, table in self.file.scenarios.items()]
+        table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
+        return page(f"{self.name}: {self.file.table.title or self.name}", table=table)

@@ -1,0 +1,106 @@
+"""The design of a POD controller."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from orchestrator.api.show import page
+from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.parameter_files import ParameterFile, parameter_file_text
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+from orchestrator.pod_design.design import DesignRequest, PodDesign, design_pod
+from orchestrator.pod_design.files import design_json, parameters_of, provenance
+from orchestrator.pod_design.target import CONTROLLERS
+
+
+class ControllerDesign:
+    """A POD controller, and the closed loop with it. `Case.design` makes it.
+
+    Attributes
+    ----------
+    result
+        Every figure on the way.
+    """
+
+    def __init__(self, result: PodDesign) -> None:
+        self.result = result
+
+    @property
+    def met(self) -> bool:
+        """Whether the closed loop has the required damping, and leaves the other modes alone."""
+        return self.result.met
+
+    @property
+    def parameters(self) -> dict[str, bool | float | str]:
+        """The setting by ``component.variable``: the values of a scenario with this controller."""
+        return parameters_of(self.result)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be borne in mind of the design."""
+        return self.result.warnings
+
+    def table(self) -> pd.DataFrame:
+        """The mode before and after: eigenvalue [1/s, rad/s] and damping ratio, beside the required one."""
+        r = self.result
+        rows = {
+            "without the controller": (r.initial, None),
+            "predicted": (r.predicted, r.required_damping),
+            "with it": (r.achieved, r.required_damping),
+        }
+        return pd.DataFrame(
+            {
+                "real": {name: value.real for name, (value, _) in rows.items()},
+                "imag": {name: value.imag for name, (value, _) in rows.items()},
+                "damping_percent": {name: -100 * value.real / abs(value) for name, (value, _) in rows.items()},
+                "required_percent": {name: None if z is None else 100 * z for name, (_, z) in rows.items()},
+            }
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor design --json`` prints, as JSON's types, without the parameter file."""
+        return design_json(self.result)
+
+    def save(self, path: str | Path) -> Path:
+        """Write a parameter file, which ``--parameters`` and `Case.scenario` take."""
+        command = f"gfor.load({self.result.case!r}).design({self.result.request.controller!r}, …) in Python"
+        text = parameter_file_text(self.parameters, provenance(self.result, command))
+        Path(path).write_text(text, encoding="utf-8")
+        return Path(path)
+
+    def __repr__(self) -> str:
+        said = "met" if self.met else "not met"
+        return f"<ControllerDesign {self.result.request.controller} for {self.result.case}: requirement {said}>"
+
+    def _repr_html_(self) -> str:
+        setting = [f"{name} = {value}" for name, value in self.parameters.items()]
+        lines = [self.result.stability.sentence(), *(f"warning: {text}" for text in self.warnings), ", ".join(setting)]
+        return page(repr(self).strip("<>"), lines, self.table())
+
+
+def design_controller(
+    file: CaseFile,
+    controller: str,
+    scenario: str | None,
+    values: Mapping[str, Value],
+    step_size: float | None,
+    parameters: Sequence[ParameterFile],
+    wanted: Mapping[str, Any],
+) -> ControllerDesign:
+    """Design a controller; the parameters are those of `Case.design`."""
+    if controller not in CONTROLLERS:
+        raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    try:
+        request = DesignRequest(
+            controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wanted
+        )
+    except TypeError as error:
+        raise InputError(f"design: {error}; DesignRequest lists what can be asked for") from error
+    for name in ("damping", "damping_increment", "least_damping"):
+        ratio = getattr(request, name)
+        if ratio is not None and not 0 < ratio < 1:
+            raise InputError(f"{name} = {ratio:g}; it is a damping ratio between 0 and 1, such as 0.2 for 20 %")
+    return ControllerDesign(design_pod(file, request))

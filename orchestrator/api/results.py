@@ -1,0 +1,278 @@
+"""Modes and runs of a scenario: as tables, as pictures, in a notebook."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+from orchestrator.analysis.identification import IdentifiedMode
+from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.stability import Stability
+from orchestrator.api.show import Axes, curves_on, new_axes, page
+from orchestrator.errors import CosimError, InputError
+from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.study.comparison import recorded
+from orchestrator.study.modes import ModesResult, modes_json
+from orchestrator.study.run import RunResult
+from orchestrator.watch.finding import Finding
+
+_STATES = 3
+"""States with the largest participation that stand in a table."""
+
+
+class Modes:
+    """Steady state and modes of one scenario. `Scenario.modes` makes it.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> modes = gfor.load("two_area").scenario("gfor").modes()
+    >>> modes.stability.stable
+    True
+    >>> mode = modes.named["electromechanical"]
+    >>> print(f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.1f} %")
+    0.582 Hz, 10.6 %
+    """
+
+    def __init__(self, result: ModesResult) -> None:
+        self.result = result
+
+    @property
+    def stability(self) -> Stability:
+        """The verdict over the whole spectrum."""
+        return self.result.stability
+
+    @property
+    def named(self) -> dict[str, Mode]:
+        """The modes that the case gives a name."""
+        return dict(self.result.named)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be borne in mind of the modes."""
+        return self.result.warnings
+
+    def __iter__(self) -> Iterator[Mode]:
+        return iter(self.result.modes)
+
+    def __len__(self) -> int:
+        return len(self.result.modes)
+
+    def table(self) -> pd.DataFrame:
+        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping ratio, name, states.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> gfor.load("two_area").scenario("gfor").modes().table().columns.tolist()
+        ['real', 'imag', 'frequency_hz', 'damping_percent', 'name', 'states']
+        """
+        rows = [
+            {
+                **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
+                "name": self.result.name_of(mode) or "",
+                "states": ", ".join(f"{state} {factor:.2f}" for state, factor in mode.participation[:_STATES]),
+            }
+            for mode in self.result.modes
+        ]
+        columns = ["real", "imag", "frequency_hz", "damping_percent", "name", "states"]
+        return pd.DataFrame(rows, columns=columns, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
+
+    def participation(self) -> pd.DataFrame:
+        """Participation of every state (row) in every mode (column, as in `table`).
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> factors = gfor.load("two_area").scenario("gfor").modes().participation()
+        >>> factors.sum().round(6).unique().tolist()
+        [1.0]
+        """
+        columns = {number: dict(mode.participation) for number, mode in enumerate(self.result.modes, start=1)}
+        table = pd.DataFrame(columns, index=list(self.result.model.names))
+        return table.rename_axis(index="state", columns="mode")
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
+        return dict(modes_json([self.result]))
+
+    def plot(self, ax: Axes = None) -> Axes:
+        """Eigenvalue map with rays of equal damping; large crosses are modes with a name.
+
+        Parameters
+        ----------
+        ax
+            Matplotlib Axes, such as those with another scenario's modes; by default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> case = gfor.load("two_area")
+        >>> axes = case.scenario("gfor").modes().plot()
+        >>> axes = case.scenario("pod_p").modes().plot(axes)
+        >>> axes.get_xlabel()
+        'Real part [1/s]'
+        """
+        from orchestrator.study.mode_plots import draw_eigenvalues  # noqa: PLC0415 - a second to import
+
+        axes = new_axes(7.2, 5.0) if ax is None else ax
+        draw_eigenvalues(axes, [self.result], curves_on(axes))
+        axes.legend(loc="upper left", fontsize="small")
+        return axes
+
+    def __repr__(self) -> str:
+        r = self.result
+        return (
+            f"<Modes of {r.prepared.case.name}, {r.prepared.name}: {len(self)} in range; {self.stability.sentence()}>"
+        )
+
+    def _repr_html_(self) -> str:
+        r = self.result
+        outside = [] if r.hidden is None else [r.hidden.sentence()]
+        lines = [self.stability.sentence(), *outside, *(f"warning: {text}" for text in self.warnings)]
+        return page(f"Modes of {r.prepared.case.name}: {r.prepared.title}", lines, self.table())
+
+
+class Run:
+    """A scenario's modes and its response in time. `Scenario.run` makes it.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
+    >>> run.dataset["grid.v"].attrs["units"]
+    'pu'
+    >>> run.modes.stability.stable
+    True
+    """
+
+    def __init__(self, result: RunResult) -> None:
+        self.result = result
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """What was recorded over the time [s], with units, long names and provenance."""
+        return self.result.dataset
+
+    @property
+    def linear(self) -> xr.Dataset | None:
+        """The linear model's response to the same events, where it was asked for."""
+        return self.result.linear
+
+    @property
+    def modes(self) -> Modes:
+        """The modes before the events."""
+        return Modes(self.result.modes)
+
+    @property
+    def ring_down(self) -> IdentifiedMode | None:
+        """The case's first mode as the response shows it."""
+        return self.result.ring_down
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What the run did wrong, in the order of its beginning."""
+        return list(self.result.findings)
+
+    @property
+    def failure(self) -> CosimError | None:
+        """The error that ended the run before its time."""
+        return self.result.failure
+
+    def signal(self, expression: str) -> xr.DataArray:
+        """A recorded variable ``"a.b"``, or the difference ``"a.b - c.d"`` of two.
+
+        Raises
+        ------
+        InputError
+            If it was not recorded.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
+        >>> run.signal("gfor.omega").dims
+        ('time',)
+        """
+        return recorded(self.dataset, expression, self.result.modes.prepared.name)
+
+    def table(self) -> pd.DataFrame:
+        """All recorded signals over the time [s]."""
+        return self.dataset.to_dataframe()
+
+    def summary(self) -> dict[str, Any]:
+        """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""
+        from orchestrator.study.files import summary_of  # noqa: PLC0415 - plots: a second to import
+
+        return summary_of(self.result)
+
+    def plot(self, signal: str | None = None, ax: Axes = None) -> Axes:
+        """A signal over the time; dashed, the linear model's response where it was asked for.
+
+        Parameters
+        ----------
+        signal
+            ``"a.b"`` or ``"a.b - c.d"``; by default the first that the case plots.
+        ax
+            Matplotlib Axes, such as those with another run's signal; by default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        InputError
+            If the signal was not recorded.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
+        >>> run.plot("grid.v").get_ylabel()
+        'grid.v [pu]'
+        """
+        from orchestrator.study.signal_plots import draw_signal  # noqa: PLC0415 - a second to import
+
+        expression = signal or self._first_plotted()
+        unit = self.signal(expression).attrs.get("units") or self.dataset[expression.split(" - ")[0].strip()].units
+        axes = new_axes(7.2, 3.2) if ax is None else ax
+        draw_signal(axes, [self.result], expression, first=curves_on(axes))
+        axes.set_xlabel("Time [s]")
+        axes.set_ylabel(f"{expression} [{unit}]")
+        axes.legend(loc="best", fontsize="small")
+        return axes
+
+    def _first_plotted(self) -> str:
+        for plot in self.result.modes.prepared.case.table.plots:
+            for panel in plot.panels:
+                return str(panel.signal)
+        raise InputError(f"the case plots no signal; name one of: {', '.join(map(str, self.dataset.data_vars))}")
+
+    def __repr__(self) -> str:
+        prepared, times = self.result.modes.prepared, self.dataset["time"].values
+        end = float(times[-1]) if len(times) else 0.0
+        failed = f"; ended early: {self.failure}" if self.failure else ""
+        return f"<Run of {prepared.case.name}, {prepared.name}: {end:g} s, {len(self.dataset)} signals{failed}>"
+
+    def _repr_html_(self) -> str:
+        lines = [self.modes.stability.sentence()]
+        lines += [f"ended early: {self.failure}"] if self.failure else []
+        lines += [f"found: {finding.message}" for finding in self.findings]
+        prepared = self.result.modes.prepared
+        return page(f"Run of {prepared.case.name}: {prepared.title}", lines, rest=str(self.dataset._repr_html_()))

@@ -1,0 +1,219 @@
+"""One scenario of a case: its modes, its response in time, its linear model."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.linear import LinearSystem
+from orchestrator.api.progress import shown_progress
+from orchestrator.api.results import Modes, Run
+from orchestrator.api.show import page
+from orchestrator.api.values import Time, in_seconds
+from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.progress import Progress
+from orchestrator.errors import InputError
+
+
+class RunEndedWarning(UserWarning):
+    """A run ended before its time; what was recorded until then is in the result."""
+
+
+class Scenario:
+    """A scenario that is ready to run. `Case.scenario` makes one.
+
+    Attributes
+    ----------
+    prepared
+        The components with their values, the schedule, the events.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> scenario = gfor.load("infinite_bus").scenario("dip", {"gfor.P_0": 0.5})
+    >>> scenario.title
+    'Voltage dip of 20 % for 150 ms'
+    >>> scenario.values["gfor.P_0"]
+    0.5
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedScenario,
+        file: CaseFile,
+        values: Mapping[str, Value],
+        step_size: float | None,
+        parameters: Sequence[ParameterFile],
+    ) -> None:
+        self.prepared = prepared
+        self._file, self._values, self._step_size, self._parameters = file, values, step_size, parameters
+
+    @property
+    def name(self) -> str:
+        """The scenario's name."""
+        return self.prepared.name
+
+    @property
+    def title(self) -> str:
+        """The scenario's title."""
+        return self.prepared.title
+
+    @property
+    def values(self) -> dict[str, float | bool]:
+        """Every value that the case, its parameter files or the caller set, by ``component.variable``."""
+        return dict(self.prepared.values)
+
+    @property
+    def questions(self) -> list[str]:
+        """Data that are most unusual, each with its place."""
+        return [str(question) for question in self.prepared.questions]
+
+    def modes(
+        self,
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        critical: float | None = None,
+        *,
+        directional: bool = False,
+        black_box: bool = False,
+    ) -> Modes:
+        """Steady state and modes.
+
+        Parameters
+        ----------
+        frequencies
+            Modes from the first to the second are shown [Hz].
+        critical
+            Damping ratio (0.2 is 20 %) below which modes are looked for, by sparse search; by default the whole
+            spectrum is computed.
+        directional
+            Linearise with the FMUs' own directional derivatives instead of by perturbation.
+        black_box
+            Identify the components that hide their states from their inputs and outputs.
+
+        Raises
+        ------
+        AnalysisError
+            If no steady state is found, or the system cannot be linearised.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> modes = gfor.load("two_area").scenario("pod_p").modes()
+        >>> modes.table()[["frequency_hz", "damping_percent", "name"]].round(2).head(2)
+              frequency_hz  damping_percent               name
+        mode
+        1             0.76            22.55  electromechanical
+        2             0.34            32.70
+        """
+        from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
+
+        low, high = frequencies
+        if not 0 <= low < high:
+            raise InputError(f"frequencies = {frequencies}; give two in Hz, the lower one first, such as (0.1, 2.0)")
+        if critical is not None and not 0 < critical < 1:
+            raise InputError(f"critical = {critical:g}; it is a damping ratio between 0 and 1, such as 0.2 for 20 %")
+        if critical is not None and not low > 0:
+            raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
+        if not black_box:
+            return Modes(compute_modes(self.prepared, frequencies, critical, directional=directional))
+        if directional:
+            raise InputError("black_box identifies, directional asks the FMUs for derivatives; choose one of them")
+        from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
+
+        with running(self.prepared) as master:
+            return Modes(modes_with_boxes(self.prepared, master, frequencies, critical))
+
+    def run(
+        self,
+        stop: Time | None = None,
+        *,
+        linear: bool = False,
+        progress: bool = False,
+        observers: Sequence[Observer] = (),
+    ) -> Run:
+        """Modes, and the response to the scenario's events.
+
+        A component that fails in the middle ends the run, and so does Ctrl-C: a `RunEndedWarning` says it, and what
+        was recorded until then is in the result.
+
+        Parameters
+        ----------
+        stop
+            Time at which the run ends [s]; the case's by default.
+        linear
+            Compute the linear model's response as well.
+        progress
+            Show a bar.
+        observers
+            What else looks on at every communication step.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
+        >>> print(f"the voltage falls to {run.dataset['grid.v'].min().item():.2f} pu")
+        the voltage falls to 0.92 pu
+        """
+        from orchestrator.study.run import run_scenario  # noqa: PLC0415 - only runs need it
+
+        prepared = self._until(in_seconds(stop, "stop"))
+        with shown_progress(self.title, shown=progress) as report:
+            bars = [Progress(report)] if progress else []
+            result = run_scenario(prepared, observers=[*bars, *observers], linear=linear)
+        if result.failure is not None:
+            warnings.warn(f"scenario {self.name!r}: {result.failure}", RunEndedWarning, stacklevel=2)
+        return Run(result)
+
+    def _until(self, stop_time: float | None) -> PreparedScenario:
+        """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""
+        if stop_time is None or stop_time == self.prepared.stop_time:
+            return self.prepared
+        (prepared,) = self._file.prepare([self.name], self._values, self._step_size, stop_time, self._parameters)
+        return prepared
+
+    def linearize(
+        self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *, continuous: bool = False
+    ) -> LinearSystem:
+        """The linear model A, B, C, D around the steady state, with names and the verdict on it.
+
+        Parameters
+        ----------
+        inputs
+            Tunable parameters and open inputs; by default what the scenario's events change.
+        outputs
+            Observed outputs; by default what the case plots.
+        continuous
+            ẋ = A·x + B·u instead of the map over one communication step.
+
+        Raises
+        ------
+        InputError
+            If there is no such variable, or an input is none that can be perturbed.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> scenario = gfor.load("infinite_bus").scenario("load_step")
+        >>> model = scenario.linearize(["gfor.droop.delta_P_ref"], ["gfor.omega"], continuous=True)
+        >>> model.B.shape == (len(model.states), 1)
+        True
+        """
+        from orchestrator.study.linear import default_inputs, default_outputs, linear_model  # noqa: PLC0415 - as above
+
+        inputs, outputs = inputs or default_inputs(self.prepared), outputs or default_outputs(self.prepared)
+        model, point, examined = linear_model(self.prepared, inputs, outputs, as_continuous=continuous)
+        return LinearSystem(
+            **vars(model), operating_point=point, stability=examined.stability, warnings=examined.warnings
+        )
+
+    def __repr__(self) -> str:
+        return f"<Scenario {self.name} of {self.prepared.case.name}: {self.title}>"
+
+    def _repr_html_(self) -> str:
+        table = pd.DataFrame({"value": self.values})
+        return page(f"{self.prepared.case.name}, {self.name}: {self.title}", self.questions, table)

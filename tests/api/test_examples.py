@@ -1,0 +1,42 @@
+"""Every public name of the Python face has an example in its docstring, and all examples run."""
+
+import doctest
+import inspect
+from importlib import import_module
+
+import pytest
+
+import orchestrator
+
+MODULES = ("acceptance", "case", "comparison", "design", "fmu", "linear", "models", "results", "scenario", "sweep")
+
+
+def examples():
+    """Examples of all modules of the face, and of the package itself."""
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    modules = [orchestrator, *(import_module(f"orchestrator.api.{name}") for name in MODULES)]
+    return [test for module in modules for test in finder.find(module, module.__name__)]
+
+
+EXAMPLES = examples()
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name.removeprefix("orchestrator."))
+def test_an_example_runs(example, tmp_path, monkeypatch):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    monkeypatch.chdir(tmp_path)
+    said = []
+    doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(example, out=said.append)
+    pyplot.close("all")
+    assert not said, "".join(said)
+
+
+@pytest.mark.parametrize("name", [name for name in orchestrator.__all__ if name != "CosimError"])
+def test_every_name_has_an_example(name):
+    value = getattr(orchestrator, name)
+    with_example = {example.name for example in EXAMPLES}
+    assert f"{value.__module__}.{value.__qualname__}" in with_example
+    for method, function in inspect.getmembers(value, inspect.isfunction):
+        if not method.startswith("_"):
+            assert function.__doc__, f"{name}.{method}"

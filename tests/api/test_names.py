@@ -1,0 +1,91 @@
+"""``import orchestrator as gfor``: which names there are, and that they cost nothing until they are used."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import orchestrator
+
+ROOT = Path(__file__).parents[2]
+NAMES = {
+    *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
+    *("open_fmu", "read_linear_model"),
+}
+
+
+def test_the_names_are_those():
+    assert set(orchestrator.__all__) == NAMES
+    assert set(dir(orchestrator)) >= NAMES
+    assert all(callable(getattr(orchestrator, name)) for name in NAMES)
+
+
+def test_no_name_is_that_of_a_module():
+    """A module would take the name's place as soon as it is imported."""
+    folder = ROOT / "orchestrator"
+    assert not {path.stem for path in folder.iterdir()} & NAMES
+
+
+def test_a_name_that_does_not_exist_is_refused_with_those_that_do():
+    with pytest.raises(AttributeError, match=r"no attribute 'laod'; it has: .*load"):
+        _ = orchestrator.laod
+
+
+def test_type_checkers_are_told_the_same():
+    tree = ast.parse((ROOT / "orchestrator" / "__init__.pyi").read_text(encoding="utf-8"))
+    homes = {alias.asname: node.module for node in tree.body for alias in node.names}
+    assert homes == {name: f"orchestrator.{home}" for name, home in orchestrator._HOMES.items()}
+
+
+def test_importing_takes_no_time_and_no_library():
+    script = (
+        "import sys, time\nbegin = time.perf_counter()\nimport orchestrator as gfor\n"
+        "print(time.perf_counter() - begin)\n"
+        "heavy = {'numpy', 'scipy', 'pandas', 'xarray', 'matplotlib', 'rich', 'casadi', 'fmpy', 'pint', 'pydantic'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+        "assert 'load' in dir(gfor)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.3
+
+
+def test_modes_need_no_plots():
+    """Matplotlib takes a second, which `gfor modes` does without."""
+    script = (
+        "import sys\nimport orchestrator as gfor\n"
+        "gfor.load('infinite_bus').scenario('dip').modes().table()\n"
+        "assert 'matplotlib' not in sys.modules"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_reference_page_lists_every_name():
+    page = (ROOT / ".docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^::: (orchestrator\.\S+)$", page, re.MULTILINE))
+    assert {f"orchestrator.{home}.{name}" for name, home in orchestrator._HOMES.items()} <= listed
+
+
+@pytest.mark.slow
+def test_type_checkers_see_types(tmp_path):
+    (tmp_path / "use.py").write_text(
+        "import orchestrator as gfor\n"
+        "modes = gfor.load('two_area').scenario('gfor').modes()\n"
+        "reveal_type(modes)\n"
+        "reveal_type(gfor.compare)\n",
+        encoding="utf-8",
+    )
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml")]
+    done = subprocess.run(
+        [*command, "--cache-dir", str(tmp_path / "cache"), str(tmp_path / "use.py")],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+    )
+    assert "orchestrator.api.results.Modes" in done.stdout, done.stdout
+    assert "RunComparison" in done.stdout
