@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.design import ControllerDesign, design_controller
-from orchestrator.api.scenario import Scenario
+from orchestrator.api.design import ControllerDesign, Wanted, design_controller
+from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.show import page
 from orchestrator.api.sweep import ParameterSweep, sweep_parameters
 from orchestrator.api.values import Time, in_seconds, parameter_files, plain
@@ -90,6 +90,8 @@ class Case:
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
+        Data that are most unusual give an `UnusualDataWarning`.
+
         Parameters
         ----------
         name
@@ -117,7 +119,8 @@ class Case:
             raise InputError(
                 f"{self.name}: the case has {len(self.scenarios)} scenarios; choose one of: {', '.join(self.scenarios)}"
             )
-        (chosen,) = self.choose([name] if name else [], values, step=step, parameters=parameters)
+        (chosen,) = choose(self.file, [name] if name else [], values, step=step, parameters=parameters)
+        question([chosen])
         return chosen
 
     def choose(
@@ -151,10 +154,9 @@ class Case:
         >>> [scenario.title for scenario in gfor.load("two_area").choose(["gfor", "pod_p"])]
         ['SG + GFOR', 'SG + GFOR POD-P']
         """
-        files = parameter_files(parameters)
-        chosen, step_size, stop_time = plain(values), in_seconds(step, "step"), in_seconds(stop, "stop")
-        prepared = self.file.prepare(names, chosen, step_size, stop_time, files)
-        return [Scenario(one, self.file, chosen, step_size, files) for one in prepared]
+        chosen = choose(self.file, names, values, step=step, stop=stop, parameters=parameters)
+        question(chosen)
+        return chosen
 
     def sweep(
         self,
@@ -211,7 +213,7 @@ class Case:
         *,
         step: Time | None = None,
         parameters: Iterable[str | Path] = (),
-        **wanted: Any,
+        **wanted: Unpack[Wanted],
     ) -> ControllerDesign:
         """Design a POD controller by eigenvalue sensitivity, and check it on the closed loop.
 
@@ -224,8 +226,9 @@ class Case:
         values, step, parameters
             As for `scenario`.
         wanted
-            What else `orchestrator.pod_design.design.DesignRequest` holds: ``damping`` or ``damping_increment``
-            (ratios: 0.2 is 20 %), ``component``, ``mode``, ``gain_bounds`` [pu], ``stages``, ``refine``, ``margins``.
+            Any of: ``damping`` or ``damping_increment`` (ratios: 0.2 is 20 %), ``component``, ``mode``,
+            ``gain_bounds`` and ``delta_gain`` [pu], ``stages``, ``compensated_gain``, ``least_damping``, ``refine``,
+            ``margins`` (False saves most of the time).
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import pandas as pd
 
@@ -14,6 +14,22 @@ from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, PodDesign, design_pod
 from orchestrator.pod_design.files import design_json, parameters_of, provenance
 from orchestrator.pod_design.target import CONTROLLERS
+
+
+class Wanted(TypedDict, total=False):
+    """What may be asked of a design beside controller and scenario; `DesignRequest` says what each means."""
+
+    component: str
+    mode: str
+    damping: float
+    damping_increment: float
+    delta_gain: float
+    gain_bounds: tuple[float, float]
+    stages: int
+    compensated_gain: bool
+    least_damping: float
+    refine: bool
+    margins: bool
 
 
 class ControllerDesign:
@@ -88,17 +104,20 @@ def design_controller(
     values: Mapping[str, Value],
     step_size: float | None,
     parameters: Sequence[ParameterFile],
-    wanted: Mapping[str, Any],
+    wanted: Wanted,
 ) -> ControllerDesign:
     """Design a controller; the parameters are those of `Case.design`."""
     if controller not in CONTROLLERS:
         raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
-    try:
-        request = DesignRequest(
-            controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wanted
-        )
-    except TypeError as error:
-        raise InputError(f"design: {error}; DesignRequest lists what can be asked for") from error
+    unknown = [name for name in wanted if name not in Wanted.__annotations__]
+    if unknown:
+        known = ", ".join(Wanted.__annotations__)
+        raise InputError(f"a design cannot be asked for {', '.join(map(repr, unknown))}; it can for {known}")
+    if "damping" in wanted and "damping_increment" in wanted:
+        raise InputError("damping and damping_increment both say what is required; give one of them")
+    request = DesignRequest(
+        controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wanted
+    )
     for name in ("damping", "damping_increment", "least_damping"):
         ratio = getattr(request, name)
         if ratio is not None and not 0 < ratio < 1:

@@ -131,10 +131,10 @@ class Modes:
         return axes
 
     def __repr__(self) -> str:
-        r = self.result
-        return (
-            f"<Modes of {r.prepared.case.name}, {r.prepared.name}: {len(self)} in range; {self.stability.sentence()}>"
-        )
+        prepared = self.result.prepared
+        head = f"Modes of {prepared.case.name}, {prepared.name}"
+        more = "".join(f"; warning: {text}" for text in self.warnings)
+        return f"<{head}: {len(self)} in range; {self.stability.sentence()}{more}>"
 
     def _repr_html_(self) -> str:
         r = self.result

@@ -1,7 +1,9 @@
 """One scenario of a case: its modes, its response in time, its linear model."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -10,7 +12,7 @@ from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.api.show import page
-from orchestrator.api.values import Time, in_seconds
+from orchestrator.api.values import Time, in_seconds, parameter_files, plain
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
@@ -22,6 +24,10 @@ from orchestrator.errors import InputError
 
 class RunEndedWarning(UserWarning):
     """A run ended before its time; what was recorded until then is in the result."""
+
+
+class UnusualDataWarning(UserWarning):
+    """Data that may well be a slip of a unit."""
 
 
 class Scenario:
@@ -217,3 +223,31 @@ class Scenario:
     def _repr_html_(self) -> str:
         table = pd.DataFrame({"value": self.values})
         return page(f"{self.prepared.case.name}, {self.name}: {self.title}", self.questions, table)
+
+
+def choose(
+    file: CaseFile,
+    names: Sequence[str] = (),
+    values: Mapping[str, Any] | None = None,
+    *,
+    step: Time | None = None,
+    stop: Time | None = None,
+    parameters: Iterable[str | Path] = (),
+) -> list[Scenario]:
+    """Scenarios of a case; the parameters are those of `Case.choose`.
+
+    Raises
+    ------
+    CaseError
+        With every problem of the case and of the values.
+    """
+    files = parameter_files(parameters)
+    chosen, step_size, stop_time = plain(values), in_seconds(step, "step"), in_seconds(stop, "stop")
+    prepared = file.prepare(names, chosen, step_size, stop_time, files)
+    return [Scenario(one, file, chosen, step_size, files) for one in prepared]
+
+
+def question(scenarios: Iterable[Scenario]) -> None:
+    """Warn about data that are most unusual, each once, where the caller of the caller stands."""
+    for text in dict.fromkeys(text for scenario in scenarios for text in scenario.questions):
+        warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3)

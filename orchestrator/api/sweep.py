@@ -11,7 +11,7 @@ import xarray as xr
 
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.show import Axes, new_axes, page
-from orchestrator.api.values import plain
+from orchestrator.api.values import plain_value
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
@@ -130,7 +130,7 @@ def sweep_parameters(
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str]) -> list[Vary]:
     """What is varied, from values by name or from texts."""
     if isinstance(vary, Mapping):
-        lists = {key: tuple(plain(dict(enumerate(values))).values()) for key, values in vary.items()}  # type: ignore[arg-type]
+        lists = {key: tuple(map(plain_value, values)) for key, values in vary.items()}
         empty = [key for key, values in lists.items() if not values]
         if empty:
             raise InputError(f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}")

@@ -15,7 +15,13 @@ Time = float | str
 
 def plain(values: Mapping[str, Any] | None) -> dict[str, Value]:
     """Values by name, with NumPy's numbers as Python's own."""
-    return {name: value.item() if hasattr(value, "item") else value for name, value in (values or {}).items()}
+    return {name: plain_value(value) for name, value in (values or {}).items()}
+
+
+def plain_value(value: Any) -> Value:
+    """A value, as Python's own number where it is one of NumPy."""
+    own: Value = value.item() if hasattr(value, "item") else value
+    return own
 
 
 def in_seconds(time: Time | None, name: str) -> float | None:

@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.case import load
-from orchestrator.api.scenario import Scenario
+from orchestrator.api.scenario import Scenario, choose
+from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import assignment, seconds
@@ -45,11 +45,11 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def choose(options: argparse.Namespace) -> list[Scenario]:
+def chosen(options: argparse.Namespace) -> list[Scenario]:
     """The scenarios of a case, as the options have them."""
-    stop = getattr(options, "stop", None)
-    scenarios = load(options.case).choose(
-        options.scenario, dict(options.set), step=options.step, stop=stop, parameters=options.parameters
+    file, stop = load_case(options.case), getattr(options, "stop", None)
+    scenarios = choose(
+        file, options.scenario, dict(options.set), step=options.step, stop=stop, parameters=options.parameters
     )
     print_questions([scenario.prepared for scenario in scenarios])
     return scenarios
@@ -57,7 +57,7 @@ def choose(options: argparse.Namespace) -> list[Scenario]:
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
     """The same, ready to run."""
-    return [scenario.prepared for scenario in choose(options)]
+    return [scenario.prepared for scenario in chosen(options)]
 
 
 def parameters(options: argparse.Namespace) -> list[ParameterFile]:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
-from orchestrator.cli.case_arguments import add_case_arguments, choose
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import made_folder, make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linearised import exceptions_in_words
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Linearise every scenario and write its model."""
-    scenarios = choose(options)
+    scenarios = chosen(options)
     folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear")
     verdicts: dict[str, Stability] = {}
     lines = []

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cli.arguments import frequency_range, percent
-from orchestrator.cli.case_arguments import add_case_arguments, choose
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_sources, print_warnings
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for."""
-    scenarios = choose(options)
+    scenarios = chosen(options)
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     folder = made_folder(options.out) if options.out else None

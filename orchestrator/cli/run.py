@@ -13,7 +13,7 @@ from rich.markup import escape
 from orchestrator.api.scenario import RunEndedWarning
 from orchestrator.cli import like
 from orchestrator.cli.arguments import seconds
-from orchestrator.cli.case_arguments import add_case_arguments, choose
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
     made_folder,
     make_console,
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the scenarios one after the other; each is written as soon as it is done."""
     rules = like.rules_of(options)
-    scenarios = choose(options)
+    scenarios = chosen(options)
     if rules is not None:
         return like.run([scenario.prepared for scenario in scenarios], rules, options)
     folder = made_folder(options.out or Path("results") / scenarios[0].prepared.case.name)

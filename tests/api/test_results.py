@@ -1,0 +1,271 @@
+"""The Python face gives what the command line prints, as tables, datasets, pictures and HTML."""
+
+import json
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+import orchestrator as face
+from orchestrator.api.progress import shown_progress
+from orchestrator.api.scenario import RunEndedWarning, UnusualDataWarning
+from orchestrator.coupling.master import Master
+from orchestrator.errors import AnalysisError, CaseError, InputError
+
+mpl.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def two_area():
+    return face.load("two_area")
+
+
+@pytest.fixture(scope="module")
+def modes(two_area):
+    return two_area.scenario("gfor", {"grid.X_L": 0.3}).modes()
+
+
+@pytest.fixture(scope="module")
+def run():
+    return face.load("infinite_bus").scenario("dip").run(stop=1.2, linear=True)
+
+
+@pytest.fixture(autouse=True)
+def _no_figures_left():
+    yield
+    import matplotlib.pyplot as plt  # noqa: PLC0415 - after the backend is chosen
+
+    plt.close("all")
+
+
+# -- the same figures as on the command line -------------------------------------------------------
+
+
+def test_modes_are_those_of_the_command(gfor, modes):
+    code, out, _ = gfor("modes", "two_area", "--scenario", "gfor", "--set", "grid.X_L=0.3", "--json")
+    assert code == 0
+    assert json.loads(out) == json.loads(json.dumps(modes.as_json()))
+    printed = json.loads(out)["scenarios"][0]["modes"]
+    table = modes.table()
+    assert len(table) == len(printed) == len(modes) > 0
+    for figure in ("real", "imag", "frequency_hz", "damping_percent"):
+        assert table[figure].tolist() == [mode[figure] for mode in printed]
+
+
+def test_a_run_is_that_of_the_command(gfor, tmp_path, run):
+    options = ("--scenario", "dip", "--stop", 1.2, "--linear", "--json", "--out", tmp_path)
+    code, out, _ = gfor("run", "infinite_bus", *options)
+    assert code == 0
+    (printed,), summary = json.loads(out), json.loads(json.dumps(run.summary()))
+    for one in (printed, summary):
+        assert one.pop("steps_per_second")
+        assert one.pop("share_in_fmus")
+    assert printed == summary
+    same = face.compare(run, tmp_path / "dip", ["grid.v", "gfor.p"]).table()
+    assert same["largest_difference"].tolist() == [0, 0]
+
+
+def test_a_linear_model_is_that_of_the_command(gfor, tmp_path, two_area):
+    names = ("--input", "gfor.droop.delta_P_ref", "--output", "sg1.omega")
+    code, _, _ = gfor("linearize", "two_area", "--scenario", "gfor", *names, "--out", tmp_path)
+    assert code == 0
+    model = two_area.scenario("gfor").linearize(["gfor.droop.delta_P_ref"], ["sg1.omega"])
+    for name in "ABCD":
+        lines = (tmp_path / "gfor" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        written = np.array([[float(cell) for cell in line.split(",")[1:]] for line in lines[1:]])
+        assert np.array_equal(written, model.table(name).to_numpy())
+        assert lines[0].split(",")[1:] == model.table(name).columns.tolist()
+    assert model.stability.stable
+    assert set(model.operating_point.states) >= {"sg1.machine.omega"}
+
+
+def test_a_sweep_is_that_of_the_command(gfor, tmp_path, two_area):
+    options = ("--scenario", "gfor", "--vary", "grid.X_L=0.1,0.2", "--workers", 1, "--json", "--out", tmp_path)
+    code, out, _ = gfor("sweep", "two_area", *options)
+    assert code == 0
+    sweep = two_area.sweep({"grid.X_L": np.array([0.1, 0.2])}, ["gfor"], folder=tmp_path)
+    assert sweep.result.computed == 0  # all points are there
+    printed, own = json.loads(out), json.loads(json.dumps(sweep.as_json()))
+    assert printed.pop("points") != own.pop("points")
+    assert printed == own
+    assert sweep.dataset.sizes["grid.X_L"] == 2
+    as_text = two_area.sweep(["grid.X_L=0.1:0.2:2"], ["gfor"], folder=tmp_path)
+    assert as_text.table().equals(sweep.table())
+    assert sweep.failures().empty
+    assert isinstance(sweep.plot(), Axes)
+    assert "stable at all points" in sweep._repr_html_()
+
+
+@pytest.mark.slow
+def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
+    file = tmp_path / "pod_p.toml"
+    code, out, _ = gfor("design", "two_area", "--controller", "pod_p", "--no-margins", "--json", "--out", file)
+    assert code == 0
+    design = two_area.design("pod_p", margins=False)
+    printed = json.loads(out)
+    assert printed.pop("parameter_file") == str(file)
+    assert printed == json.loads(json.dumps(design.as_json()))
+    saved = design.save(tmp_path / "saved.toml")
+    by_file = two_area.scenario("gfor", parameters=[saved])
+    assert by_file.values == two_area.scenario("gfor", design.parameters).values
+    assert "requirement met" in design._repr_html_()
+    assert design.table().loc["with it", "damping_percent"] > 20
+
+
+# -- values and mistakes ---------------------------------------------------------------------------
+
+
+def test_values_may_be_numpys_and_have_units():
+    case = face.load("infinite_bus")
+    values = {"gfor.S_n": "1.5 GVA", "gfor.pod_p.K": np.float32(2), "gfor.pod_p.enabled": np.True_}
+    found = case.scenario("dip", values, step="100 us").values
+    assert found["gfor.S_n"] == 1500
+    assert found["gfor.pod_p.K"] == 2
+    assert found["gfor.pod_p.enabled"] is True
+
+
+@pytest.mark.parametrize(
+    ("mistake", "says"),
+    [
+        (lambda: face.load("two_aera"), "built-in: ieee118"),
+        (lambda: face.load("infinite_bus").scenario(), "2 scenarios; choose one of: dip, load_step"),
+        (lambda: face.load("infinite_bus").scenario("dip", step=-1), "step = -1; it must be a time above 0"),
+        (lambda: face.load("infinite_bus").scenario("dip", step="1 m"), "step: '1 m' is in m"),
+        (lambda: face.load("infinite_bus").scenario("dip").modes((2, 1)), "the lower one first"),
+        (lambda: face.load("infinite_bus").scenario("dip").modes(critical=20), "damping ratio between 0 and 1"),
+        (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 0.2), "begin above 0 Hz"),
+        (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
+        (lambda: face.load("infinite_bus").sweep("grid.X"), "not of the form component.parameter"),
+        (lambda: face.load("two_area").design("pod_x"), "there are: pod_p, pod_q"),
+        (lambda: face.load("two_area").design("pod_p", dampning=0.2), "dampning"),
+        (lambda: face.load("two_area").design("pod_p", damping=0.2, damping_increment=0.1), "give one of them"),
+        (lambda: face.load("two_area").design("pod_p", damping=20), "damping = 20; it is a damping ratio"),
+        (lambda: face.build("gforr"), "there is no model 'gforr'; there are: "),
+        (lambda: face.build("gfor", fmi="3.0"), "native"),
+        (lambda: face.compare("a", "b"), "there is no trajectory.nc"),
+    ],
+)
+def test_a_mistake_is_said_in_words(mistake, says):
+    with pytest.raises(InputError) as caught:
+        mistake()
+    assert says in str(caught.value)
+
+
+def test_the_mistakes_of_a_case_come_together():
+    with pytest.raises(CaseError) as caught:
+        face.load("infinite_bus").scenario("dip", {"gfor.nothing": 1, "grid.X": "3 MW"})
+    assert len(caught.value.problems) == 2
+    assert isinstance(caught.value, face.CosimError)
+
+
+def test_data_that_are_most_unusual_are_questioned_where_the_caller_stands():
+    case = face.load("infinite_bus")
+    for prepare in (
+        lambda: case.scenario("dip", {"gfor.pod_p.K": 5e4}),
+        lambda: case.choose([], {"gfor.pod_p.K": 5e4}),
+    ):
+        with pytest.warns(UnusualDataWarning, match=r"gfor.pod_p.K") as caught:
+            prepare()
+        assert len(caught) == 1
+        assert caught[0].filename == __file__
+
+
+def test_a_run_that_ends_early_warns_and_keeps_what_it_has(monkeypatch):
+    whole = Master.run
+
+    def broken(self, stop_time, events=(), observers=()):
+        whole(self, 0.5, events, observers)
+        raise AnalysisError("made to fail")
+
+    scenario = face.load("infinite_bus").scenario("load_step")
+    monkeypatch.setattr(Master, "run", broken)
+    with pytest.warns(RunEndedWarning, match="scenario 'load_step': made to fail"):
+        run = scenario.run(stop=1.0)
+    assert run.dataset["time"].values[-1] == 0.5
+    assert "made to fail" in repr(run)
+    assert "ended early: made to fail" in run._repr_html_()
+
+
+# -- pictures and notebooks ------------------------------------------------------------------------
+
+
+def test_plots_take_and_return_axes(modes, run, two_area):
+    axes = modes.plot()
+    assert isinstance(axes, Axes)
+    assert two_area.scenario("pod_p").modes().plot(axes) is axes
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert len(labels) == len(set(labels)) == 2
+    named = [points for points in axes.collections if not points.get_label().startswith("_")]
+    colours = {tuple(points.get_edgecolor()[0]) for points in named}
+    assert len(colours) == 2
+    first = run.plot()
+    assert isinstance(first, Axes)
+    axes = run.plot("grid.v")
+    assert axes.get_ylabel() == "grid.v [pu]"
+    assert len(axes.lines) == 2  # the linear model's response beside the simulated one
+    assert np.array_equal(axes.lines[0].get_ydata(), run.dataset["grid.v"])
+    assert run.plot("grid.v", ax=axes) is axes
+    with pytest.raises(InputError, match=r"'grid\.w' was not recorded"):
+        run.plot("grid.w")
+
+
+def test_results_show_themselves(modes, run, two_area):
+    scenario = two_area.scenario("gfor")
+    for shown in (two_area, scenario, modes, run):
+        html = shown._repr_html_()
+        assert html.startswith("<p><b>")
+        assert "two_area" in html or "infinite_bus" in html
+        assert repr(shown).startswith("<")
+    assert "stable: the largest real part" in modes._repr_html_()
+    assert "electromechanical" in modes._repr_html_()
+    assert scenario.linearize()._repr_html_().count("<tr>") > 10
+
+
+def test_what_is_shown_cannot_be_read_as_html(two_area):
+    from orchestrator.api.show import page  # noqa: PLC0415 - inner part
+
+    assert "<script>" not in page("<script>", ["<script>"])
+
+
+def test_participation_is_that_of_the_modes(modes):
+    factors = modes.participation()
+    for number, mode in enumerate(modes, start=1):
+        assert factors[number].to_dict() == dict(mode.participation)
+
+
+def test_progress_is_reported():
+    with shown_progress("points", shown=False) as report:
+        report(1, 2)
+    with shown_progress("points", shown=True) as report:
+        report(1, 2)
+    scenario = face.load("infinite_bus").scenario("dip")
+    with_bar, without = scenario.run(stop=0.2, progress=True), scenario.run(stop=0.2)
+    assert with_bar.dataset.equals(without.dataset)
+
+
+# -- one FMU ---------------------------------------------------------------------------------------
+
+
+def test_an_fmu_is_set_stepped_and_read(fmu_path):
+    with face.open_fmu(fmu_path("infinite_bus"), {"f_n": "60 Hz"}, stop=1.0) as fmu:
+        assert fmu.get("f_n") == 60
+        assert set(fmu.values()) == {"v_re", "v_im", "v", "p", "q"}
+        fmu.set({"load.scale": "1.5", "i_re": np.float64(1)})
+        fmu.step(1e-3)
+        assert fmu.time == 1e-3
+        assert fmu.table().loc["v", "unit"] == "pu"
+        for mistake in (lambda: fmu.get("w"), lambda: fmu.set({"w": 1}), lambda: fmu.set({"f_n": "3 MW"})):
+            with pytest.raises(InputError, match="infinite_bus"):
+                mistake()
+        with pytest.raises(InputError, match="above 0 s"):
+            fmu.step(0)
+        assert "infinite_bus" in fmu._repr_html_()
+
+
+def test_an_fmu_is_checked(fmu_path):
+    report = face.check(fmu_path("infinite_bus"), only=["runs"])
+    assert report.trusted
+    assert not report.faults
+    assert report.as_json()["trusted"]
+    assert "no check failed" in report._repr_html_()
