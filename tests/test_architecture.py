@@ -292,3 +292,14 @@ def test_a_path_of_some_machine_is_recognised(text):
 @pytest.mark.parametrize("text", ["fmus/toolchain", "https://example.org/home/x", "results/tmp/x", "1/s", "a/work/b"])
 def test_what_only_looks_like_one(text):
     assert not OF_A_MACHINE.search(text)
+
+
+def test_a_class_name_has_one_meaning():
+    """The Python face gives the inner case and acceptance a friendlier form under the same name."""
+    homes = {}
+    for name, tree in MODULES.items():
+        for node in tree.body:
+            if within(name, "orchestrator") and isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(name)
+    twice = {name: modules for name, modules in homes.items() if len(modules) > 1}
+    assert {name: m for name, m in twice.items() if not any(within(x, "orchestrator.api") for x in m)} == {}

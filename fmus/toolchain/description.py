@@ -10,7 +10,7 @@ from fmus.toolchain.dependencies import structure
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
 
-VENDOR = "gfor-cosim"
+TOOL = "gfor-cosim"
 
 
 def model_description(model: Model, guid: str, identifier: str, tool: str, *, native: bool = False) -> bytes:
@@ -49,7 +49,7 @@ def model_description(model: Model, guid: str, identifier: str, tool: str, *, na
     write_units(root, model)
     write_log_categories(root, "fmi2")
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
-    annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=VENDOR)
+    annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
     SubElement(annotation, "ContinuousStates", settable="true")
     _variables(root, model)
     _structure(root, model)

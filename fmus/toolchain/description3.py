@@ -3,7 +3,7 @@
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmus.toolchain.dependencies import Unknown, structure
-from fmus.toolchain.description import VENDOR, attributes_of, derivative_unit, write_log_categories, write_units
+from fmus.toolchain.description import TOOL, attributes_of, derivative_unit, write_log_categories, write_units
 from fmus.toolchain.model import Model
 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
@@ -44,7 +44,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     _variables(root, model)
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
-    SubElement(annotations, "Annotation", type=f"{VENDOR}.ContinuousStates").text = "settable"
+    SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
     indent(root)
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

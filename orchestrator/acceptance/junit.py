@@ -4,11 +4,11 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from orchestrator.acceptance.checks.base import Verdict
-from orchestrator.acceptance.runner import Report
+from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.errors import InputError
 
 
-def write_junit(report: Report, path: Path) -> None:
+def write_junit(report: AcceptanceReport, path: Path) -> None:
     """Write a report.
 
     Raises

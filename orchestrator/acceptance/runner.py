@@ -16,7 +16,7 @@ from typing import Any
 from orchestrator.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.acceptance.checks.base import (
     Check,
-    Result,
+    CheckResult,
     Verdict,
     failed,
     not_applicable,
@@ -49,7 +49,7 @@ _PATIENCE = 10
 
 
 @dataclass
-class Report:
+class AcceptanceReport:
     """What all checks found.
 
     Attributes
@@ -62,12 +62,12 @@ class Report:
 
     fmu: Path
     binding: Path | None
-    results: list[Result] = field(default_factory=list)
+    results: list[CheckResult] = field(default_factory=list)
     unlimited: tuple[str, ...] = ()
     used_as: str = ""
 
     @property
-    def failures(self) -> list[Result]:
+    def failures(self) -> list[CheckResult]:
         """Results of the checks that failed."""
         return [r for r in self.results if r.verdict is Verdict.FAIL]
 
@@ -126,7 +126,7 @@ def check_fmu(
     only: tuple[str, ...] = (),
     run_for: float = RUN_FOR,
     use: Use | None = None,
-) -> Report:
+) -> AcceptanceReport:
     """Run the acceptance tests.
 
     Parameters
@@ -150,7 +150,7 @@ def check_fmu(
         raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
-    report = Report(fmu, binding, used_as=use.said if use else "")
+    report = AcceptanceReport(fmu, binding, used_as=use.said if use else "")
     try:
         native = read_description(fmu)
         directory = extract(fmu)
@@ -177,7 +177,7 @@ def check_fmu(
     return report
 
 
-def _unpacked(fmu: Path) -> Result:
+def _unpacked(fmu: Path) -> CheckResult:
     twice = listed_twice(fmu)
     if not twice:
         return passed("archive", "unpacked within limits, and read")
@@ -189,7 +189,7 @@ def _unpacked(fmu: Path) -> Result:
     )
 
 
-def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescription | None:
+def _bound(report: AcceptanceReport, native: FmuDescription, binding: Path) -> BoundDescription | None:
     """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
         bound = bind(native, binding)
@@ -204,7 +204,7 @@ def _bound(report: Report, native: FmuDescription, binding: Path) -> BoundDescri
 class _Runner:
     """Asks every question, in this process, of an FMU that is in another."""
 
-    def __init__(self, report: Report, subject: Subject, limits: Limits) -> None:
+    def __init__(self, report: AcceptanceReport, subject: Subject, limits: Limits) -> None:
         self._report, self._subject, self._limits = report, subject, limits
         self._process: FmuProcess | None = None
         self._deadline = 0.0
@@ -230,13 +230,13 @@ class _Runner:
                 results += [not_applicable(later, because) for later in names[place + 1 :]]
                 return
 
-    def _too_bad(self, result: Result) -> str:
+    def _too_bad(self, result: CheckResult) -> str:
         """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""
         if self._process is not None and not self._process.alive:
             return f"because it ended its process in 'runs' ({result.fault})"
         return "because it ends before it shows anything" if result.fault == "ends at once" else ""
 
-    def _answer(self, check: Check) -> Result:
+    def _answer(self, check: Check) -> CheckResult:
         """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
         faulty = [r.check for r in self._report.results if r.fault]
         asked_of_the_file = ORDER.index(check.name) <= ORDER.index("loads")
@@ -271,7 +271,7 @@ class _Runner:
             self._process.close()
 
 
-def _ended(name: str, subject: Subject, error: EndedError) -> Result:
+def _ended(name: str, subject: Subject, error: EndedError) -> CheckResult:
     """An orderly end is no fault; one that comes earlier than before is worth a word."""
     if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
         says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"

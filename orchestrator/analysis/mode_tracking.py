@@ -29,7 +29,7 @@ _DISTANCE_WEIGHT = 0.1
 _EDGE = 1.1
 """A mode nearer than this factor to an end of the range of frequencies may leave or enter there."""
 
-Place = TypeVar("Place", bound=Hashable)
+At = TypeVar("At", bound=Hashable)
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
 
 @dataclass
-class Followed(Generic[Place]):
+class Followed(Generic[At]):
     """Which trajectory every mode belongs to.
 
     Attributes
@@ -152,16 +152,16 @@ class Followed(Generic[Place]):
         That point; None where a trajectory begins.
     """
 
-    trajectory: dict[Place, list[int]] = field(default_factory=dict)
-    similarity: dict[Place, list[float]] = field(default_factory=dict)
-    origin: dict[Place, list[Place | None]] = field(default_factory=dict)
+    trajectory: dict[At, list[int]] = field(default_factory=dict)
+    similarity: dict[At, list[float]] = field(default_factory=dict)
+    origin: dict[At, list[At | None]] = field(default_factory=dict)
 
 
 def number_trajectories(
-    points: Mapping[Place, ModeSet],
-    route: Iterable[tuple[Place, Sequence[Place]]],
+    points: Mapping[At, ModeSet],
+    route: Iterable[tuple[At, Sequence[At]]],
     threshold: float = THRESHOLD,
-) -> Followed[Place]:
+) -> Followed[At]:
     """Give every mode of every point the number of a trajectory.
 
     Parameters
@@ -174,11 +174,11 @@ def number_trajectories(
     threshold
         Least similarity.
     """
-    result: Followed[Place] = Followed()
+    result: Followed[At] = Followed()
     count = 0
     for place, origins in route:
         modes = points[place]
-        numbers: dict[int, tuple[int, float, Place | None]] = {}
+        numbers: dict[int, tuple[int, float, At | None]] = {}
         for origin in origins:
             for link in match(points[origin], modes, threshold):
                 number = result.trajectory[origin][link.source]

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.acceptance.checks.subject import Use
-from orchestrator.acceptance.runner import Report, check_fmu, question_of
+from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, question_of
 from orchestrator.api.show import page
 from orchestrator.api.values import Time, in_seconds
 
@@ -21,7 +21,7 @@ class Acceptance:
         Every result with evidence, remedy and figures.
     """
 
-    def __init__(self, report: Report) -> None:
+    def __init__(self, report: AcceptanceReport) -> None:
         self.report = report
 
     @property

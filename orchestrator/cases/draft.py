@@ -10,7 +10,7 @@ from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable, 
 from orchestrator.coupling.system import System
 from orchestrator.errors import Problem
 
-Place = Callable[..., str]
+Locate = Callable[..., str]
 COMMAND_LINE = "--set"
 
 
@@ -73,7 +73,7 @@ class Draft:
     name: str
     scenario: ScenarioTable
     directory: Path
-    place: Place
+    place: Locate
     layers: list[Layer] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     data: NetworkData | None = None

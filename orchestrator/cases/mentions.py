@@ -7,7 +7,7 @@ import fnmatch
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from orchestrator.cases.draft import Draft, Place
+from orchestrator.cases.draft import Draft, Locate
 from orchestrator.cases.names import close_names, variables_of
 from orchestrator.cases.schema import CaseTable
 from orchestrator.errors import InputError, Problem
@@ -48,12 +48,12 @@ class Named:
         self.homes |= set(draft.network.buses) if draft.network else set()
 
 
-def unmatched(case: CaseTable, named: Named, place: Place) -> list[Problem]:
+def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
     """Every entry that names nothing, with its place."""
     return [*_states(case, named, place), *_areas(case, named, place), *_signals(case, named, place)]
 
 
-def _states(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     analysis = case.analysis
     groups: list[tuple[str, list[str]]] = []
     for k, mode in enumerate(analysis.modes):
@@ -72,7 +72,7 @@ def _of_foreign(named: Named, pattern: str) -> bool:
     return "." in pattern and bool(fnmatch.filter(named.foreign, pattern.partition(".")[0]))
 
 
-def _areas(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for area, patterns in case.analysis.areas.items():
         for pattern in patterns:
             if not fnmatch.filter(named.homes, pattern):
@@ -82,7 +82,7 @@ def _areas(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
                 )
 
 
-def _signals(case: CaseTable, named: Named, place: Place) -> Iterator[Problem]:
+def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
     entries += [
         (place("plots", k, "panels", n, "signal"), panel.signal)

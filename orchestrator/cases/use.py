@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestrator.acceptance.checks.subject import Point, Use
+from orchestrator.acceptance.checks.subject import OperatingAt, Use
 from orchestrator.cases.case import Case, load_case
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
@@ -46,7 +46,7 @@ def use_in_case(
     return Use(prepared.step_size, point, values, inputs, f"{origin}: {said}"), binding
 
 
-def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[Point | None, str]:
+def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[OperatingAt | None, str]:
     """The operating point with defaults for what the case does not give, in words as well."""
     if not start:
         return None, "no operating point; the checks take their own"
@@ -59,7 +59,7 @@ def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[Point | None, 
             declared = variables.get(name)
             full[name] = default if declared is None or declared.start is None else declared.start_number
         words.append(f"{name} = {full[name]:.6g}{'' if name in start else ' (default)'}")
-    return Point(full["v_0"], full["theta_0"], full["P_0"], full["Q_0"]), ", ".join(words)
+    return OperatingAt(full["v_0"], full["theta_0"], full["P_0"], full["Q_0"]), ", ".join(words)
 
 
 def _scenario(case: Case, component: str, wanted: str | None) -> str:

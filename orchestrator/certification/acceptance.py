@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.acceptance.checks.all import CHECKS
-from orchestrator.acceptance.runner import Report, check_fmu, file_hash
+from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, file_hash
 from orchestrator.errors import InputError
 
 KEPT = "check.json"
@@ -92,7 +92,7 @@ def _left_out(names: Iterable[str]) -> list[str]:
     return [name for name in CHECKS if name not in there]
 
 
-def _of_report(report: Report) -> Acceptance:
+def _of_report(report: AcceptanceReport) -> Acceptance:
     return Acceptance(report.trusted, tuple(report.faults), report.as_dict())
 
 

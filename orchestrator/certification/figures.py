@@ -15,7 +15,7 @@ from orchestrator.certification.point import CONVERTER, PointResult
 from orchestrator.certification.recompute import commands
 from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.study import Certification
-from orchestrator.certification.swings import Swing, SwingTest
+from orchestrator.certification.swings import RecordedSwing, SwingTest
 from orchestrator.fmi.origin import read_origin
 from orchestrator.results.mode_json import eigenvalue_json
 
@@ -134,6 +134,6 @@ def _swings_json(test: SwingTest) -> dict[str, Any]:
     }
 
 
-def _swing_json(s: Swing) -> dict[str, Any]:
+def _swing_json(s: RecordedSwing) -> dict[str, Any]:
     points = {"P": s.before, "M": s.minimum, "P_next": s.after}
     return {"k": s.number, "line": s.line, "depth": s.depth} | {n: [p.time, p.value] for n, p in points.items()}

@@ -36,7 +36,7 @@ _SIGNAL = "signal "
 
 
 @dataclass(frozen=True)
-class PointTask:
+class CertificatePointTask:
     """A scenario of the study's case file at one reactance.
 
     Attributes
@@ -113,7 +113,7 @@ class PointResult:
         return self.failure is None
 
     @classmethod
-    def lost(cls, task: PointTask, error: WorkerLostError) -> Self:
+    def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
         """That of a point whose worker died."""
         return cls(task.X_L, task.scenario, failure=str(error))
 
@@ -139,7 +139,7 @@ class PointResult:
             return None
 
 
-def compute_point(task: PointTask) -> PointResult:
+def compute_point(task: CertificatePointTask) -> PointResult:
     """Steady state, modes and response of one point; what fails becomes part of the result.
 
     Raises
@@ -159,7 +159,7 @@ def compute_point(task: PointTask) -> PointResult:
     return result
 
 
-def _compute(case: Case, task: PointTask, result: PointResult) -> None:
+def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> None:
     (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
     watch = Watch(prepared)
     with running(prepared) as master:

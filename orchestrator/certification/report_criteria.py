@@ -11,7 +11,7 @@ from orchestrator.certification.criteria import PAIRED, is_judged, is_near
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.point import COMPUTED, FREQUENCY
 from orchestrator.certification.study import Certification
-from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
+from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
 
 _SHOWN = 30.0
@@ -105,7 +105,7 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
         point = c.points[scenario, v.X_L]
         if v.time.signal in point.signals:
             shown = point.times <= c.event_time + _SHOWN
-            curves.append(Curve(f"{scenario} the converter", colour(k), point.times[shown],
+            curves.append(ChartCurve(f"{scenario} the converter", colour(k), point.times[shown],
                                 point.signals[v.time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
     curves += _construction(v.time, c.event_time + _SHOWN)
     label = f"{'Frequency at bus 2' if v.time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]"
@@ -121,15 +121,15 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
     yield _modal_table(v.time)
 
 
-def _construction(time: TimeVerdict, last: float) -> Iterator[Curve]:
+def _construction(time: TimeVerdict, last: float) -> Iterator[ChartCurve]:
     """The norm's lines, as far as they are in the picture."""
     red = "#a11d1d"
     for s in time.swings.swings:
         if s.after.time <= last and s.number <= 6:
             ends = np.array([s.before.time, s.after.time]), np.array([s.before.value, s.after.value])
-            yield Curve(f"P{s.number}–P{s.number + 1}", red, *ends, dashed=True)
+            yield ChartCurve(f"P{s.number}–P{s.number + 1}", red, *ends, dashed=True)
             moment = np.array([s.minimum.time, s.minimum.time + 1e-6])
-            yield Curve(f"ΔP{s.number}M{s.number}", red, moment, np.array([s.minimum.value, s.line]))
+            yield ChartCurve(f"ΔP{s.number}M{s.number}", red, moment, np.array([s.minimum.value, s.line]))
 
 
 def _swing_table(time: TimeVerdict, unit: str) -> str:

@@ -14,14 +14,14 @@ from orchestrator.certification.case_file import BASE, BINDING, FMU, WITH, WITHO
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.details import Details
 from orchestrator.certification.judgement import PointVerdict, judge, watched
-from orchestrator.certification.point import CONVERTER, PointResult, PointTask, compute_point
+from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
 from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import Report, kept_or_computed
+from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
 
 
@@ -135,7 +135,7 @@ def certify(
     request: CertificationRequest,
     executor: Executor,
     folder: Path,
-    report: Report = lambda done, total: None,
+    report: CountReport = lambda done, total: None,
 ) -> Certification:
     """Compute all points and judge them.
 
@@ -214,7 +214,7 @@ def tasks_of(
     prepared: Mapping[str, PreparedScenario],
     request: CertificationRequest,
     controllers: DampingControllers,
-) -> list[PointTask]:
+) -> list[CertificatePointTask]:
     """Both scenarios at all reactances, the one without the converter first."""
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
     settings: dict[str, dict[str, Value]] = {
@@ -228,7 +228,7 @@ def tasks_of(
 
 def _tasks(
     prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
-) -> list[PointTask]:
+) -> list[CertificatePointTask]:
     """One scenario at all reactances."""
     # The case file names the binding, if there is one: what that says is in the scenario's content, where it matters.
     content = {
@@ -239,5 +239,6 @@ def _tasks(
     }
     place, mark = reference_to(prepared.case), fingerprint(prepared.case)
     return [
-        PointTask(place, mark, prepared.name, X_L, key_of({**content, "X_L": X_L}), black_box) for X_L in reactances
+        CertificatePointTask(place, mark, prepared.name, X_L, key_of({**content, "X_L": X_L}), black_box)
+        for X_L in reactances
     ]

@@ -38,7 +38,7 @@ class Extremum:
 
 
 @dataclass(frozen=True, slots=True)
-class Swing:
+class RecordedSwing:
     """Number k with its two maxima, the minimum between them, and ΔPkMk [unit of the signal]."""
 
     number: int
@@ -75,7 +75,7 @@ class SwingTest:
     """
 
     dropped: Extremum | None
-    swings: tuple[Swing, ...]
+    swings: tuple[RecordedSwing, ...]
     ratio: float | None
     accepted: bool
     reason: str
@@ -126,12 +126,12 @@ def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = R
     return found
 
 
-def swings_of(points: list[Extremum]) -> tuple[Swing, ...]:
+def swings_of(points: list[Extremum]) -> tuple[RecordedSwing, ...]:
     """Swings between successive maxima; a minimum before the first maximum belongs to none."""
     maxima = [p for p in points if p.is_maximum]
     minima = [p for p in points if not p.is_maximum and maxima and p.time > maxima[0].time]
     parts = zip(maxima, minima, maxima[1:], strict=False)
-    return tuple(Swing(k, *part) for k, part in enumerate(parts, start=1))
+    return tuple(RecordedSwing(k, *part) for k, part in enumerate(parts, start=1))
 
 
 def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: bool = True) -> SwingTest:

@@ -19,7 +19,7 @@ from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.form import check_form
-from orchestrator.certification.point import CONVERTER, PointResult, PointTask, compute_point
+from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
 from orchestrator.certification.rejudgement import rejudge
 from orchestrator.certification.request import same_reactance
 from orchestrator.errors import InputError
@@ -177,7 +177,7 @@ def verify_points(
     place, mark = reference_to(case), fingerprint(case)
     places = [(p, scenario) for p in points for scenario in (WITHOUT, WITH)]
     tasks = [
-        PointTask(place, mark, scenario, p["X_L"], key_of({"verify": [mark, scenario, p["X_L"]]}),
+        CertificatePointTask(place, mark, scenario, p["X_L"], key_of({"verify": [mark, scenario, p["X_L"]]}),
                   bool(content["black_box"]) and scenario == WITH) for p, scenario in places
     ]  # fmt: skip
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:

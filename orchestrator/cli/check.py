@@ -8,10 +8,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.acceptance.checks.base import Result, Verdict
+from orchestrator.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.junit import write_junit
-from orchestrator.acceptance.runner import Report, check_fmu
+from orchestrator.acceptance.runner import AcceptanceReport, check_fmu
 from orchestrator.cases.use import use_in_case
 from orchestrator.cli.arguments import positive
 from orchestrator.errors import InputError
@@ -66,9 +66,9 @@ def run(options: argparse.Namespace) -> int:
     return 1 if report.failures else NOT_SUPPORTED if report.not_supported else 0
 
 
-def _each_once(results: list[Result]) -> list[Result]:
+def _each_once(results: list[CheckResult]) -> list[CheckResult]:
     """What was not asked for one and the same reason goes into one line."""
-    lines: list[Result] = []
+    lines: list[CheckResult] = []
     for result in results:
         if result.verdict is Verdict.NOT_APPLICABLE and lines and lines[-1].evidence == result.evidence:
             lines[-1] = replace(lines[-1], check=f"{lines[-1].check}, {result.check}")
@@ -77,7 +77,7 @@ def _each_once(results: list[Result]) -> list[Result]:
     return lines
 
 
-def _print(report: Report) -> None:
+def _print(report: AcceptanceReport) -> None:
     console = Console(soft_wrap=True, highlight=False, emoji=False)
     if report.used_as:
         console.print(f"As {escape(report.used_as)}.", end="\n\n")

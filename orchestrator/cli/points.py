@@ -9,14 +9,14 @@ from rich.markup import escape
 
 from orchestrator.cli.terminal import make_errors
 from orchestrator.points.executor import Executor
-from orchestrator.points.points import Report
+from orchestrator.points.points import CountReport
 from orchestrator.report.progress import progress_bar
 
 Result = TypeVar("Result")
 
 
 def compute_points(
-    study: Callable[[Report], Result], executor: Executor, folder: Path, console: Console
+    study: Callable[[CountReport], Result], executor: Executor, folder: Path, console: Console
 ) -> Result | None:
     """Run a study, and close its executor.
 

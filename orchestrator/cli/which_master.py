@@ -17,7 +17,7 @@ from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
 from orchestrator.interop.probe_result import read_probe_result
-from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Verdict, identify
+from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Identified, identify
 
 _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
     # property: what it is called, what its values mean
@@ -87,7 +87,7 @@ def _named(text: str) -> tuple[str, str]:
     return signal.strip(), heading.strip()
 
 
-def _print(verdict: Verdict, console: Console) -> None:
+def _print(verdict: Identified, console: Console) -> None:
     compared = f"{verdict.rows} rows compared, largest difference {verdict.difference:.1e}"
     if not verdict.fits:
         console.print(f"None of the schedules known here gives these values ({compared}). The nearest is: "
@@ -111,7 +111,7 @@ def _in_words(candidate: Candidate) -> str:
     return "; ".join(f"{title.lower()} {words[getattr(candidate, name)]}" for name, (title, words) in _WORDS.items())
 
 
-def _json(verdict: Verdict) -> dict[str, Any]:
+def _json(verdict: Identified) -> dict[str, Any]:
     return {
         "fits": [asdict(fit) for fit in verdict.fits],
         "told": {name: a[0] if len(a) == 1 else None for name in PROPERTIES for a in [verdict.answers(name)]},

@@ -15,7 +15,7 @@ _CONTINUOUS = ("Float64", "Float32")
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class FmiClock:
     """One clock.
 
     Attributes
@@ -47,7 +47,7 @@ class Clock:
         return self.variability == "triggered" and self.causality == "input"
 
 
-def clocks_of(root: ElementTree.Element) -> tuple[Clock, ...]:
+def clocks_of(root: ElementTree.Element) -> tuple[FmiClock, ...]:
     """All clocks of a model description of FMI 3.0.
 
     Raises
@@ -59,7 +59,7 @@ def clocks_of(root: ElementTree.Element) -> tuple[Clock, ...]:
     return tuple(_clock(e, types.get(e.get("declaredType"))) for e in root.iterfind("ModelVariables/Clock"))
 
 
-def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -> Clock:
+def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -> FmiClock:
     said = {**({} if declared is None else declared.attrib), **element.attrib}
     name, variability = said["name"], said.get("intervalVariability", "")
     if variability not in _VARIABILITIES:
@@ -67,7 +67,7 @@ def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -
             f"clock {name!r} has intervalVariability {variability!r}; FMI knows {', '.join(_VARIABILITIES)}"
         )
     interval = _seconds(said, "interval")
-    clock = Clock(
+    clock = FmiClock(
         name, int(said["valueReference"]), said.get("causality", "local"), variability,
         interval if variability in ("constant", "fixed", "tunable") else None, _seconds(said, "shift") or 0.0,
     )  # fmt: skip

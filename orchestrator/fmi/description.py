@@ -15,10 +15,10 @@ from fmpy.model_description import ModelDescription
 
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
-from orchestrator.fmi.clocks import Clock, clocks_of, special_variables
+from orchestrator.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.fmi.values import Scalar, typed
 
-VENDOR = "gfor-cosim"
+TOOL = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
 """Begins the names of what is ours inside other people's formats."""
 
@@ -128,7 +128,7 @@ class FmuDescription:
     rates: tuple[str, ...] = ()
     has_event_mode: bool = False
     returns_early: bool = False
-    clocks: tuple[Clock, ...] = ()
+    clocks: tuple[FmiClock, ...] = ()
     specials: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -279,9 +279,9 @@ def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
 
 def _settable(root: ElementTree.Element, version: str) -> bool:
     if version == "3.0":
-        annotation = root.find(f"Annotations/Annotation[@type='{VENDOR}.ContinuousStates']")
+        annotation = root.find(f"Annotations/Annotation[@type='{TOOL}.ContinuousStates']")
         return annotation is not None and (annotation.text or "").strip() == "settable"
-    tool = root.find(f"VendorAnnotations/Tool[@name='{VENDOR}']/ContinuousStates")
+    tool = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/ContinuousStates")
     return tool is not None and tool.get("settable") == "true"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
-from orchestrator.fmi.clocks import MOST_CLOCKS, Clock
+from orchestrator.fmi.clocks import MOST_CLOCKS, FmiClock
 from orchestrator.fmi.description import FmuDescription
 
 SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
@@ -182,7 +182,7 @@ class Fmi3Library:
         adapter.fmi3_prepare(ctypes.byref(self._table))
 
 
-def _described(clock: Clock) -> _Clock:
+def _described(clock: FmiClock) -> _Clock:
     kind = "periodic" if clock.periodic else "output" if clock.variability == "triggered" else clock.variability
     asked = kind != "output" and clock.interval is None
     interval = 0.0 if clock.interval is None else clock.interval

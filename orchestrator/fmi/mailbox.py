@@ -49,7 +49,7 @@ class Head(ctypes.Structure):
     )
 
 
-class Run(ctypes.Structure):
+class MailboxRun(ctypes.Structure):
     """What one question for many steps says, behind the log in ``struct mailbox``."""
 
     _fields_ = (
@@ -130,7 +130,7 @@ class Mailbox:
         self.head = Head.from_buffer(self._memory)
         self.address = ctypes.addressof(self.head)
         self._text, self._log, run, *arrays = (self.library.mailbox_offset(which) for which in range(6))
-        self.run = Run.from_buffer(self._memory, run)
+        self.run = MailboxRun.from_buffer(self._memory, run)
         self._arrays = arrays
 
     def array(self, which: int, kind: Any, count: int) -> Any:

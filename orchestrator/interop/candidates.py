@@ -57,12 +57,12 @@ def probe_system() -> System:
     return system
 
 
-Trajectory = tuple[Candidate, NDArray[np.float64]]
+MasterTrajectory = tuple[Candidate, NDArray[np.float64]]
 """A schedule, and what it shows: row k holds `SIGNALS` after k + ``early_label`` steps, NaN where unknown."""
 
 
 @cache
-def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tuple[Trajectory, ...]:
+def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tuple[MasterTrajectory, ...]:
     """Every schedule with one kind of extrapolation, and its trajectory of ``steps`` + 1 rows."""
     found = []
     for schedule in _schedules(extrapolation):

@@ -24,7 +24,7 @@ _FITS = 1e-3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Identified:
     """What was found.
 
     Attributes
@@ -75,7 +75,7 @@ class Verdict:
 PROPERTIES = tuple(field.name for field in fields(Candidate))
 
 
-def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME) -> Verdict:
+def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME) -> Identified:
     """Compare a result with every schedule.
 
     Parameters
@@ -104,7 +104,7 @@ def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float
     differences = list(_differences(index[known], result.values[known], step_size, intervals))
     best, nearest = min(differences, key=lambda pair: pair[0])
     fits = tuple(c for d, c in differences if d <= max(10 * best, 1e-9)) if best <= _FITS else ()
-    return Verdict(fits, nearest, best, int(known.sum()), int(index[on_point].max()), step_size, stop_time)
+    return Identified(fits, nearest, best, int(known.sum()), int(index[on_point].max()), step_size, stop_time)
 
 
 def _differences(

@@ -31,11 +31,11 @@ from orchestrator.pod_design.lead_lag import (
     sensitivity,
 )
 from orchestrator.pod_design.margins import Margins, compute_margins
-from orchestrator.pod_design.refinement import Refinement, Verdict, refine
+from orchestrator.pod_design.refinement import Judgement, Refinement, refine
 from orchestrator.pod_design.target import Target, check_range, find_target, mode_name
 from orchestrator.study.modes import named_modes, running
 
-Report = Callable[[str], None]
+StageReport = Callable[[str], None]
 
 _OFF = PodSetting(0.0, NO_COMPENSATION)
 
@@ -184,7 +184,7 @@ class PodDesign:
         return "lower" if self.gain > self.unbounded_gain else "upper"
 
 
-def design_pod(case: Case, request: DesignRequest, report: Report = lambda text: None) -> PodDesign:
+def design_pod(case: Case, request: DesignRequest, report: StageReport = lambda text: None) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
     Parameters
@@ -269,7 +269,7 @@ class _Start:
     examined: Examination
 
 
-def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
+def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     request, off, before = start.request, start.off, start.before
     initial = off.eigenvalue
     required = _required(request, initial)
@@ -278,10 +278,10 @@ def _design(start: _Start, loop: PodLoop, report: Report) -> PodDesign:
     def around(placed: Placed) -> Surroundings:
         return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
 
-    def judge(placed: Placed) -> Verdict:
+    def judge(placed: Placed) -> Judgement:
         after = around(placed)
         damping = damping_ratio(after.counting(placed.eigenvalue))
-        return Verdict(damping, breach(before, after, request.least_damping))
+        return Judgement(damping, breach(before, after, request.least_damping))
 
     report("sensitivity of the mode")
     bare = loop.place(off, request.delta_gain)

@@ -27,14 +27,14 @@ from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Judgement:
     """On a setting: the damping ratio that counts, and what it does to other modes that it must not."""
 
     damping: float
     broken: str | None
 
 
-Judge = Callable[[Placed], Verdict]
+Judge = Callable[[Placed], Judgement]
 
 _GAINS = 9
 _TURN = 15.0
@@ -49,7 +49,7 @@ _TOLERANCE = 2e-4
 
 
 @dataclass(frozen=True)
-class Sweep:
+class GainSweep:
     """The target mode over the range of the gain, with one lead/lag.
 
     Attributes
@@ -85,7 +85,7 @@ class Refinement:
         Whether it has the required damping.
     """
 
-    sweeps: list[Sweep] = field(default_factory=list)
+    sweeps: list[GainSweep] = field(default_factory=list)
     chosen: Placed | None = None
     score: float = -1.0
     met: bool = False
@@ -162,7 +162,7 @@ def sweep(
     bounds: tuple[float, float],
     why: str,
     special: float | None = None,
-) -> Sweep:
+) -> GainSweep:
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
 
     Parameters
@@ -187,7 +187,7 @@ def sweep(
         chosen = _crossing(loop, points[above - 1], points[above], required)
     else:
         chosen = _peak(loop, points)
-    return Sweep(why, filters, tuple(points), chosen, _unstable(loop, points))
+    return GainSweep(why, filters, tuple(points), chosen, _unstable(loop, points))
 
 
 def _unstable(loop: PodLoop, points: Sequence[Placed]) -> tuple[float, ...]:
@@ -301,7 +301,7 @@ def recentred(loop: PodLoop, here: Placed) -> LeadLag:
     return lead_lag(phase, here.eigenvalue.imag, filters.N_S)
 
 
-def _guarded(loop: PodLoop, found: Sweep, judge: Judge, notes: list[str]) -> Placed | None:
+def _guarded(loop: PodLoop, found: GainSweep, judge: Judge, notes: list[str]) -> Placed | None:
     """The sweep's choice, or the largest gain below it that leaves the other modes alone; None if none does."""
     reason = judge(found.chosen).broken
     if reason is None:

@@ -6,7 +6,7 @@ from typing import Any, Protocol, Self, TypeVar
 from orchestrator.points.executor import Executor, WorkerLostError
 from orchestrator.points.store import Arrays, PointStore
 
-Report = Callable[[int, int], None]
+CountReport = Callable[[int, int], None]
 """Callback: how many points are done, of how many."""
 
 
@@ -52,7 +52,7 @@ def kept_or_computed(
     tasks: Sequence[Task],
     executor: Executor,
     store: PointStore,
-    report: Report,
+    report: CountReport,
 ) -> Iterator[tuple[int, Point, bool]]:
     """Give the index of each task with its point, in any order, and whether an earlier start had left that.
 

@@ -11,7 +11,7 @@ from orchestrator.ssp.archive import SspArchive
 from orchestrator.ssp.names import SYSTEM_FILE, children, plain_name, tag
 from orchestrator.ssp.parameter_sets import SspValue
 from orchestrator.ssp.structure import Owner, Structure, read_structure
-from orchestrator.ssp.study import Study, foreign_step, read_study
+from orchestrator.ssp.study import SspStudy, foreign_step, read_study
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _converted(value: SspValue, unit: str) -> float | bool | str:
     return f"{value.value!r} {value.unit}"
 
 
-def _add_study(tables: dict[str, Any], study: Study) -> None:
+def _add_study(tables: dict[str, Any], study: SspStudy) -> None:
     """What our annotation says; its tables join those of SSP."""
     for name, content in study.tables.items():
         tables[name] = tables.get(name, {}) | content if isinstance(content, dict) else content

@@ -20,7 +20,7 @@ _OMS_TYPE = "org.openmodelica"
 
 
 @dataclass(frozen=True)
-class Study:
+class SspStudy:
     """A scenario without its system.
 
     Attributes
@@ -46,7 +46,7 @@ class Study:
 
 def study_of(
     scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
-) -> Study:
+) -> SspStudy:
     """The study of a scenario; its events come down to the variables that they set."""
     settings = tuple(
         (event.time, component, variable, value)
@@ -54,10 +54,10 @@ def study_of(
         for component, new in event.changes().items()
         for variable, value in new.items()
     )
-    return Study(scenario, title, step_size, schedule.name, schedule.groups, settings, tables)
+    return SspStudy(scenario, title, step_size, schedule.name, schedule.groups, settings, tables)
 
 
-def write_study(annotations: Element, study: Study) -> None:
+def write_study(annotations: Element, study: SspStudy) -> None:
     """Our annotation."""
     annotation = SubElement(annotations, tag("ssc:Annotation"), type=STUDY_TYPE)
     root = SubElement(annotation, tag("gfor:Study"), scenario=study.scenario, title=study.title)
@@ -81,7 +81,7 @@ def write_osp_step(annotations: Element, step_size: float) -> None:
     SubElement(algorithm, tag("osp:FixedStepAlgorithm"), baseStepSize=repr(step_size))
 
 
-def read_study(description: Element) -> Study | None:
+def read_study(description: Element) -> SspStudy | None:
     """Our annotation of a system structure description, if it has one.
 
     Raises
@@ -100,7 +100,7 @@ def read_study(description: Element) -> Study | None:
     return None
 
 
-def _read(annotation: Element) -> Study:
+def _read(annotation: Element) -> SspStudy:
     (root,) = children(annotation, "gfor:Study")
     (step,), (schedule,) = children(root, "gfor:CommunicationStep"), children(root, "gfor:Schedule")
     groups = tuple(
@@ -110,7 +110,7 @@ def _read(annotation: Element) -> Study:
         (float(e.attrib["time"]), e.attrib["component"], e.attrib["variable"], _value(e.attrib["value"]))
         for e in children(root, "gfor:Events/gfor:Set")
     )
-    return Study(
+    return SspStudy(
         root.attrib["scenario"],
         root.get("title", ""),
         float(step.attrib["seconds"]),

@@ -9,10 +9,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SYSTEM_FILE, plain_name, tag
 from orchestrator.ssp.parameter_sets import write_parameter_set, write_units
-from orchestrator.ssp.study import Study, write_osp_step, write_study
+from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 
 
-def ssp_members(name: str, title: str, system: System, stop_time: float, study: Study) -> dict[str, bytes]:
+def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
     """What the archive holds, by path: the structure, the components' values and their FMUs.
 
     Parameters
@@ -68,7 +68,7 @@ def _description(
     fmus: Mapping[Path, str],
     files: Mapping[str, str],
     stop_time: float,
-    study: Study,
+    study: SspStudy,
     tool: str,
 ) -> Element:
     root = Element(tag("ssd:SystemStructureDescription"), version=SSP_VERSION, name=name, generationTool=tool)

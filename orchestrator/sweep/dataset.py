@@ -16,7 +16,7 @@ from orchestrator.results.storage import provenance, save_table
 from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
-from orchestrator.sweep.trajectories import Place, Trajectory
+from orchestrator.sweep.trajectories import GridPlace, Trajectory
 
 _FIGURES = {
     "real": ("1/s", "Real part of the eigenvalue"),
@@ -34,7 +34,7 @@ _SEPARATOR = "; "
 _BEGINNINGS = "start followed refined entered broken"
 
 
-Curve = list[tuple[Place, dict[str, Any]]]
+Curve = list[tuple[GridPlace, dict[str, Any]]]
 """A trajectory's figures by place."""
 
 
@@ -62,7 +62,7 @@ class Samples:
             self._curves[id(trajectory)] = list(self._samples(sweep, trajectory))
         return self._curves[id(trajectory)]
 
-    def _samples(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Iterator[tuple[Place, dict[str, Any]]]:
+    def _samples(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Iterator[tuple[GridPlace, dict[str, Any]]]:
         for place, point in trajectory.points.items():
             modes = sweep.points[place].modes
             if modes is None:
@@ -89,7 +89,7 @@ class Samples:
                 },
             )
 
-    def setting(self, place: Place) -> dict[str, float | bool]:
+    def setting(self, place: GridPlace) -> dict[str, float | bool]:
         """Values of the varied parameters at a place of the grid."""
         return {axis.key: axis.values[int(i)] for axis, i in zip(self.axes, place, strict=True)}
 

@@ -19,7 +19,7 @@ from orchestrator.study.modes import ModesResult, compute_modes
 
 
 @dataclass(frozen=True)
-class PointTask:
+class SweepPointTask:
     """A scenario with the values of one point.
 
     Attributes
@@ -84,7 +84,7 @@ class PointRecord:
         return self.stability.get("stable") is False
 
     @classmethod
-    def lost(cls, _: PointTask, error: WorkerLostError) -> Self:
+    def lost(cls, _: SweepPointTask, error: WorkerLostError) -> Self:
         """That of a point whose worker died."""
         return cls(error=str(error), lasting=False)
 
@@ -110,7 +110,7 @@ def make_task(
     varied: Mapping[str, Value],
     step_size: float | None,
     frequency_range: tuple[float, float],
-) -> PointTask:
+) -> SweepPointTask:
     """The task of one point.
 
     Parameters
@@ -129,13 +129,13 @@ def make_task(
         "range": list(frequency_range),
     }
     reference, mark = reference_to(prepared.case), fingerprint(prepared.case)
-    return PointTask(reference, mark, prepared.name, overrides, step_size, frequency_range, key_of(content))
+    return SweepPointTask(reference, mark, prepared.name, overrides, step_size, frequency_range, key_of(content))
 
 
 # -- computing ---------------------------------------------------------------------------------------
 
 
-def compute_point(task: PointTask) -> PointRecord:
+def compute_point(task: SweepPointTask) -> PointRecord:
     """Prepare, find the steady state, linearise, find the modes; a failure becomes a record as well.
 
     Raises

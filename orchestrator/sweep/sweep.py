@@ -13,11 +13,11 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import CaseError, Problem
 from orchestrator.points.executor import Executor
-from orchestrator.points.points import Report, kept_or_computed
+from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import ALPHA, Axis, Vary, grid_places, resolve
-from orchestrator.sweep.point import PointRecord, PointTask, compute_point, make_task
-from orchestrator.sweep.trajectories import Place, Trajectory, find_trajectories
+from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
+from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
 REFINEMENTS = 5
 """How often the way between two points is halved where a mode is not recognised from one to the other."""
@@ -53,11 +53,11 @@ class SweepPlan:
         """Points of the grid in all scenarios."""
         return len(self.scenarios) * int(np.prod([len(axis.values) for axis in self.axes]))
 
-    def values(self, place: Place) -> dict[str, Value]:
+    def values(self, place: GridPlace) -> dict[str, Value]:
         """What is set at a place; between two places of the last axis, what lies between their values."""
         return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
 
-    def task(self, prepared: PreparedScenario, place: Place) -> PointTask:
+    def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
         """The task of one point."""
         varied = self.values(place)
         return make_task(prepared, self.overrides, varied, self.step_size, self.frequency_range)
@@ -86,10 +86,10 @@ class ScenarioSweep:
     """
 
     prepared: PreparedScenario
-    points: dict[Place, PointRecord] = field(default_factory=dict)
+    points: dict[GridPlace, PointRecord] = field(default_factory=dict)
     trajectories: list[Trajectory] = field(default_factory=list)
 
-    def unstable(self, axes: Sequence[Axis]) -> list[Place]:
+    def unstable(self, axes: Sequence[Axis]) -> list[GridPlace]:
         """Places of the grid where a mode grows at any frequency, the fastest first."""
         found = [place for place in grid_places(axes) if self.points[place].is_unstable]
         return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
@@ -125,7 +125,7 @@ class SweepResult:
     stored: int = 0
     refined: int = 0
 
-    def failures(self) -> Iterator[tuple[ScenarioSweep, Place, str]]:
+    def failures(self) -> Iterator[tuple[ScenarioSweep, GridPlace, str]]:
         """Points of the grid that have no modes, and why."""
         for sweep in self.scenarios:
             for place in grid_places(self.plan.axes):
@@ -174,7 +174,7 @@ def run_sweep(
     plan: SweepPlan,
     executor: Executor,
     store: PointStore,
-    report: Report = lambda done, total: None,
+    report: CountReport = lambda done, total: None,
 ) -> SweepResult:
     """Compute what is not stored yet, then follow the modes, with more points where one is not recognised.
 
@@ -189,7 +189,7 @@ def run_sweep(
     """
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
-    wanted: list[tuple[ScenarioSweep, Place]] = [(sweep, place) for sweep in result.scenarios for place in grid]
+    wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
     _fill(result, wanted, executor, store, report)
     for depth in range(1, REFINEMENTS + 1):
         gaps = [(s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))]
@@ -205,10 +205,10 @@ def run_sweep(
 
 def _fill(
     result: SweepResult,
-    wanted: Sequence[tuple[ScenarioSweep, Place]],
+    wanted: Sequence[tuple[ScenarioSweep, GridPlace]],
     executor: Executor,
     store: PointStore,
-    report: Report,
+    report: CountReport,
 ) -> None:
     """Load or compute some points."""
     tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
@@ -224,11 +224,11 @@ def _fill(
         result.computed += not stored
 
 
-def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[Place]:
+def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:
     """Middles between neighbours along the last axis, ``width`` apart, with a mode that is not recognised."""
     if any(isinstance(value, bool) for value in plan.axes[-1].values):
         return
-    modes: dict[Place, ModeSet] = {p: r.modes for p, r in sweep.points.items() if r.modes is not None}
+    modes: dict[GridPlace, ModeSet] = {p: r.modes for p, r in sweep.points.items() if r.modes is not None}
     for place in sorted(modes):
         *row, at = place
         following = (*row, at + width)

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from orchestrator.sweep.dataset import Samples
 from orchestrator.sweep.plots import axis_label
-from orchestrator.sweep.trajectories import Place
+from orchestrator.sweep.trajectories import GridPlace
 
 _FAILURES_SHOWN = 5
 _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
@@ -109,7 +109,7 @@ def remarks(samples: Samples) -> list[str]:
 def _warnings(samples: Samples) -> list[str]:
     """Each kind of the points' warnings once, with how many points have it; figures make no kind of their own."""
     asked = {str(question) for sweep in samples.result.scenarios for question in sweep.prepared.questions}
-    kinds: dict[str, tuple[str, set[tuple[str, Place]]]] = {}
+    kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
     for sweep in samples.result.scenarios:
         for place, record in sweep.points.items():
             for text in record.warnings:
@@ -124,13 +124,13 @@ def _count(number: int, what: str) -> str:
     return f"{number} {what}" + ("s" if number != 1 else "")
 
 
-def place_text(samples: Samples, place: Place) -> str:
+def place_text(samples: Samples, place: GridPlace) -> str:
     """``grid.X_L = 0.1 pu``."""
     setting = samples.setting(place)
     return ", ".join(f"{a.key} = {_value(setting[a.key])} {a.unit}".rstrip() for a in samples.axes)
 
 
-def _values(samples: Samples, place: Place) -> str:
+def _values(samples: Samples, place: GridPlace) -> str:
     return ", ".join(_value(value) for value in samples.setting(place).values())
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.analysis.mode_tracking import Followed, ModeSet, near_an_end, number_trajectories
 from orchestrator.sweep.point import PointRecord
 
-Place = tuple[float, ...]
+GridPlace = tuple[float, ...]
 """Indices of a point on all axes; not whole on the last one for points between those of the grid."""
 
 
@@ -59,11 +59,11 @@ class Trajectory:
 
     name: str = ""
     carries: str | None = None
-    points: dict[Place, TrajectoryPoint] = field(default_factory=dict)
+    points: dict[GridPlace, TrajectoryPoint] = field(default_factory=dict)
 
 
 def find_trajectories(
-    points: Mapping[Place, PointRecord], names: Sequence[str], frequency_range: tuple[float, float]
+    points: Mapping[GridPlace, PointRecord], names: Sequence[str], frequency_range: tuple[float, float]
 ) -> list[Trajectory]:
     """Follow the modes of a scenario along the last axis, row by row.
 
@@ -95,14 +95,14 @@ def find_trajectories(
     return _with_names(list(trajectories.values()), points, names)
 
 
-def _on_grid(place: Place) -> bool:
+def _on_grid(place: GridPlace) -> bool:
     return place[-1] == int(place[-1])
 
 
-def _route(modes: Iterable[Place]) -> Iterator[tuple[Place, list[Place]]]:
+def _route(modes: Iterable[GridPlace]) -> Iterator[tuple[GridPlace, list[GridPlace]]]:
     """Places row by row, each with the one before it and the one above it, as far as they have modes."""
-    seen: set[Place] = set()
-    before: Place | None = None
+    seen: set[GridPlace] = set()
+    before: GridPlace | None = None
     for place in sorted(modes):
         origins = [before] if before is not None and before[:-1] == place[:-1] else []
         above = next(
@@ -121,10 +121,10 @@ def _route(modes: Iterable[Place]) -> Iterator[tuple[Place, list[Place]]]:
 
 
 def _history(
-    followed: Followed[Place],
-    modes: Mapping[Place, ModeSet],
-    first: set[Place],
-    place: Place,
+    followed: Followed[GridPlace],
+    modes: Mapping[GridPlace, ModeSet],
+    first: set[GridPlace],
+    place: GridPlace,
     index: int,
     frequency_range: tuple[float, float],
 ) -> tuple[float, Beginning]:
@@ -144,7 +144,7 @@ def _history(
 
 
 def _with_names(
-    trajectories: list[Trajectory], points: Mapping[Place, PointRecord], names: Sequence[str]
+    trajectories: list[Trajectory], points: Mapping[GridPlace, PointRecord], names: Sequence[str]
 ) -> list[Trajectory]:
     """Sorted: those with a name as they first have it, then the others by frequency."""
     carriers: dict[str, list[Trajectory]] = {name: [] for name in names}

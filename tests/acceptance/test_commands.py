@@ -11,7 +11,7 @@ import xarray as xr
 
 from orchestrator.acceptance.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.acceptance.checks.base import CHECKS as ENTERED
-from orchestrator.acceptance.checks.subject import Point
+from orchestrator.acceptance.checks.subject import OperatingAt
 from orchestrator.cases import infinite_bus, two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
@@ -175,7 +175,7 @@ def test_a_start_value_that_a_case_does_not_give_has_its_default(gallery, tmp_pa
     path = tmp_path / "case.toml"
     path.write_text(text.replace('model = "gfor"\n', f'fmu = "{fmu}"\n'), encoding="utf-8")
     use, _ = use_in_case(str(path), None, fmu, None)
-    assert use.point == Point(1.0, 0.0, 0.6, 0.05)
+    assert use.point == OperatingAt(1.0, 0.0, 0.6, 0.05)
     assert use.said.endswith("P_0 = 0.6, Q_0 = 0.05, v_0 = 1, theta_0 = 0 (default)")
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.acceptance.checks.base import failed, passed
-from orchestrator.acceptance.runner import Report
+from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
 from orchestrator.certification import texts
@@ -33,7 +33,7 @@ def document(tmp_path_factory, gallery):
     folder = tmp_path_factory.mktemp("document")
     fmu, binding = gallery("converter_power_si")
     (folder / "details.toml").write_text(DETAILS, encoding="utf-8")
-    report = Report(fmu, binding, [passed(name, "fine") for name in CHECKS])
+    report = AcceptanceReport(fmu, binding, [passed(name, "fine") for name in CHECKS])
     (folder / "report.json").write_text(json.dumps(report.as_dict()), encoding="utf-8")
     from orchestrator.cli import main  # noqa: PLC0415
 
@@ -164,7 +164,7 @@ def test_what_is_wrong_with_details_is_said_with_its_line(tmp_path):
 )
 def test_a_report_of_checks_is_of_this_fmu_and_whole(tmp_path, fmu_path, gfor, change, text):
     fmu = fmu_path("gfor")
-    report = Report(fmu, None, [passed(name, "fine") for name in CHECKS]).as_dict()
+    report = AcceptanceReport(fmu, None, [passed(name, "fine") for name in CHECKS]).as_dict()
     change(report)
     (tmp_path / "report.json").write_text(json.dumps(report), encoding="utf-8")
     code, _, error = gfor("certify", fmu, "--check", tmp_path / "report.json", "--out", tmp_path / "out")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.acceptance.checks.base import failed, passed
-from orchestrator.acceptance.runner import Report
+from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
 from orchestrator.certification.point import FREQUENCY, POWER, PointResult
@@ -54,7 +54,7 @@ def test_all_thirteen_pass_and_a_failed_acceptance_test_is_loud(certified, monke
     assert "Damping test of &#x27;gfor&#x27;: passed</h1>" in page
 
     def check(fmu, binding, *_):
-        return Report(fmu, binding, [passed("archive", "fine"), failed("runs", "crash", "it died")])
+        return AcceptanceReport(fmu, binding, [passed("archive", "fine"), failed("runs", "crash", "it died")])
 
     monkeypatch.setattr("orchestrator.certification.acceptance.check_fmu", check)
     code, _, content, page = certified("--check-them")

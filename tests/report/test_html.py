@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.report.html.charts import Curve, Frame, line_chart, thinned
+from orchestrator.report.html.charts import ChartCurve, Frame, line_chart, thinned
 from orchestrator.report.html.page import write_report
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -93,7 +93,7 @@ def test_what_is_no_folder_of_a_run_is_said(tmp_path, page):
 
 def test_names_cannot_break_the_page():
     x = np.array([0.0, 1.0])
-    svg = line_chart("<b>", "x", "y < 1", [Curve('"><script>alert(1)</script>', "#000", x, x)])
+    svg = line_chart("<b>", "x", "y < 1", [ChartCurve('"><script>alert(1)</script>', "#000", x, x)])
     assert "<script>" not in svg
     assert "<b>" not in svg
 
@@ -109,6 +109,6 @@ def test_a_thinned_curve_keeps_its_peaks():
 
 
 def test_a_frame_without_extent_still_has_axes():
-    chart = line_chart("flat", "x", "y", [Curve("c", "#000", np.array([0.0, 1.0]), np.zeros(2))])
+    chart = line_chart("flat", "x", "y", [ChartCurve("c", "#000", np.array([0.0, 1.0]), np.zeros(2))])
     assert "nan" not in chart
     assert Frame((0, 2), (0, 1), "", "").at(1, 0)[0] > 0

@@ -31,7 +31,7 @@ class Whose(StrEnum):
 
 
 @dataclass(frozen=True)
-class Result:
+class CheckResult:
     """What one check found.
 
     Attributes
@@ -64,7 +64,7 @@ class Result:
         return {**asdict(self), "figures": _plain(self.figures)}
 
     @classmethod
-    def of_dict(cls, values: dict[str, Any]) -> "Result":
+    def of_dict(cls, values: dict[str, Any]) -> "CheckResult":
         """The result that `as_dict` wrote."""
         return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
 
@@ -94,7 +94,7 @@ class Check:
     name: str
     question: str
     needs: tuple[str, ...]
-    run: Callable[[Subject], Result]
+    run: Callable[[Subject], CheckResult]
 
 
 CHECKS: dict[str, Check] = {}
@@ -107,45 +107,45 @@ SAME = ("independence", "repeatability")
 
 def check(
     name: str, question: str, needs: tuple[str, ...] = ()
-) -> Callable[[Callable[[Subject], Result]], Callable[[Subject], Result]]:
+) -> Callable[[Callable[[Subject], CheckResult]], Callable[[Subject], CheckResult]]:
     """Enter a function into `CHECKS`."""
 
-    def enter(function: Callable[[Subject], Result]) -> Callable[[Subject], Result]:
+    def enter(function: Callable[[Subject], CheckResult]) -> Callable[[Subject], CheckResult]:
         CHECKS[name] = Check(name, question, needs, function)
         return function
 
     return enter
 
 
-def passed(name: str, evidence: str, **figures: Any) -> Result:
+def passed(name: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found no fault."""
-    return Result(name, Verdict.PASS, evidence, figures=figures)
+    return CheckResult(name, Verdict.PASS, evidence, figures=figures)
 
 
-def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> Result:
+def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResult:
     """A check that found something to ask about, which is no fault."""
-    return Result(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
+    return CheckResult(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
 
 
-def failed(name: str, fault: str, evidence: str, **figures: Any) -> Result:
+def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found a fault of the FMU."""
-    return Result(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
+    return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 
 
-def not_applicable(name: str, because: str) -> Result:
+def not_applicable(name: str, because: str) -> CheckResult:
     """A check that has nothing to test on this FMU."""
-    return Result(name, Verdict.NOT_APPLICABLE, because)
+    return CheckResult(name, Verdict.NOT_APPLICABLE, because)
 
 
-def not_supported(name: str, error: UnsupportedFmuError) -> Result:
+def not_supported(name: str, error: UnsupportedFmuError) -> CheckResult:
     """What this program or this machine cannot do, which says nothing about the FMU."""
     evidence, _, remedy = str(error).rpartition("; ")
-    return Result(name, Verdict.NOT_SUPPORTED, evidence or remedy, error.kind, remedy, whose=Whose.HERE)
+    return CheckResult(name, Verdict.NOT_SUPPORTED, evidence or remedy, error.kind, remedy, whose=Whose.HERE)
 
 
-def provoked(name: str, evidence: str) -> Result:
+def provoked(name: str, evidence: str) -> CheckResult:
     """What an FMU does after a call that FMI forbids."""
     remedy = "only this check makes such a call, and our master never does; an FMU should refuse it, tell the author"
-    return Result(
+    return CheckResult(
         name, Verdict.REMARK, f"a call that FMI forbids provoked it: {evidence}", "", remedy, whose=Whose.CALL
     )

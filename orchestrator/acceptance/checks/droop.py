@@ -7,20 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from orchestrator.acceptance.checks.subject import Point
+from orchestrator.acceptance.checks.subject import OperatingAt
 
-POINT = Point(1.0, 0.0, 0.7, 0.1)
+POINT = OperatingAt(1.0, 0.0, 0.7, 0.1)
 """With much active power, so that Q follows P at constant voltage and the internal voltage shows in Q."""
 
-ABSORBING = Point(1.0, 0.0, 0.7, -0.3)
+ABSORBING = OperatingAt(1.0, 0.0, 0.7, -0.3)
 """As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu."""
 
 VOLTAGE = 0.02
 FREQUENCY = 0.001
 """Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
 
-_FURTHER = (Point(1.0, 0.0, 0.2, 0.02), Point(1.0, 0.0, 0.2, 0.3), Point(1.0, 0.0, -0.5, 0.1))
-_FURTHER_ABSORBING = (Point(1.0, 0.0, 0.2, -0.25), Point(1.0, 0.0, 0.2, -0.4), Point(1.0, 0.0, -0.5, -0.3))
+_FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
+_FURTHER_ABSORBING = (
+    OperatingAt(1.0, 0.0, 0.2, -0.25),
+    OperatingAt(1.0, 0.0, 0.2, -0.4),
+    OperatingAt(1.0, 0.0, -0.5, -0.3),
+)
 
 SETTLED = 1e-3
 """Power [pu, S_n] by which an answer may still move."""
@@ -29,7 +33,7 @@ _GOOD = 0.2
 """Largest error of the law, in parts of what the droop does where the frequency changes."""
 
 
-def further(point: Point) -> tuple[Point, ...]:
+def further(point: OperatingAt) -> tuple[OperatingAt, ...]:
     """Points with other powers at which a law is looked for, all with reactive power of the same sign."""
     return _FURTHER if point.Q >= 0 else _FURTHER_ABSORBING
 
@@ -58,7 +62,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Answer:
+class DroopAnswer:
     """Half the difference of what a change up and the same one down bring [pu, S_n], early and settled.
 
     Attributes
@@ -83,7 +87,7 @@ class Answer:
     ways: tuple[Way, Way]
 
 
-def droop(found: Sequence[tuple[Point, Answer, Answer]]) -> float | None:
+def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> float | None:
     """Fall of the voltage behind an impedance per reactive power [pu, S_n]; None where no such law is seen.
 
     Parameters
@@ -110,7 +114,9 @@ def droop(found: Sequence[tuple[Point, Answer, Answer]]) -> float | None:
     return slope
 
 
-def _errors(x: NDArray[np.float64], found: Sequence[tuple[Point, Answer, Answer]], inside: bool) -> NDArray[np.float64]:
+def _errors(
+    x: NDArray[np.float64], found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]], inside: bool
+) -> NDArray[np.float64]:
     """ΔE + n·ΔQ for every answer."""
     resistance, reactance, slope = x
     errors = []

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import EQUAL, affordable
 from orchestrator.acceptance.checks.subject import Subject, difference
 from orchestrator.arrays import Numbers
@@ -12,7 +12,7 @@ _STEPS = 50
 
 
 @check("nan_input", "Does it tell of inputs that are no numbers, and get over them?", needs=SAME)
-def nan_input(subject: Subject) -> Result:
+def nan_input(subject: Subject) -> CheckResult:
     if not subject.inputs:
         return not_applicable("nan_input", "because there are no Real inputs")
     steps, h = affordable(subject, 200), subject.step_size
@@ -52,7 +52,7 @@ def _answer(subject: Subject, deviation: Numbers) -> str:
 
 
 @check("extreme_inputs", "Does it give numbers, or an error, where its inputs are extreme?")
-def extreme_inputs(subject: Subject) -> Result:
+def extreme_inputs(subject: Subject) -> CheckResult:
     """Inputs far out, each alone and all together; a NaN or infinite output needs an error from the call."""
     if not subject.inputs:
         return not_applicable("extreme_inputs", "because there are no Real inputs")

@@ -4,7 +4,7 @@ from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
-from orchestrator.acceptance.checks.base import Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.fmi.archive import MODEL_DESCRIPTION
 from orchestrator.fmi.description import FmuDescription, VariableInfo
@@ -36,7 +36,7 @@ def some_of(texts: list[str], between: str = "; ") -> str:
 
 
 @check("fmi_validity", "Does the file keep to FMI 2.0?")
-def fmi_validity(subject: Subject) -> Result:
+def fmi_validity(subject: Subject) -> CheckResult:
     grave, harmless = validation_problems(subject.directory)
     if grave:
         return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
@@ -51,7 +51,7 @@ def fmi_validity(subject: Subject) -> Result:
 
 
 @check("units", "Are units declared, known, and what their definitions say?")
-def units(subject: Subject) -> Result:
+def units(subject: Subject) -> CheckResult:
     described = native(subject)
     wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described)
     if wrong:
@@ -111,7 +111,7 @@ def _wrong_port_units(described: FmuDescription) -> list[str]:
 
 
 @check("declared_starts", "Does every input and parameter start, within its own bounds?")
-def declared_starts(subject: Subject) -> Result:
+def declared_starts(subject: Subject) -> CheckResult:
     missing, wrong = [], []
     for info in native(subject).variables.values():
         if info.causality not in ("input", "parameter") or info.type == "Clock":  # a clock ticks, and starts at nothing
@@ -136,7 +136,7 @@ def _out_of_bounds(info: VariableInfo) -> str | None:
 
 
 @check("declared_dependencies", "Does the file say what its outputs depend on?")
-def declared_dependencies(subject: Subject) -> Result:
+def declared_dependencies(subject: Subject) -> CheckResult:
     described = native(subject)
     if not described.outputs:
         return not_applicable("declared_dependencies", "because the FMU has no outputs")

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.running import EQUAL, affordable
 from orchestrator.acceptance.checks.subject import (
-    Point,
+    OperatingAt,
     Running,
     Stimulus,
     Subject,
@@ -23,15 +23,15 @@ from orchestrator.errors import ComponentError
 
 Setting = Mapping[str, float | bool]
 
-_OTHER = Point(v=1.03, theta=0.4, P=0.7, Q=-0.1)
+_OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 
 
 @check("independence", "Do two instances leave each other alone?")
-def independence(subject: Subject) -> Result:
+def independence(subject: Subject) -> CheckResult:
     """Leave an instance idle beside another one that runs; then run both, with different inputs."""
     if subject.description.one_instance:
         return not_applicable("independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess")
-    result: Result | None = None
+    result: CheckResult | None = None
     for setting in settings(subject):
         try:
             found = _independent(subject, setting)
@@ -46,7 +46,7 @@ def independence(subject: Subject) -> Result:
     return result
 
 
-def _independent(subject: Subject, setting: Setting) -> Result:
+def _independent(subject: Subject, setting: Setting) -> CheckResult:
     """Look with some parameters set."""
     moved = _idle(subject, setting)
     if moved is not None:
@@ -96,9 +96,9 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) 
 
 
 @check("reset", "Is it like new after fmi2Reset?", needs=SAME)
-def reset(subject: Subject) -> Result:
+def reset(subject: Subject) -> CheckResult:
     """Also with its tunable Booleans the other way: in the life before, and in the one after."""
-    result: Result | None = None
+    result: CheckResult | None = None
     for setting in settings(subject):
         try:
             found = _like_new(subject, setting)
@@ -113,7 +113,7 @@ def reset(subject: Subject) -> Result:
     return result
 
 
-def _like_new(subject: Subject, setting: Setting) -> Result:
+def _like_new(subject: Subject, setting: Setting) -> CheckResult:
     """Compare a run after fmi2Reset with one of a new instance, with some parameters set."""
     steps, h = affordable(subject, 300), subject.step_size
     stimulus, moved = subject.steps(hold=10 * h), elsewhere(subject)
@@ -138,7 +138,7 @@ def _like_new(subject: Subject, setting: Setting) -> Result:
 
 
 @check("reinstantiation", "Is a later instance like the first?", needs=SAME)
-def reinstantiation(subject: Subject) -> Result:
+def reinstantiation(subject: Subject) -> CheckResult:
     """Compare a first instance with later ones: after another's life while the library stays loaded, and alone."""
     steps, h = affordable(subject, 300), subject.step_size
     stimulus, later = subject.steps(hold=10 * h), []

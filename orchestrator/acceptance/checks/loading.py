@@ -1,6 +1,6 @@
 """Whether an FMU's binary can be loaded here and gives an instance, and what it does with calls that FMI forbids."""
 
-from orchestrator.acceptance.checks.base import Result, check, failed, passed, provoked, remarked
+from orchestrator.acceptance.checks.base import CheckResult, check, failed, passed, provoked, remarked
 from orchestrator.acceptance.checks.file import native, some_of
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.acceptance.process import HostedComponent, ProcessEndedError
@@ -8,7 +8,7 @@ from orchestrator.errors import ComponentError, EndedError, InputError, Unsuppor
 
 
 @check("loads", "Can its binary be loaded here, and does it give an instance?")
-def loads(subject: Subject) -> Result:
+def loads(subject: Subject) -> CheckResult:
     """What this machine lacks is said here, once; all that needs an instance is not asked then."""
     described, process = native(subject), subject.process()
     try:
@@ -37,7 +37,7 @@ def loads(subject: Subject) -> Result:
 
 
 @check("call_order", "Does it refuse calls out of order, and survive them?")
-def call_order(subject: Subject) -> Result:
+def call_order(subject: Subject) -> CheckResult:
     """Make three calls that FMI forbids, each in an instance of its own; what an FMU does then is provoked."""
     h = subject.step_size
     steps = {

@@ -9,22 +9,22 @@ from time import perf_counter
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import LONGEST, RUN_FOR, affordable
-from orchestrator.acceptance.checks.subject import Point, Running, Subject
+from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
 
 POINTS = (
-    Point(1.0, 0.0, 0.5, 0.1),
-    Point(1.03, 0.4, 0.7, -0.1),
-    Point(0.97, -0.5, 0.3, 0.2),
-    Point(1.0, 2.0, 0.6, 0.0),
-    Point(1.01, -2.5, 0.4, -0.2),
+    OperatingAt(1.0, 0.0, 0.5, 0.1),
+    OperatingAt(1.03, 0.4, 0.7, -0.1),
+    OperatingAt(0.97, -0.5, 0.3, 0.2),
+    OperatingAt(1.0, 2.0, 0.6, 0.0),
+    OperatingAt(1.01, -2.5, 0.4, -0.2),
 )
-IMPORTING = (Point(1.0, 0.3, -0.5, 0.15), Point(1.02, -0.4, -0.3, -0.1))
+IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))
 """Points at which it takes power."""
 
 _BALANCE = 0.02
@@ -85,12 +85,12 @@ def _current(running: Running) -> complex:
     return complex(*values) * SYSTEM_BASE_MVA / _rating(running)
 
 
-def _points(subject: Subject) -> tuple[Point, ...]:
+def _points(subject: Subject) -> tuple[OperatingAt, ...]:
     """The operating point of use, and others."""
     return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
 
 
-def cannot_import(subject: Subject, point: Point) -> str:
+def cannot_import(subject: Subject, point: OperatingAt) -> str:
     """Why it is not tried with that power: its declared bounds of P_0 forbid it; "" where they do not."""
     described = subject.description
     takers = [("P_0", point.P)]
@@ -105,7 +105,7 @@ def cannot_import(subject: Subject, point: Point) -> str:
 
 
 @check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
-def steady_state(subject: Subject) -> Result:
+def steady_state(subject: Subject) -> CheckResult:
     if not subject.starts:
         return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
     steps, worst = affordable(subject, 5000), 0.0
@@ -173,11 +173,11 @@ def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Re
 
 
 @check("power_balance", "Are sign, base and frame such that the power at its port is the power asked of it?")
-def power_balance(subject: Subject) -> Result:
+def power_balance(subject: Subject) -> CheckResult:
     """Fit x = a·x_0 + b·conj(x_0) + c over several operating points, for powers and for currents."""
     if not subject.starts:
         return not_applicable("power_balance", WHY["no start" if subject.port else "no port"])
-    best: Result | None = None
+    best: CheckResult | None = None
     settle = 0 if subject.memory.get("drift", 0.0) <= _DRIFT else affordable(subject, 20000)
     for steps in dict.fromkeys((0, settle)):
         asked, found, voltages, left_out = _powers(subject, steps)
@@ -218,7 +218,9 @@ def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex],
     return asked, found, voltages, left_out
 
 
-def _judged(asked: Sequence[complex], found: Sequence[complex], voltages: Sequence[complex], after: float) -> Result:
+def _judged(
+    asked: Sequence[complex], found: Sequence[complex], voltages: Sequence[complex], after: float
+) -> CheckResult:
     s_0, s = np.array(asked), np.array(found)
     at = "at the start" if not after else f"after {after:.3g} s"
     if not np.isfinite(s).all():

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from itertools import pairwise
 
-from orchestrator.acceptance.checks.base import Result, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, saved
 from orchestrator.errors import ComponentError
@@ -24,7 +24,7 @@ _TOOL = 65536.0
 
 
 @check("memory", "Does it give back the memory that it takes?")
-def memory(subject: Subject) -> Result:
+def memory(subject: Subject) -> CheckResult:
     if not subject.memory_in_use():
         return not_applicable("memory", "because this platform does not tell how much memory is in use")
     steps, instance = affordable(subject, 1500), _TOOL if subject.description.needs_tool else _INSTANCE

@@ -8,9 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
-from orchestrator.acceptance.checks.subject import Point, Subject
+from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.errors import ComponentError
 
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
@@ -47,14 +47,14 @@ _PART = 1.5
 
 
 @dataclass(frozen=True)
-class Event:
+class Disturbance:
     """A factor on the voltage, from a time on, for a while; at an operating point of its own where not None."""
 
     name: str
     factor: complex
     at: float
     lasts: float = _LASTS
-    point: Point | None = None
+    point: OperatingAt | None = None
 
     def __str__(self) -> str:
         return f"the {self.name} at {self.at:g} s{f' from P_0 = {self.point.P:g}' if self.point else ''}"
@@ -74,13 +74,13 @@ class Answer:
         Distance of the current from where it was, afterwards.
     """
 
-    event: Event
+    event: Disturbance
     peak: float
     mean: float
     away: float
 
 
-def _runs() -> Iterator[list[Event]]:
+def _runs() -> Iterator[list[Disturbance]]:
     """Every kind of event at every time, one at each time of a run; the first run has the most telling ones."""
     dips = {v: (f"dip to {v:g} pu", complex(v)) for v in (0.9, 0.7, 0.5, 0.2, 0.0)}
     swells = {v: (f"overvoltage of {v:g} pu", complex(v)) for v in (1.1, 1.3)}
@@ -90,14 +90,14 @@ def _runs() -> Iterator[list[Event]]:
     for k in range(len(kinds)):
         if k == 1:
             for to, at, lasts in (_LONG, _DEEP):
-                yield [Event(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
+                yield [Disturbance(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
             some = zip((dips[0.0], dips[0.5], jumps[-60.0]), _TIMES, strict=False)
-            yield [Event(*kind, at, point=IMPORTING[0]) for kind, at in some]
-        yield [Event(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(_TIMES)]
+            yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
+        yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(_TIMES)]
 
 
 @check("limits", "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?")
-def limits(subject: Subject) -> Result:
+def limits(subject: Subject) -> CheckResult:
     """Disturb it at several times; a run goes on while it comes back, and begins anew where it does not."""
     if not subject.port:
         return not_applicable("limits", WHY["no port"])
@@ -127,7 +127,9 @@ def limits(subject: Subject) -> Result:
     return result
 
 
-def _disturbed(subject: Subject, rest: list[Event], answers: list[Answer], refused: list[str]) -> Event | None:
+def _disturbed(
+    subject: Subject, rest: list[Disturbance], answers: list[Answer], refused: list[str]
+) -> Disturbance | None:
     """Let events happen to one instance, as long as it comes back; those that happened leave the list."""
     point, h = rest[0].point, subject.step_size
     normal = (point or subject.point).voltage
@@ -157,7 +159,7 @@ def _disturbed(subject: Subject, rest: list[Event], answers: list[Answer], refus
     return None
 
 
-def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_out: int) -> Result:
+def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_out: int) -> CheckResult:
     if not answers:
         return remarked("limits", "; ".join(refused[:2]), "ask how it rides through")
     worst, highest = max(answers, key=lambda a: a.mean), max(answers, key=lambda a: a.peak)

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.subject import Subject, difference, elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
@@ -34,7 +34,7 @@ EQUAL = 1e-10
 
 
 @check("runs", "Does it run without crash, hang, exit, NaN or infinite values?")
-def runs(subject: Subject) -> Result:
+def runs(subject: Subject) -> CheckResult:
     """Run to where the file says an experiment ends, at least for a while, and in reason."""
     h, ends = subject.step_size, subject.description.stop_time or 10.0
     stimulus, least = subject.steps(hold=_HELD * h), subject.memory.get("run_for", RUN_FOR)
@@ -68,7 +68,7 @@ def runs(subject: Subject) -> Result:
     )
 
 
-def _ended(subject: Subject, error: EndedError) -> Result:
+def _ended(subject: Subject, error: EndedError) -> CheckResult:
     """An orderly end; so early that nothing can be learned, it is a fault."""
     h, declared, ended = subject.step_size, subject.description.stop_time, error.ended_at
     steps, early = round(error.time / h), declared is not None and ended < declared - 0.5 * h
@@ -86,7 +86,7 @@ def _ended(subject: Subject, error: EndedError) -> Result:
     return remarked("runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended)
 
 
-def _not_finite(subject: Subject, values: Numbers, time: float) -> Result:
+def _not_finite(subject: Subject, values: Numbers, time: float) -> CheckResult:
     bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
     return failed(
         "runs",
@@ -104,7 +104,7 @@ def affordable(subject: Subject, steps: int, step_size: float | None = None) -> 
 
 
 @check("repeatability", "Does it give the same answer twice?", needs=("independence",))
-def repeatability(subject: Subject) -> Result:
+def repeatability(subject: Subject) -> CheckResult:
     steps = affordable(subject, 1000)
     stimulus = subject.steps(hold=20 * subject.step_size)
     first, second = (subject.trajectory(steps, subject.step_size, stimulus) for _ in range(2))
@@ -120,7 +120,7 @@ def repeatability(subject: Subject) -> Result:
 
 
 @check("reading", "Does reading leave it as it was?", needs=SAME)
-def reading(subject: Subject) -> Result:
+def reading(subject: Subject) -> CheckResult:
     """Read everything, several times and backwards, in one of two equal runs."""
     steps = affordable(subject, 300)
     stimulus = subject.steps(hold=10 * subject.step_size)
@@ -156,7 +156,7 @@ def reading(subject: Subject) -> Result:
 
 
 @check("start_values", "Do its variables start where the file says?")
-def start_values(subject: Subject) -> Result:
+def start_values(subject: Subject) -> CheckResult:
     variables = subject.description.variables
     names = [
         n

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.errors import ComponentError
@@ -31,7 +31,7 @@ _MOST_STEPS = 1.05
 
 
 @check("sample_time", "Do its outputs change with every step, or at times of its own?", needs=(*SAME, "reading"))
-def sample_time(subject: Subject) -> Result:
+def sample_time(subject: Subject) -> CheckResult:
     """Move all inputs before every step and see in which steps the outputs move."""
     h = subject.step_size
     own = _sample_time(subject, h)

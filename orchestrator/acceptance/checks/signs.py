@@ -5,21 +5,21 @@ from math import pi
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.droop import (
     ABSORBING,
     FREQUENCY,
     POINT,
     SETTLED,
     VOLTAGE,
-    Answer,
+    DroopAnswer,
     Way,
     droop,
     further,
 )
 from orchestrator.acceptance.checks.port import WHY, of_current
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Point, Subject
+from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
@@ -61,7 +61,7 @@ _PLAIN = ("pu", "p.u.", "1")
 
 
 @check("rated_frequency", "Is its frequency 1 at rest?", needs=SAME)
-def rated_frequency(subject: Subject) -> Result:
+def rated_frequency(subject: Subject) -> CheckResult:
     """An FMU for 60 Hz that is bound as one of 50 Hz has omega = 1.2."""
     if not subject.port or not _shows_omega(subject):
         return not_applicable(
@@ -93,7 +93,7 @@ def _rated(subject: Subject) -> float:
 
 
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
-def signs(subject: Subject) -> Result:
+def signs(subject: Subject) -> CheckResult:
     """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:
         return not_applicable("signs", WHY["no port"])
@@ -106,7 +106,7 @@ def signs(subject: Subject) -> Result:
     places = [POINT]
     if subject.starts:
         places += [p for p in (subject.use.point, ABSORBING) if p is not None]
-    first: Result | None = None
+    first: CheckResult | None = None
     refused = []
     for point in places:
         try:
@@ -125,11 +125,11 @@ def signs(subject: Subject) -> Result:
     return first
 
 
-def _named(point: Point) -> str:
+def _named(point: OperatingAt) -> str:
     return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}"
 
 
-def _at(subject: Subject, steps: int, point: Point) -> Result:
+def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     """What small changes at one operating point say."""
     voltage, frequency = _answers(subject, steps, point)
     figures = {
@@ -153,7 +153,7 @@ def _at(subject: Subject, steps: int, point: Point) -> Result:
     return passed("signs", said, **figures)
 
 
-def _answers(subject: Subject, steps: int, point: Point) -> tuple[Answer, Answer]:
+def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[DroopAnswer, DroopAnswer]:
     """To lower voltage, and to lower frequency."""
     omega = 2 * pi * _rated(subject) * FREQUENCY
     return (
@@ -162,7 +162,9 @@ def _answers(subject: Subject, steps: int, point: Point) -> tuple[Answer, Answer
     )
 
 
-def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float, Numbers], Complex]) -> Answer:
+def _answer(
+    subject: Subject, steps: int, point: OperatingAt, factor: Callable[[float, Numbers], Complex]
+) -> DroopAnswer:
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
     time: Numbers = np.arange(steps, dtype=np.float64) * h
@@ -187,7 +189,7 @@ def _answer(subject: Subject, steps: int, point: Point, factor: Callable[[float,
     half = [(a - b) / 2 for a, b in zip(*found, strict=True)]
     i, s = ([part[window].mean() for window in windows] for part in half)
     moving, far = float(_apart(s[1], s[2])), max(way.far for way in ways)
-    return Answer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
+    return DroopAnswer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
 
 
 def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
@@ -209,7 +211,7 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
     return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 
-def _wrong(point: Point, voltage: Answer, frequency: Answer) -> tuple[str, str] | None:
+def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> tuple[str, str] | None:
     """Name of a fault, and what shows it."""
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
@@ -229,7 +231,7 @@ def _wrong(point: Point, voltage: Answer, frequency: Answer) -> tuple[str, str] 
     return _wrong_omega(frequency)
 
 
-def _least(point: Point) -> float:
+def _least(point: OperatingAt) -> float:
     """Constant current or impedance takes so much reactive power with the voltage, and is no answer."""
     return 3 * VOLTAGE * abs(point.Q) + _SOME
 
@@ -238,7 +240,7 @@ def _rests(way: Way) -> bool:
     return way.far <= _AWAY and way.moving < max(_SOME, _SETTLED * abs(way.power))
 
 
-def _lost(*answers: Answer) -> str:
+def _lost(*answers: DroopAnswer) -> str:
     """Which change makes it run away, where the opposite one does not; "" where there is none."""
     for answer, kind, size in zip(answers, ("voltage", "frequency"), (VOLTAGE, FREQUENCY), strict=True):
         for here, there, word in zip(answer.ways, answer.ways[::-1], _WORDS, strict=True):
@@ -250,7 +252,7 @@ def _lost(*answers: Answer) -> str:
     return ""
 
 
-def _wrong_omega(frequency: Answer) -> tuple[str, str] | None:
+def _wrong_omega(frequency: DroopAnswer) -> tuple[str, str] | None:
     """In synchronism its frequency is the network's, which the changes moved."""
     for sign, way in zip(_SIGNS, frequency.ways, strict=True):
         if way.omega is None or not _rests(way) or way.omega_moving > _OMEGA_APART / 10:
@@ -262,7 +264,7 @@ def _wrong_omega(frequency: Answer) -> tuple[str, str] | None:
 
 
 def _wrong_droop(
-    subject: Subject, steps: int, point: Point, voltage: Answer, frequency: Answer
+    subject: Subject, steps: int, point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer
 ) -> tuple[str, str] | None:
     """Look closer where lower voltage brings more reactive power in the end than in the first cycle."""
     if not subject.starts or voltage.power.imag < _MORE * voltage.early_power.imag or not voltage.early_power.imag > 0:
@@ -285,7 +287,7 @@ def _wrong_droop(
     return "wrong sign", f"{says}: look for the sign of Q in its droop"
 
 
-def _said(point: Point, voltage: Answer, frequency: Answer) -> str:
+def _said(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> str:
     q, p = voltage.power.imag, frequency.power.real
     first = f"{100 * VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
     second = f"{100 * FREQUENCY:g} % less frequency {p:+.3g} pu of active power"

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from time import perf_counter
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import (
     Running,
@@ -32,7 +32,7 @@ _READ = 1e-9
 
 
 @check("state", "Does a saved state bring back everything?", needs=(*SAME, "reading"))
-def state(subject: Subject) -> Result:
+def state(subject: Subject) -> CheckResult:
     """Run, save, run on; restore, and run the same again: what was not saved goes on from where it was."""
     if not subject.description.can_save_state:
         return not_applicable("state", "because the FMU does not declare canGetAndSetFMUstate")
@@ -68,7 +68,7 @@ def state(subject: Subject) -> Result:
 
 
 @check("settable_states", "Does it take the states that it lets a master set?", needs=("reading",))
-def settable_states(subject: Subject) -> Result:
+def settable_states(subject: Subject) -> CheckResult:
     """Set one state after another and read it back."""
     names = subject.description.states
     if not (subject.description.states_are_settable and names):
@@ -89,7 +89,7 @@ def settable_states(subject: Subject) -> Result:
 
 
 @check("state_size", "How large is the state, and does it stay so?", needs=(*SAME, "reading", "state"))
-def state_size(subject: Subject) -> Result:
+def state_size(subject: Subject) -> CheckResult:
     if not (subject.description.can_save_state and subject.description.can_serialize_state):
         return not_applicable("state_size", "because the FMU does not declare canSerializeFMUstate")
     h, sizes = subject.step_size, []

@@ -25,7 +25,7 @@ PORT_STEP = 1e-4
 
 
 @dataclass(frozen=True)
-class Point:
+class OperatingAt:
     """An operating point: S = P + jQ [pu, S_n] at the bus voltage v∠θ [pu, rad]."""
 
     v: float = 1.0
@@ -56,7 +56,7 @@ class Use:
     """
 
     step_size: float | None = None
-    point: Point | None = None
+    point: OperatingAt | None = None
     values: Mapping[str, float | bool] = field(default_factory=dict)
     inputs: Mapping[str, float] = field(default_factory=dict)
     said: str = ""
@@ -128,7 +128,7 @@ class Subject:
         self.doing = ""
 
     def running(
-        self, name: str = "fmu", point: Point | None = None, parameters: Mapping[str, float | bool] | None = None
+        self, name: str = "fmu", point: OperatingAt | None = None, parameters: Mapping[str, float | bool] | None = None
     ) -> "Running":
         """A new instance, initialised; use it as a context manager."""
         component = self.open(name)
@@ -157,16 +157,16 @@ class Subject:
         return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
 
     @property
-    def point(self) -> Point:
+    def point(self) -> OperatingAt:
         """Where it starts, where nobody says otherwise."""
-        return self.use.point or Point()
+        return self.use.point or OperatingAt()
 
     @property
     def start_voltage(self) -> complex:
         """Bus voltage [pu] at which it starts."""
         return self.point.voltage
 
-    def start_inputs(self, point: Point | None) -> Numbers:
+    def start_inputs(self, point: OperatingAt | None) -> Numbers:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
         voltage = (point or self.point).voltage
         known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
@@ -208,7 +208,7 @@ class Subject:
 class Running:
     """An initialised instance that knows its time."""
 
-    def __init__(self, subject: Subject, component: HostedComponent, point: Point | None = None,
+    def __init__(self, subject: Subject, component: HostedComponent, point: OperatingAt | None = None,
                  parameters: Mapping[str, float | bool] | None = None) -> None:  # fmt: skip
         self.subject, self.component, self.point = subject, component, point
         self.parameters = dict(parameters or {})

@@ -25,11 +25,11 @@ _DWELL = 0.1
 _STEPS = 2.0
 """How many of the longer steps a time between two switchings may differ by."""
 
-Run = tuple[Numbers, float]
+Interval = tuple[Numbers, float]
 """What was read after every step, from the start on, and the step [s]."""
 
 
-def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Run, Run]]) -> list[str]:
+def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Interval, Interval]]) -> list[str]:
     """Names of signals that switch at other moments in runs that are otherwise alike; empty where more differs.
 
     Parameters
@@ -46,7 +46,7 @@ def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Run, Run]]) -
     return list(found)
 
 
-def _elsewhere(first: Run, second: Run) -> list[int] | None:
+def _elsewhere(first: Interval, second: Interval) -> list[int] | None:
     """Places of the signals that switch at other moments; None where more than moments differs."""
     (a, h), (b, other_h) = first, second
     if not (np.isfinite(a).all() and np.isfinite(b).all()):

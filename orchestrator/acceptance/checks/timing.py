@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, Result, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, scales
 from orchestrator.acceptance.checks.switching import switches_elsewhere
@@ -27,7 +27,7 @@ _DELAYS = 5
 
 
 @check("feedthrough", "Does what its outputs depend on at once agree with what it declares?", needs=("reading",))
-def feedthrough(subject: Subject) -> Result:
+def feedthrough(subject: Subject) -> CheckResult:
     """Change one input after another, without a step, and see which outputs follow."""
     if not subject.inputs or not subject.outputs:
         return not_applicable("feedthrough", "because there are no Real inputs, or no Real outputs")
@@ -73,7 +73,7 @@ def _observed(subject: Subject) -> dict[str, set[str]]:
 
 
 @check("delay", "Do its outputs come when they are due?", needs=(*SAME, "reading"))
-def delay(subject: Subject) -> Result:
+def delay(subject: Subject) -> CheckResult:
     """Look for answers that are shifted by a number of communication steps, whatever these are."""
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
@@ -194,7 +194,7 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> float:
 
 
 @check("step_invariance", "Is its answer the same with other communication steps?", needs=(*SAME, "reading", "delay"))
-def step_invariance(subject: Subject) -> Result:
+def step_invariance(subject: Subject) -> CheckResult:
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
         return remarked(
@@ -240,7 +240,7 @@ def _claimed(subject: Subject) -> float:
     return max(subject.description.default_step_size or 0.0, subject.use.step_size or 0.0)
 
 
-def _switching(name: str, signals: list[str], seen: str, **figures: float) -> Result:
+def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:
     """What is to be said where only moments of switching follow the step."""
     return remarked(
         name,
@@ -266,7 +266,7 @@ def _typical(a: Numbers, b: Numbers) -> float:
     "Does its internal step stay inside, where communication steps are no multiple of it?",
     needs=(*SAME, "reading", "delay", "step_invariance"),
 )
-def internal_step(subject: Subject) -> Result:
+def internal_step(subject: Subject) -> CheckResult:
     h = subject.memory.get("base step", subject.step_size)
     evens = subject.memory.get("step sizes")
     if isinstance(evens, str):

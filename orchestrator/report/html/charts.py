@@ -17,7 +17,7 @@ _POINTS = 500
 
 
 @dataclass(frozen=True)
-class Curve:
+class ChartCurve:
     """A line through points, with a name that the legend shows."""
 
     label: str
@@ -89,7 +89,7 @@ class Frame:
         )
 
 
-def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[Curve], height: int = 210) -> str:
+def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
     """Curves over one axis; the pointer shows all values at its x."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
@@ -112,7 +112,7 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[Curve], h
 
 
 def complex_plane(
-    name: str, marks: Sequence[Mark], trajectories: Sequence[Curve] = (), highest_hz: float | None = None
+    name: str, marks: Sequence[Mark], trajectories: Sequence[ChartCurve] = (), highest_hz: float | None = None
 ) -> str:
     """Eigenvalues as real part [1/s] against frequency [Hz], with rays of equal damping."""
     xs = [m.x for m in marks] + [v for t in trajectories for v in t.x.tolist()]

@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 import xarray as xr
 
-from orchestrator.report.html.charts import Curve, Mark, bar_chart, complex_plane, legend, line_chart
+from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
@@ -283,7 +283,7 @@ def _watched(results: Results) -> str:
     return f'<p class="soft">{_NOTHING}</p>' if watched else ""
 
 
-def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve], dict[str, str]]:
+def _curves(results: Results, expression: str, scale: float) -> tuple[list[ChartCurve], dict[str, str]]:
     """One signal in every scenario, and how far it goes."""
     curves, deviations = [], {}
     for k, s in enumerate(results.scenarios):
@@ -291,11 +291,13 @@ def _curves(results: Results, expression: str, scale: float) -> tuple[list[Curve
         if seen is None:
             continue
         x, y = seen["time"].values, scale * seen.values
-        curves.append(Curve(s["title"], colour(k), x, y))
+        curves.append(ChartCurve(s["title"], colour(k), x, y))
         text = f"{np.abs(y - y[0]).max():.3g}"
         linear = _signal(results.linear.get(s["name"]), expression)
         if linear is not None:
-            curves.append(Curve(f"{s['title']}, linear", "#000", linear["time"].values, scale * linear.values, True))
+            curves.append(
+                ChartCurve(f"{s['title']}, linear", "#000", linear["time"].values, scale * linear.values, True)
+            )
             share = relative_difference(seen, linear)
             text += f" ({100 * share:.2g} %)" if np.isfinite(share) else ""
         deviations[s["name"]] = text

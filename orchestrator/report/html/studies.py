@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.report.html.charts import Curve, Mark, complex_plane, legend, line_chart
+from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
 
@@ -54,7 +54,7 @@ def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
         for s in names:
             for rank, (name, points) in enumerate(_named(shown, s, axis, quantity).items()):
                 label_of = title.get(s, s) if rank == 0 else f"{title.get(s, s)}: {name}"
-                curves.append(Curve(label_of, shades[s], *points, dashed=rank > 0))
+                curves.append(ChartCurve(label_of, shades[s], *points, dashed=rank > 0))
         if curves:
             picture, link = figures.add(
                 key + line_chart(f"{text} along {axis}", label, tick, curves, 260),
@@ -83,7 +83,7 @@ def _unstable(shown: xr.Dataset, axis: str, title: dict[str, str]) -> str:
 
 def _trajectories(
     shown: xr.Dataset, axis: str, shades: dict[str, str], title: dict[str, str]
-) -> tuple[list[Curve], list[Mark]]:
+) -> tuple[list[ChartCurve], list[Mark]]:
     lines, marks = [], []
     for s, shade in shades.items():
         one = shown.sel(scenario=s)
@@ -93,7 +93,7 @@ def _trajectories(
             if not there.any():
                 continue
             name = str(one["trajectory_name"].values[t])
-            lines.append(Curve(name, shade, real[there], hz[there]))
+            lines.append(ChartCurve(name, shade, real[there], hz[there]))
             for n, k in enumerate(np.flatnonzero(there).tolist()):
                 text = (
                     f"{name}, {title.get(s, s)}\n{axis} = {shown[axis].values[k]:.4g}\n"
@@ -127,7 +127,7 @@ def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> dict[s
     return found
 
 
-def _extremes(curves: list[Curve], unit: str) -> str:
+def _extremes(curves: list[ChartCurve], unit: str) -> str:
     said = [
         f"{escape(c.label)} from {number(float(c.y[0]), 2)} to {number(float(c.y[-1]), 2)}, "
         f"least {number(float(c.y.min()), 2)} at {c.x[np.argmin(c.y)]:.3g}"
@@ -146,7 +146,7 @@ def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: d
         shares = {state: _named(shown.assign(share=shown["participation"].sel(state=state)), s, axis, "share")
                   for state in states}  # fmt: skip
         for name in next(iter(shares.values())):
-            curves = [Curve(x, colour(k + 1), *shares[x][name]) for k, x in enumerate(states) if name in shares[x]]
+            curves = [ChartCurve(x, colour(k + 1), *shares[x][name]) for k, x in enumerate(states) if name in shares[x]]
             charts.append(f"<h3>{escape(title.get(s, s))}: {escape(name)}</h3>" + line_chart(
                 f"Participation along {axis}, {s}, {name}", label, "Participation", curves, 170))  # fmt: skip
     if not charts:
