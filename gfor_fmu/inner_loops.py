@@ -10,7 +10,21 @@ LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
 
 def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Phasor) -> Phasor:
-    """Declare both loops and return the voltage that the converter applies [pu, S_n]."""
+    """Declare both loops and return the voltage that the converter applies [pu, S_n].
+
+    Parameters
+    ----------
+    m
+        The converter's model.
+    f
+        The filter as it is declared.
+    omega_b
+        Base angular frequency [rad/s].
+    w
+        Frequency of the converter [pu, f_n].
+    u_ref
+        Reference of the voltage across the capacitor branch, converter's frame [pu, S_n].
+    """
     start = f.initial
     u_lagged, i_g_lagged = _feed_forwards(m, f)
     with m.scope("voltage_control"):

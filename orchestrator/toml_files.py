@@ -20,6 +20,8 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
 
     Parameters
     ----------
+    path
+        Of the file.
     subject
         The file in an error's words, such as "the binding".
     remedy

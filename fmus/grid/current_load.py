@@ -35,7 +35,19 @@ class CurrentLoad:
 
 
 def declare_current_load(m: ModelBuilder, load: Load, declared: DeclaredLoad, buses: dict[str, Bus]) -> CurrentLoad:
-    """Make a declared load one of constant current."""
+    """Make a declared load one of constant current.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    load
+        Where it is, and its name.
+    declared
+        The same load as a constant impedance, as `declare_load` returns it.
+    buses
+        By name; the correction is added to what is injected at the load's bus.
+    """
     bus = buses[load.bus]
     with m.scope(load.name):
         tau = m.parameter(

@@ -138,6 +138,19 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
     """An inductor whose state is its current at scale 1.
 
     ``scale`` times of it is drawn: a load that is switched off and on again comes back without a direct component.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    bus
+        What is drawn is taken from what is injected there.
+    name
+        Of the bus.
+    X
+        Reactance [pu, 100 MVA].
+    scale
+        So many times the state is drawn.
     """
     current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
     drawn = current * scale
@@ -148,7 +161,21 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
 def declare_load(
     m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool, inductor: Inductor = inductor_state
 ) -> DeclaredLoad:
-    """Declare a constant impedance; ``alone``: nothing else determines the voltage of its bus."""
+    """Declare a constant impedance.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    load
+        Its power and name; the power is the default of parameters.
+    buses
+        By name; that of the load is changed.
+    alone
+        Whether nothing else determines the voltage of its bus: then it cannot be switched off.
+    inductor
+        Declares the inductor of a load that draws reactive power.
+    """
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
     text = "Load step: factor on G and 1/X; 0 is switched off"
@@ -176,7 +203,19 @@ def declare_load(
 def declare_shunt(
     m: ModelBuilder, shunt: Shunt, buses: dict[str, Bus], *, inductor: Inductor = inductor_state
 ) -> list[Branch]:
-    """Declare an admittance to earth: conductance, and a capacitor or an inductor."""
+    """Declare an admittance to earth: conductance, and a capacitor or an inductor.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    shunt
+        Its powers at 1 pu and its name; the powers are the defaults of parameters.
+    buses
+        By name; that of the shunt is changed.
+    inductor
+        Declares the inductor of a shunt that draws reactive power.
+    """
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
         if shunt.g_mw:
@@ -207,7 +246,21 @@ def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
 def declare_network_outputs(
     m: ModelBuilder, network: Network, buses: dict[str, Bus], drawn: list[Phasor], fed: list[Phasor]
 ) -> None:
-    """Declare all voltages, what every line draws from its from bus, and what every device feeds."""
+    """Declare all voltages, what every line draws from its from bus, and what every device feeds.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    network
+        Its lines and ports.
+    buses
+        By name, with their voltages.
+    drawn
+        What every line draws from its from bus, in the order of the lines: network frame [pu, 100 MVA].
+    fed
+        What every device feeds, in the order of the ports: network frame [pu, 100 MVA].
+    """
     for name, bus in buses.items():
         with m.scope(name):
             m.output("v_re", bus.v.re, "pu", "Bus voltage, real part, network frame", base="bus")
@@ -222,7 +275,19 @@ def declare_network_outputs(
 
 
 def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: ca.SX) -> None:
-    """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ."""
+    """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    branch
+        With its current as a state.
+    buses
+        By name, with their voltages.
+    omega_b
+        Base angular frequency [rad/s].
+    """
     over = buses[branch.from_bus].v
     if branch.ratio is not None:
         over = over / branch.ratio
@@ -239,7 +304,21 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
 
 
 def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
-    """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage."""
+    """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage.
+
+    Parameters
+    ----------
+    m
+        The grid's model.
+    name
+        Scope of both outputs.
+    v
+        Voltage [pu].
+    current
+        In the same frame [pu, 100 MVA].
+    active, reactive
+        Descriptions of the two outputs.
+    """
     s = power(v, current)
     with m.scope(name):
         m.output("p", s.re, "pu", active, base=SYSTEM_BASE)

@@ -7,7 +7,17 @@ Admittances = dict[str, dict[str, Phasor]]
 
 
 def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None:
-    """Add to one element."""
+    """Add to one element.
+
+    Parameters
+    ----------
+    Y
+        It is changed in place.
+    row, column
+        Names of buses; the row is there already.
+    value
+        In the unit of the others.
+    """
     Y[row][column] = Y[row].get(column, ZERO) + value
 
 

@@ -60,7 +60,21 @@ def _generator(name: str, exciter: Exciter, data: MachineData, governor: Governo
 
 
 def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_fd: ca.SX, P_m: ca.SX) -> None:
-    """Declare what a generator shows beside its port."""
+    """Declare what a generator shows beside its port.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    machine
+        Gives speed, angle and torque.
+    v_t
+        Voltage magnitude at the terminal [pu, S_n].
+    E_fd
+        Field voltage; 1 pu gives 1 pu of voltage on open circuit.
+    P_m
+        Mechanical power [pu, S_n].
+    """
     m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
     m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
     m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")

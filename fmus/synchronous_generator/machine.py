@@ -127,7 +127,19 @@ class Machine:
 
 
 def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
-    """Declare a flux linkage as a state [pu, S_n]."""
+    """Declare a flux linkage as a state [pu, S_n].
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name
+        Of the state.
+    start
+        Its initial value [pu, S_n].
+    text
+        Its description.
+    """
     return m.state(name, start, "pu", text, base="S_n")
 
 
@@ -136,7 +148,16 @@ def declare_machine(
 ) -> Machine:
     """Declare the machine's parameters and states; the power flow gives the operating point.
 
-    ``stator_flux`` declares ψ̃_d and ψ̃_q: as states, or as what a model without stator transients closes.
+    Parameters
+    ----------
+    m
+        The generator's model.
+    port
+        Gives the operating point.
+    data
+        Defaults of the parameters.
+    stator_flux
+        Declares ψ̃_d and ψ̃_q: as states, or as what a model without stator transients closes.
     """
     with m.scope("transformer"):
         R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
@@ -157,7 +178,21 @@ def declare_machine(
 
 
 def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
-    """Give the derivatives of fluxes, speed and angle."""
+    """Give the derivatives of fluxes, speed and angle.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    g
+        The machine as it is declared, its stator fluxes as states.
+    port
+        Gives the bus voltage.
+    E_fd
+        Field voltage; 1 pu gives 1 pu of voltage on open circuit.
+    P_m
+        Mechanical power [pu, S_n].
+    """
     psi_q, psi_d = _flux_rates(g, port, E_fd)[:2]
     m.derivative(g.q.psi, psi_q)
     m.derivative(g.d.psi, psi_d)
@@ -165,7 +200,15 @@ def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX
 
 
 def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
-    """Give the derivatives of the rotor's fluxes, speed and angle."""
+    """Give the derivatives of the rotor's fluxes, speed and angle.
+
+    Parameters
+    ----------
+    m, port, E_fd, P_m
+        As `machine_equations`.
+    g
+        The machine as it is declared.
+    """
     rates = _rotor_flux_rates(g, port, E_fd)
     for psi, rate in zip((g.d.psi_1, g.d.psi_2, g.q.psi_1, g.q.psi_2), rates, strict=True):
         m.derivative(psi, rate)

@@ -15,21 +15,57 @@ BYPASS_TIME = 0.01
 
 
 def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
-    """s·T_W/(1 + s·T_W); its output is 0 in steady state."""
+    """s·T_W/(1 + s·T_W); its output is 0 in steady state.
+
+    Parameters
+    ----------
+    m
+        The model.
+    name
+        Of the state.
+    u
+        What goes in.
+    T_W
+        Time constant [s].
+    initial
+        Of u, in steady state.
+    """
     x = m.state(name, initial, "pu", "washout, slow part of the signal", base="S_n")
     m.derivative(x, (u - x) / T_W)
     return u - x
 
 
 def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
-    """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly."""
+    """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly.
+
+    Parameters
+    ----------
+    m
+        The model.
+    name
+        Of the state.
+    u
+        What goes in.
+    T
+        Time constant [s].
+    initial
+        Of u, in steady state.
+    """
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     m.derivative(x, (u - x) / T)
     return x
 
 
 def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
-    """1/(1 + s·T); passed through where T = 0."""
+    """1/(1 + s·T); passed through where T = 0.
+
+    Parameters
+    ----------
+    m, name, u, initial
+        As `low_pass`.
+    T
+        Time constant [s], 0 or more.
+    """
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     left_out = _is_zero(T)
     m.derivative(x, (u - x) / ca.if_else(left_out, BYPASS_TIME, T))
@@ -37,7 +73,15 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial
 
 
 def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
-    """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0."""
+    """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
+
+    Parameters
+    ----------
+    m, name, u, initial
+        As `low_pass`.
+    T_lead, T_lag
+        Time constants [s], 0 or more.
+    """
     x = m.state(name, initial, "pu", "lead/lag", base="S_n")
     left_out = _is_zero(T_lag)
     T = ca.if_else(left_out, BYPASS_TIME, T_lag)
@@ -46,7 +90,23 @@ def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar
 
 
 def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar) -> ca.SX:
-    """K_P + K_I/s; ``initial`` is the steady-state output, carried by the integrator."""
+    """K_P + K_I/s.
+
+    Parameters
+    ----------
+    m
+        The model.
+    name
+        Of the state, the integrator's output.
+    error
+        What goes in; 0 in steady state.
+    K_P
+        Proportional gain.
+    K_I
+        Integral gain [1/s, times the unit of K_P].
+    initial
+        Of the output, in steady state; the integrator carries it.
+    """
     x = m.state(name, initial, "pu", "integrator", base="S_n")
     m.derivative(x, K_I * error)
     return K_P * error + x

@@ -18,6 +18,8 @@ def model_description(model: Model, guid: str, identifier: str, tool: str, *, na
 
     Parameters
     ----------
+    model
+        What the FMU computes.
     guid, identifier
         As in the standard; the identifier also names the binaries.
     tool

@@ -123,7 +123,19 @@ class QdState:
 
 
 def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> QdState:
-    """Declare ``name_q`` and ``name_d`` [pu, S_n]."""
+    """Declare ``name_q`` and ``name_d`` [pu, S_n].
+
+    Parameters
+    ----------
+    m
+        The model.
+    name
+        Of both states, before ``_q`` and ``_d``.
+    initial
+        An expression of parameters [pu, S_n].
+    description
+        Of both states; each adds which component it is.
+    """
     q = m.state(f"{name}_q", initial.re, "pu", f"{description}, q component", base="S_n")
     d = m.state(f"{name}_d", -initial.im, "pu", f"{description}, d component", base="S_n")
     return QdState(q, d)

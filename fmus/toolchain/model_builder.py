@@ -102,7 +102,29 @@ class ModelBuilder:
         type: VariableType = "Real",
         source: str = "",
     ) -> ca.SX:
-        """Declare a parameter; ``start`` is its default."""
+        """Declare a parameter.
+
+        Parameters
+        ----------
+        name
+            Without the scope.
+        start
+            Its default.
+        unit
+            One of `UNITS`.
+        description
+            One sentence.
+        base
+            What 1 pu is, such as ``"S_n"``; required where the unit is ``pu``.
+        minimum, maximum
+            Bounds; None where there is none.
+        tunable
+            Whether it can be set at any communication point, not only before initialisation.
+        type
+            In the equations an Integer or a Boolean is a number as well.
+        source
+            Where the default comes from; empty where that is not said.
+        """
         return self._declare(
             Parameter(
                 self._full(name),
@@ -119,25 +141,58 @@ class ModelBuilder:
         )
 
     def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
-        """Declare a Boolean parameter; in the equations it is 0 or 1."""
+        """Declare a Boolean parameter; in the equations it is 0 or 1.
+
+        Parameters
+        ----------
+        name, description, tunable
+            As `parameter`.
+        start
+            Its default.
+        """
         return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
 
     def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
-        """Declare a quantity computed at initialisation from fixed parameters."""
+        """Declare a quantity computed at initialisation from fixed parameters.
+
+        Parameters
+        ----------
+        name, unit, description, base
+            As `parameter`.
+        value
+            An expression of fixed parameters.
+        """
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
         return self._declare(CalculatedParameter(full, unit, description, base))
 
     def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
-        """Declare an input."""
+        """Declare an input.
+
+        Parameters
+        ----------
+        name, unit, description, base
+            As `parameter`.
+        start
+            Its value until it is set.
+        """
         return self._declare(Input(self._full(name), unit, description, base, start))
 
     def state(
         self, name: str, initial: Scalar, unit: str, description: str, base: str = "", *, stepwise: bool = False
     ) -> ca.SX:
-        """Declare a continuous state with its initial value, an expression of parameters.
+        """Declare a continuous state.
 
-        ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end.
+        Parameters
+        ----------
+        name, description, base
+            As `parameter`.
+        initial
+            Its initial value, an expression of parameters.
+        unit
+            One of `UNITS`; the same per second must be one of them too.
+        stepwise
+            Whether it is held during a communication step, as inputs are, and moves by rate × step size at its end.
         """
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
@@ -155,7 +210,15 @@ class ModelBuilder:
         self._derivatives[state.name()] = ca.SX(rate)
 
     def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
-        """Declare an output as a function of states, inputs and parameters."""
+        """Declare an output as a function of states, inputs and parameters.
+
+        Parameters
+        ----------
+        name, unit, description, base
+            As `parameter`.
+        value
+            An expression of states, inputs and parameters.
+        """
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
         self._declare(Output(full, unit, description, base))

@@ -44,6 +44,8 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
 
     Parameters
     ----------
+    m
+        The device's model.
     emf, start
         In the device's frame [pu], a function of states; and its value at the operating point.
     angle, rate
@@ -86,7 +88,17 @@ def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, im
     """Declare the port's outputs: current and powers as every device has them, emf and admittance.
 
     Current and powers are read after a step, with the voltage that was held in it: they are those of its middle.
-    ``impedance`` lies between emf and bus [pu, S_n], an expression of fixed parameters.
+
+    Parameters
+    ----------
+    m
+        The device's model.
+    port
+        Of the device.
+    emf
+        In the network frame [pu], as `source_emf` returns it.
+    impedance
+        Between emf and bus [pu, S_n], an expression of fixed parameters.
     """
     with m.scope("source"):
         R = m.calculated("R", impedance.re, "pu", "Resistance between emf and bus", base="S_n")

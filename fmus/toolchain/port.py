@@ -63,7 +63,19 @@ def declare_rating(m: ModelBuilder, S_n: float) -> ca.SX:
 
 
 def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> DevicePort:
-    """Declare the power-flow start values of a device at a bus voltage, network frame [pu]."""
+    """Declare the power-flow start values of a device at a bus voltage.
+
+    Parameters
+    ----------
+    m
+        The device's model.
+    v
+        Bus voltage, network frame [pu].
+    P_0
+        Default of the active power into the bus [pu, S_n].
+    current_scale
+        Device current [pu, S_n] times this is the current in the port's unit.
+    """
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)

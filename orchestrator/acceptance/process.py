@@ -121,7 +121,17 @@ class FmuProcess:
     # -- questions and answers -------------------------------------------------------------------
 
     def talk(self, call: str, instance: int, command: str, *arguments: Any) -> Any:
-        """Have something done that needs more than numbers."""
+        """Have something done that needs more than numbers.
+
+        Parameters
+        ----------
+        call
+            Name of what is asked, for the error where the process ends meanwhile.
+        instance
+            Its number in the process; −1 where no instance is meant.
+        command, arguments
+            What the worker does, and with what: plain values for JSON.
+        """
         if self._ended is not None:
             raise self._ended
         self.box.clear_log()
@@ -152,10 +162,18 @@ class FmuProcess:
 
         Parameters
         ----------
+        instance
+            Its number in the process.
         into, out
             Value references that are set before a step, and read after it.
         rows
             Their values, shape (n, len(into)): one row a step, and none for the steps after the last row.
+        steps
+            How many; with 0 the first row is set and one row read, without a step.
+        time
+            At which the first step starts [s].
+        step_size
+            Communication step [s].
 
         Returns
         -------
@@ -322,6 +340,19 @@ class HostedComponent(Derived):
 
     def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
+
+        Parameters
+        ----------
+        into, out
+            Variables that are set before a step, and read after it.
+        rows
+            Values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
+        steps
+            How many; with 0 the first row is set and one row read, without a step.
+        time
+            At which the first step starts [s].
+        step_size
+            Communication step [s].
 
         Raises
         ------

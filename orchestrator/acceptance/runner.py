@@ -131,10 +131,16 @@ def check_fmu(
 
     Parameters
     ----------
-    run_for
-        Wall-clock time for which it is made to run [s].
+    fmu
+        Its file.
+    binding
+        File of the binding; None where there is none.
+    limits
+        What the FMU may take; the usual limits where None.
     only
         Names of checks; all of them where empty.
+    run_for
+        Wall-clock time for which it is made to run [s].
     use
         Step, operating point and values with which it is used; what the file declares where None.
 

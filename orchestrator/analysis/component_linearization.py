@@ -109,6 +109,12 @@ def linearize_component(
 
     Parameters
     ----------
+    exchange
+        The component, at its operating point, with its connected inputs and outputs.
+    time
+        Of the operating point [s].
+    step_size
+        Communication step to linearise over [s].
     inputs, observed
         Tunable parameters or open inputs, and outputs, that matter beside the connected ones.
     derivatives
@@ -162,6 +168,8 @@ def linearize_by_derivatives(
 
     Parameters
     ----------
+    exchange, time, step_size
+        As `linearize_component`.
     inputs, observed
         As `linearize_component`.
 

@@ -66,6 +66,8 @@ def follow_along(start: Eigenpair, model_at: Callable[[float], LinearModel], beg
         The mode at ``begin``.
     model_at
         The linear model at any point of the path.
+    begin, end
+        Ends of the path; the end may be the smaller one.
 
     Raises
     ------

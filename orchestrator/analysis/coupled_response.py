@@ -87,6 +87,12 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
     ----------
     master
         At the operating point that the model is of; it is left as it was.
+    blocks
+        The linearised components.
+    model
+        The step map composed of the blocks.
+    stability
+        The verdict on that model.
     """
     if not stability.stable:
         return stability

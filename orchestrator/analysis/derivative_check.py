@@ -34,6 +34,10 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
         Lets its states be set, and saves and restores its state.
     given
         Shape (unknowns, knowns).
+    unknowns
+        Variables that are derived, one a row: rates and outputs.
+    knowns
+        Variables by which they are derived, one a column: states and inputs.
 
     Raises
     ------

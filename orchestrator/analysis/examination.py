@@ -41,6 +41,8 @@ def examine(
     ----------
     master
         At the operating point at which the blocks were linearised; it is left as it was.
+    blocks
+        The linearised components.
     model, system
         The step map composed of the blocks, and the continuous model; None where a component gives no derivatives.
     spectrum

@@ -60,7 +60,19 @@ class LinearModel:
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
-        """The model of one matrix, with no outputs under way."""
+        """The model of one matrix, with no outputs under way.
+
+        Parameters
+        ----------
+        A
+            Shape (n, n); in 1/s for a continuous model.
+        names
+            Of the states, length n.
+        step_size
+            Communication step [s]; None for a continuous model.
+        disagreement
+            As the class has it.
+        """
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
         return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)

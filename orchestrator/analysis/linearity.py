@@ -74,6 +74,10 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
 
     Parameters
     ----------
+    blocks
+        The linearised components.
+    schedule
+        The order in which the components are stepped and exchange values.
     model
         The step map composed of the blocks.
     modes

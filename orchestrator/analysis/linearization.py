@@ -153,6 +153,12 @@ def linearize_within(
 
     Parameters
     ----------
+    master
+        At the operating point; it is left as it was.
+    name
+        Of the component.
+    step_size
+        Communication step to linearise over [s].
     inputs, observed, derivatives
         As `linearize_component`.
     without_step, directional

@@ -231,7 +231,19 @@ def to_continuous(
 def make_mode(
     value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]
 ) -> Mode:
-    """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,)."""
+    """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
+
+    Parameters
+    ----------
+    value
+        λ [rad/s].
+    left
+        Eigenvector of Aᴴ, shape (n,), of any length and angle.
+    right
+        Eigenvector of A, shape (n,), of any length and angle.
+    names
+        Of the states, length n.
+    """
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()
     order = np.argsort(-factors)

@@ -136,8 +136,14 @@ def check_response(component: Component, model: ContinuousModel, what: str, time
     ----------
     component
         At the model's operating point; it can save and restore its state.
+    model
+        States, inputs and outputs have the names of the FMU's variables.
     what
         What the model is, for the error: ``the linear model inside its FMU``.
+    time
+        Of the operating point [s].
+    step_size
+        Communication step [s].
 
     Raises
     ------

@@ -106,7 +106,25 @@ def design_controller(
     parameters: Sequence[ParameterFile],
     wanted: Wanted,
 ) -> ControllerDesign:
-    """Design a controller; the parameters are those of `Case.design`."""
+    """Design a controller, as `Case.design` offers it.
+
+    Parameters
+    ----------
+    file
+        The case.
+    controller
+        ``pod_p`` or ``pod_q``.
+    scenario
+        Its name; where None, the one in which all PODs are there and off.
+    values
+        Values by ``component.variable``; they go before the parameter files.
+    step_size
+        Communication step [s]; the case's where None.
+    parameters
+        Parameter files.
+    wanted
+        As `Case.design`; a name that it does not have is refused.
+    """
     if controller not in CONTROLLERS:
         raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
     unknown = [name for name in wanted if name not in Wanted.__annotations__]

@@ -234,7 +234,20 @@ def choose(
     stop: Time | None = None,
     parameters: Iterable[str | Path] = (),
 ) -> list[Scenario]:
-    """Scenarios of a case; the parameters are those of `Case.choose`.
+    """Scenarios of a case, as `Case.choose` offers them.
+
+    Parameters
+    ----------
+    file
+        The case.
+    names
+        Of the scenarios; all of them where empty.
+    values
+        Values by ``component.variable``; they go before the parameter files.
+    step, stop
+        Communication step, and time at which runs end [s]; the case's where None.
+    parameters
+        Paths of parameter files.
 
     Raises
     ------

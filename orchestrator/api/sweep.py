@@ -117,7 +117,29 @@ def sweep_parameters(
     *,
     progress: bool,
 ) -> ParameterSweep:
-    """Plan and compute a sweep; the parameters are those of `Case.sweep`."""
+    """Plan and compute a sweep, as `Case.sweep` offers it.
+
+    Parameters
+    ----------
+    file
+        The case.
+    vary
+        Values by ``component.parameter``, or texts as with ``--vary``.
+    scenarios
+        Names; all of them where empty.
+    values
+        Values by ``component.variable`` that hold at every point.
+    step_size
+        Communication step [s]; the case's where None.
+    frequencies
+        Modes from the first to the second are followed [Hz].
+    workers
+        Processes to compute in, at least 1.
+    folder
+        Keeps the points; they are forgotten where None.
+    progress
+        Show a bar.
+    """
     if workers < 1:
         raise InputError(f"workers = {workers}; it must be a whole number of at least 1")
     plan = plan_sweep(file, _varied(vary), scenarios, values, step_size, frequencies)

@@ -93,7 +93,19 @@ class Bases:
         return self.voltage
 
     def voltage_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
-        """Number of the FMU's units in 1 pu of voltage."""
+        """Number of the FMU's units in 1 pu of voltage.
+
+        Parameters
+        ----------
+        unit
+            Of the variable: pu, or a unit of voltage.
+        base
+            What 1 pu is, such as ``"220 kV"``; V_n where None. Only pu has one.
+        value
+            Which value of the voltage it is, such as ``"phase peak"``; only pu needs none.
+        name
+            Of the variable, for errors.
+        """
         if unit == PER_UNIT:
             if base in (None, "V_n"):
                 return 1.0
@@ -103,7 +115,19 @@ class Bases:
         return self._v_n(f"a voltage in {unit}") * _VALUES[value] * factor("kV", unit, name)
 
     def current_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
-        """Number of the FMU's units in 1 pu of current on the rating."""
+        """Number of the FMU's units in 1 pu of current on the rating.
+
+        Parameters
+        ----------
+        unit
+            Of the variable: pu, or a unit of current.
+        base
+            Power that belongs to 1 pu, such as ``"100 MVA"``; S_n where None. Only pu has one.
+        value
+            ``"rms"`` or ``"peak"``; only pu needs none.
+        name
+            Of the variable, for errors.
+        """
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)
         peak = {"rms": 1.0, "phase rms": 1.0, "peak": sqrt(2), "phase peak": sqrt(2)}

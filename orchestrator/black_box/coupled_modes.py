@@ -92,6 +92,8 @@ def linearize_with_box(
         Initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
     component
         The box; only inputs are set and outputs read.
+    excitation
+        The signals that the box is given; the usual ones where None.
     restore
         Whether the box's state may be saved and restored; None for: if its FMU can.
 
@@ -123,7 +125,14 @@ def modes_with_boxes(
     critical: float | None = None,
     excitation: Excitation | None = None,
 ) -> ModesResult:
-    """As `modes_of`, but what hides its states is identified; nothing is, where all components show theirs.
+    """Modes as `modes_of` finds them, but what hides its states is identified; nothing is, where all show theirs.
+
+    Parameters
+    ----------
+    prepared, master, frequency_range, critical
+        As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
+    excitation
+        As `linearize_with_box`.
 
     Raises
     ------

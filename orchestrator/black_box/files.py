@@ -20,7 +20,19 @@ from orchestrator.results.storage import save_table
 def save_identification(
     response: FrequencyResponse, model: IdentifiedModel, passive: Passivity, folder: Path
 ) -> list[Path]:
-    """Write ``admittance.csv``, ``identified_model.mat``, ``identification.json`` and ``admittance.png``."""
+    """Write ``admittance.csv``, ``identified_model.mat``, ``identification.json`` and ``admittance.png``.
+
+    Parameters
+    ----------
+    response
+        As it was measured.
+    model
+        As it was fitted.
+    passive
+        Passivity of the response.
+    folder
+        Where the files go; it is made where it is missing.
+    """
     names = ("admittance.csv", "identified_model.mat", "identification.json", "admittance.png")
     table, matrices, summary, picture = (folder / name for name in names)
     save_table(_rows(response, passive), table)

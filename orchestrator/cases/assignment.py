@@ -25,7 +25,19 @@ def assign_values(draft: Draft) -> None:
 
 
 def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:
-    """The value in the variable's unit and type; None where it does not fit, which is noted."""
+    """The value in the variable's unit and type; None where it does not fit, which is noted.
+
+    Parameters
+    ----------
+    draft
+        Takes the note.
+    info
+        The variable.
+    value
+        A number in the variable's unit, a truth value, or text with a unit.
+    where
+        Its place in the case file, for the note.
+    """
     try:
         return convert(info, value)
     except ValueError as error:

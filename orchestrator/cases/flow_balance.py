@@ -125,7 +125,21 @@ def widest_angle(
     injected: Mapping[str, float],
     slack_bus: str,
 ) -> str:
-    """A sentence that names the branch with the largest angle in the DC solution; ``injected`` in pu of 100 MVA."""
+    """A sentence that names the branch with the largest angle in the DC solution.
+
+    Parameters
+    ----------
+    buses
+        Names.
+    lines
+        Those that are open are left out.
+    loads
+        Of them the active power counts.
+    injected
+        Active power that units feed, by bus [pu, 100 MVA]; 0 where a bus is missing.
+    slack_bus
+        The bus with angle 0, which feeds what is left.
+    """
     closed = [line for line in lines if line.closed]
     position = {bus: k for k, bus in enumerate(buses)}
     power = np.array([injected.get(bus, 0.0) for bus in buses])

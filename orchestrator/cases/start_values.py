@@ -25,6 +25,8 @@ def start_from_power_flow(
     ----------
     system
         Its plans for the grid and the units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
+    network
+        Buses, lines and loads.
     grid
         The component that is the network.
     units

@@ -18,8 +18,12 @@ def use_in_case(
 
     Parameters
     ----------
+    case
+        Name of a case, or path of its file.
     component
         Its name; the one component that is that file where None.
+    fmu
+        The file.
     step_size
         Communication step [s]; the case's where None.
     scenario

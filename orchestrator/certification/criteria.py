@@ -174,6 +174,8 @@ def stability_fault(
 
     Parameters
     ----------
+    growth_with, growth_without
+        Largest real part of all eigenvalues with the converter and without it [1/s].
     with_converter, without
         The verdicts over the whole spectrum, as `Stability.as_json` has them.
     """

@@ -208,7 +208,19 @@ def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeV
 
 
 def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -> TimeVerdict:
-    """Both ways of the time-domain criterion on a recorded signal."""
+    """Both ways of the time-domain criterion on a recorded signal.
+
+    Parameters
+    ----------
+    times
+        [s], shape (n,).
+    y
+        The signal, shape (n,).
+    signal
+        Its name.
+    event_time
+        When the system was disturbed [s].
+    """
     y = slow_part(times, y)
     return TimeVerdict(
         signal,

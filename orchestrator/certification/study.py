@@ -141,6 +141,10 @@ def certify(
 
     Parameters
     ----------
+    request
+        What is to be certified, and how.
+    executor
+        Where the points are computed.
     folder
         Takes the study's case file, the FMU and its binding, and every point as soon as it is there: those that are
         there already are not computed again.

@@ -171,7 +171,21 @@ def verify_points(
     executor: Executor,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Verification:
-    """Compute points anew, with and without the converter, and compare them with what was certified."""
+    """Compute points anew, with and without the converter, and compare them with what was certified.
+
+    Parameters
+    ----------
+    folder
+        Of the certificate.
+    content
+        What the certificate's JSON file says.
+    points
+        Those of its points that are to be computed.
+    executor
+        Where they are computed.
+    report
+        Is told how many computations are done, of how many: two for each point.
+    """
     found = Verification()
     case = load_case(folder / CASE)
     place, mark = reference_to(case), fingerprint(case)

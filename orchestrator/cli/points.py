@@ -24,8 +24,12 @@ def compute_points(
     ----------
     study
         Computes all points; it is given a callback for how many are done, of how many.
+    executor
+        Where the points are computed.
     folder
         Keeps the points.
+    console
+        Shows the progress.
 
     Returns
     -------

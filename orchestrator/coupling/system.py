@@ -69,10 +69,18 @@ class System:
         *,
         isolated: bool | None = None,
     ) -> None:
-        """Add a component; ``inputs`` are constants for inputs that nothing feeds.
+        """Add a component.
 
         Parameters
         ----------
+        name
+            By which connections and signals mean it.
+        description
+            Of its FMU.
+        parameters
+            Values that are set before initialisation, by variable.
+        inputs
+            Constants for inputs that nothing feeds, by variable.
         isolated
             Whether it runs in a process of its own; by default all but our own FMUs do.
 

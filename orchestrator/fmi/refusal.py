@@ -27,8 +27,12 @@ def refusal(component: Component, said_by: Said, status: int, call: str, time: f
 
     Parameters
     ----------
+    component
+        The one that was called.
     said_by
         The FMU's log since the call.
+    status
+        The call's, as FMI 2.0 numbers them.
     call
         By its name in FMI 2.0; the error has the name in the FMU's own version.
     time

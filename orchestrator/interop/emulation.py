@@ -50,6 +50,10 @@ def emulate(
 
     Parameters
     ----------
+    system
+        Its components start with the values that they are given there.
+    rules
+        The other master's.
     step_size, stop_time
         [s]
     record
@@ -60,6 +64,8 @@ def emulate(
         They happen before the step that starts at their time, as with our own schedules; most masters have none.
     order
         In which the components step, for a master that takes them in turn; by default the system's own.
+    observers
+        Look at the run beside the recorder.
 
     Raises
     ------

@@ -53,6 +53,8 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
 
     Parameters
     ----------
+    loop
+        The running system with the controller to be set.
     off
         The target with the controller off.
     nominal

@@ -115,6 +115,8 @@ def refine(
 
     Parameters
     ----------
+    loop
+        The running system with the controller to be set.
     off
         The target with the controller off.
     filters
@@ -167,6 +169,18 @@ def sweep(
 
     Parameters
     ----------
+    loop
+        The running system with the controller to be set.
+    off
+        The target with the controller off, from which it is followed.
+    filters
+        The lead/lag, the same at every gain.
+    required
+        Damping ratio of the target.
+    bounds
+        Of the gain [pu of the converter's rating].
+    why
+        Where the lead/lag comes from, for people.
     special
         A gain in the bounds that is looked at in any case [pu].
     """

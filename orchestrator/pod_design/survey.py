@@ -59,6 +59,8 @@ def survey(
 
     Parameters
     ----------
+    loop
+        The running system with the controller to be set.
     initial, others
         The target and the other modes without the controller [rad/s].
     stages

@@ -44,6 +44,23 @@ def find_target(
 ) -> Target:
     """The scenario that was asked for, else the one in which all PODs are there and off; and its components.
 
+    Parameters
+    ----------
+    case
+        In which it is designed.
+    controller
+        ``pod_p`` or ``pod_q``.
+    scenario
+        Its name; where None, the one in which all PODs are there and off.
+    pattern
+        Name or pattern of the components, such as ``gfor*``; all with the controller where None.
+    stages
+        N_S of the lead/lag; that of the components where None.
+    overrides
+        Values by ``component.variable``.
+    parameters
+        Parameter files; ``overrides`` go before them.
+
     Raises
     ------
     InputError
@@ -97,6 +114,19 @@ def check_range(
     plan: Mapping[str, ComponentPlan], components: Sequence[str], variable: str, value: float, option: str
 ) -> None:
     """A value must be one that every component's FMU takes.
+
+    Parameters
+    ----------
+    plan
+        Components of the scenario, by name.
+    components
+        Names of those that are looked at.
+    variable
+        Without the component.
+    value
+        In the variable's own unit.
+    option
+        Of the command line; the error begins with it.
 
     Raises
     ------

@@ -62,6 +62,14 @@ def kept_or_computed(
         Of the points.
     compute
         The point of a task; it may run in another process.
+    tasks
+        One for each point.
+    executor
+        Where the points are computed that are not stored yet.
+    store
+        Has the points of earlier starts, and takes new ones that are worth keeping.
+    report
+        Is told how many points are done, of how many.
     """
     missing: list[int] = []
     for index, task in enumerate(tasks):

@@ -47,7 +47,19 @@ def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
 
 
 def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> None:
-    """Define the units that a file uses; nothing where it uses none."""
+    """Define the units that a file uses; nothing where it uses none.
+
+    Parameters
+    ----------
+    parent
+        Takes the group of units as its last element.
+    name
+        Of that group, with its namespace.
+    used
+        Units, each once.
+    known
+        Attributes of ``BaseUnit`` by unit; a unit that is missing gets none.
+    """
     units = [(unit, known.get(unit, {})) for unit in used]
     if units:
         group = SubElement(parent, name)

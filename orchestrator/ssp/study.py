@@ -47,7 +47,21 @@ class SspStudy:
 def study_of(
     scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
 ) -> SspStudy:
-    """The study of a scenario; its events come down to the variables that they set."""
+    """The study of a scenario; its events come down to the variables that they set.
+
+    Parameters
+    ----------
+    scenario, title
+        Its name, and its name for people.
+    step_size
+        Communication step [s].
+    schedule
+        The order in which the components are stepped.
+    events
+        Their order is kept.
+    tables
+        Tables of the case file that only this project knows.
+    """
     settings = tuple(
         (event.time, component, variable, value)
         for event in events

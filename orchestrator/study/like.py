@@ -22,6 +22,15 @@ def run_like(
 
     The operating point is not improved before and no modes are computed: another master does neither.
 
+    Parameters
+    ----------
+    prepared
+        The scenario; its own schedule is not used.
+    rules
+        The other master's.
+    order, observers
+        As `emulate`.
+
     Raises
     ------
     InputError, ComponentError

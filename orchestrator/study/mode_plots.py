@@ -145,7 +145,19 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
 
 
 def draw_mode_shape(axis: Any, result: ModesResult, name: str, shade: str) -> None:
-    """Arrows of the states that swing in a named mode, on polar Matplotlib Axes."""
+    """Arrows of the states that swing in a named mode, on polar Matplotlib Axes.
+
+    Parameters
+    ----------
+    axis
+        Polar Matplotlib Axes.
+    result
+        The modes of a scenario.
+    name
+        Of the mode; no arrow is drawn where the scenario has none of that name.
+    shade
+        Colour of the arrows.
+    """
     axis.set_ylim(0, 1.08)
     axis.spines["polar"].set_visible(False)
     axis.set_yticks([0.5, 1.0], [])

@@ -112,6 +112,8 @@ def compute_modes(
 
     Parameters
     ----------
+    prepared
+        The scenario.
     frequency_range
         [Hz]
     critical

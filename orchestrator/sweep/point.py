@@ -119,6 +119,10 @@ def make_task(
         The scenario without what is varied: its FMUs and values go into the key.
     fixed, varied
         Overrides; the varied ones go first.
+    step_size
+        Communication step [s]; the case's where None.
+    frequency_range
+        Modes of these frequencies are kept [Hz].
     """
     overrides = {**fixed, **varied}
     content = {

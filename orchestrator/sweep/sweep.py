@@ -144,6 +144,21 @@ def plan_sweep(
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs.
 
+    Parameters
+    ----------
+    case
+        The file that is swept.
+    vary
+        What is varied, one for each axis; modes are followed along the last one.
+    scenarios
+        Names; all of them where empty.
+    overrides
+        Values by ``component.variable`` that hold at every point.
+    step_size
+        Communication step [s]; the case's where None.
+    frequency_range
+        Modes of these frequencies are followed [Hz].
+
     Raises
     ------
     InputError
@@ -180,6 +195,8 @@ def run_sweep(
 
     Parameters
     ----------
+    plan
+        What is computed, as `plan_sweep` found it to be in order.
     executor
         Where the points are computed.
     store

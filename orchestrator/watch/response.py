@@ -102,6 +102,12 @@ def unsettled_response(seen: Seen, system: System, stretch: Stretch, units: Sequ
 
     Parameters
     ----------
+    seen
+        What was seen of the run.
+    system
+        What ran.
+    stretch
+        The part of the run that is looked at.
     units
         Components that feed the grid: they are named rather than the grid where both swing.
     """

@@ -67,6 +67,14 @@ def run_away(
 
     Parameters
     ----------
+    seen
+        What was seen of the run.
+    system
+        What ran.
+    settings
+        The parameters' values over the run.
+    stretches
+        The parts of the run between its events.
     slipped
         Whether units lost synchronism: then a speed counts as outside of its band only at the end.
     """

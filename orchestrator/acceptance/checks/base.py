@@ -123,12 +123,36 @@ def passed(name: str, evidence: str, **figures: Any) -> CheckResult:
 
 
 def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResult:
-    """A check that found something to ask about, which is no fault."""
+    """A check that found something to ask about, which is no fault.
+
+    Parameters
+    ----------
+    name
+        Of the check.
+    evidence
+        What was seen.
+    remedy
+        What to ask for or to do.
+    figures
+        What was measured, for the report: plain values by name.
+    """
     return CheckResult(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
 
 
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
-    """A check that found a fault of the FMU."""
+    """A check that found a fault of the FMU.
+
+    Parameters
+    ----------
+    name
+        Of the check.
+    fault
+        A key of `REMEDIES`, which has the remedy for it.
+    evidence
+        What was seen.
+    figures
+        What was measured, for the report: plain values by name.
+    """
     return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 
 

@@ -200,7 +200,19 @@ class Subject:
         return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
-        """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs)."""
+        """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs).
+
+        Parameters
+        ----------
+        steps
+            How many communication steps.
+        step_size
+            Their length [s].
+        stimulus
+            Gives the deviations of the inputs from where they start, at a time [s].
+        options
+            As `running`.
+        """
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
 

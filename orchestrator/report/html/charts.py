@@ -90,7 +90,19 @@ class Frame:
 
 
 def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
-    """Curves over one axis; the pointer shows all values at its x."""
+    """Curves over one axis; the pointer shows all values at its x.
+
+    Parameters
+    ----------
+    name
+        What a screen reader reads out.
+    x_label, y_label
+        Of the axes, with their units.
+    curves
+        At least one, with a point at least.
+    height
+        Of the picture [px].
+    """
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)
@@ -114,7 +126,19 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
 def complex_plane(
     name: str, marks: Sequence[Mark], trajectories: Sequence[ChartCurve] = (), highest_hz: float | None = None
 ) -> str:
-    """Eigenvalues as real part [1/s] against frequency [Hz], with rays of equal damping."""
+    """Eigenvalues as real part [1/s] against frequency [Hz], with rays of equal damping.
+
+    Parameters
+    ----------
+    name
+        What a screen reader reads out.
+    marks
+        Eigenvalues: x [1/s], y [Hz].
+    trajectories
+        Lines in the same units, beneath the marks.
+    highest_hz
+        The axis ends a little above this frequency [Hz]; above the highest mark or line where None.
+    """
     xs = [m.x for m in marks] + [v for t in trajectories for v in t.x.tolist()]
     ys = [m.y for m in marks] + [v for t in trajectories for v in t.y.tolist()]
     top = 1.08 * (highest_hz or max(ys, default=1.0))

@@ -16,6 +16,8 @@ def document(
 
     Parameters
     ----------
+    title
+        Text, for the page's head and its first line.
     kind
         What sort of report it is, for the line below the title.
     findings
