@@ -8,6 +8,9 @@ from fmus.toolchain.variables import CalculatedParameter, Input, Output, Paramet
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
+FmiVersion = Literal["2.0", "3.0"]
+"""Of an FMU without Python."""
+
 Function = Any
 """A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""
 

@@ -11,8 +11,8 @@ from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_libra
 from fmus.toolchain.description import model_description
 from fmus.toolchain.description3 import model_description_3
 from fmus.toolchain.exporter import this_machine
-from fmus.toolchain.model import Model
-from fmus.toolchain.native_source import FmiVersion, identity_source, native_source
+from fmus.toolchain.model import FmiVersion, Model
+from fmus.toolchain.native_source import identity_source, native_source
 from fmus.toolchain.terminals import has_port, terminals_and_icons
 
 _FOLDERS_3 = {

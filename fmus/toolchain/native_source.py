@@ -4,14 +4,11 @@ One translation unit per version of FMI, with nothing in it but the C library.
 """
 
 from pathlib import Path
-from typing import Literal
 
 import casadi as ca
 
 from fmus.toolchain.kernel import c_source
-from fmus.toolchain.model import Model
-
-FmiVersion = Literal["2.0", "3.0"]
+from fmus.toolchain.model import FmiVersion, Model
 
 _C = Path(__file__).with_name("c")
 _SHORTEST_TEXT = 640

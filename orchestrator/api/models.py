@@ -5,8 +5,7 @@ from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.extras import require
-from fmus.toolchain.model import Model
-from fmus.toolchain.native_source import FmiVersion
+from fmus.toolchain.model import FmiVersion, Model
 from orchestrator.errors import InputError
 
 

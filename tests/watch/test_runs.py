@@ -116,8 +116,9 @@ def test_speeds_without_governors_run_away():
 @pytest.mark.slow
 def test_an_undisturbed_state_that_grows():
     """λ = 68.85 ± j215.8 (34.35 Hz) with that droop; the reference moves it off its exact rest by 1e-9 pu."""
-    growth, lost = findings("two_area", "gfor", 0.9, gfor__droop__R_f=5.0, gfor__droop__delta_P_ref=1e-9)
-    assert growth.kind == "growth"
+    found = findings("two_area", "gfor", 0.9, gfor__droop__R_f=5.0, gfor__droop__delta_P_ref=1e-9)
+    assert [f.kind for f in found] == ["growth", "active_limit", "run_away", "active_limit", "loss_of_synchronism"]
+    growth, lost = found[0], found[-1]
     assert growth.figures["growth_rate"] == pytest.approx(68.85, rel=0.01)
     assert growth.figures["frequency_hz"] == pytest.approx(34.35, rel=0.01)
     assert 0.1 < growth.time < 0.3
