@@ -269,11 +269,12 @@ def test_the_table_of_steps(studied):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("label", ["POD-P, ΔK = 50", "POD-Q, ΔK = 50", "POD-P, ΔK = 0.1", "POD-Q, ΔK = 0.1"])
-def test_the_table_of_designs(gfor, label):
+def test_the_table_of_designs(gfor, label, tmp_path):
     (rows,) = [t for t in on_page_of("pod-design") if "K before its bounds" in t[0]]
     (row,) = [r for r in rows if r[0] == label]
     controller, gain = label.split(", ΔK = ")
-    arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json"]
+    out = ("--out", tmp_path / "pod.toml")
+    arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json", *out]
     found = json.loads(gfor("design", "two_area", *arguments)[1])
     for heading, key in {"T_S1 [s]": "T_S1", "T_S2 [s]": "T_S2", "K before its bounds": "K_unbounded"}.items():
         agrees(dict(zip(rows[0], row, strict=True)), heading, found[key])
