@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from ctypes import c_uint, memmove
 from dataclasses import asdict
 from math import inf
@@ -33,6 +33,7 @@ from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.process_end import fault_of_exit, last_line
 from orchestrator.fmi.refusal import FATAL, check_log, refusal
+from orchestrator.fmi.remote_calls import RemoteCalls
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _LOOK = 0.05
@@ -308,7 +309,7 @@ class FmuProcess:
         rmtree(self._folder, ignore_errors=True)
 
 
-class HostedComponent(Derived):
+class HostedComponent(RemoteCalls, Derived):
     """An instance in an `FmuProcess`, used as any other; NaN and infinite values are passed on."""
 
     def __init__(self, name: str, process: FmuProcess) -> None:
@@ -380,22 +381,6 @@ class HostedComponent(Derived):
         return self._process.run(self.number, _NONE, _EMPTY, _NONE, 1, time, step_size)[0]
 
     # -- all else --------------------------------------------------------------------------------
-
-    def setup(self, start_time: float, stop_time: float | None) -> None:
-        self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
-
-    def enter_initialization_mode(self) -> None:
-        self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
-
-    def exit_initialization_mode(self) -> None:
-        self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
-
-    def reset(self) -> None:
-        self._remote("fmi2Reset", "reset")
-
-    def set(self, values: Mapping[str, float | bool]) -> None:
-        if values:
-            self._remote(f"setting {', '.join(values)}", "set", dict(values))
 
     def values(self, names: Iterable[str]) -> dict[str, float | bool]:
         return self._process.table(self._remote("reading", "values", list(names)))

@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from shutil import rmtree
@@ -30,9 +30,10 @@ from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, Mail
 from orchestrator.fmi.messages import FLOODED, texts
 from orchestrator.fmi.process_end import fault_of_exit, last_line
 from orchestrator.fmi.refusal import check_log, refusal
+from orchestrator.fmi.remote_calls import RemoteCalls
 
 
-class IsolatedComponent(Derived):
+class IsolatedComponent(RemoteCalls, Derived):
     """An instance of an FMU in a process of its own.
 
     Parameters
@@ -151,22 +152,6 @@ class IsolatedComponent(Derived):
             at, how, log = answer["component_error"]
             raise ComponentError(self.name, at, how, log)
         return answer.get("result")
-
-    def setup(self, start_time: float, stop_time: float | None) -> None:
-        self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
-
-    def enter_initialization_mode(self) -> None:
-        self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
-
-    def exit_initialization_mode(self) -> None:
-        self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
-
-    def reset(self) -> None:
-        self._remote("fmi2Reset", "reset")
-
-    def set(self, values: Mapping[str, float | bool]) -> None:
-        if values:
-            self._remote(f"setting {', '.join(values)}", "set", dict(values))
 
     def read(self, batch: RealBatch) -> None:
         self._box.clear_log()

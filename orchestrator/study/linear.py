@@ -77,7 +77,9 @@ def linear_model(
         examined = examine(master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks))
         if not as_continuous:
             return state_space(blocks, master.schedule), point, examined
-        space = state_space(Blocks(master, inputs=inputs, outputs=outputs, without_step=True), None)
+        if not blocks.serves_continuous:
+            blocks = Blocks(master, inputs=inputs, outputs=outputs, without_step=True)
+        space = state_space(blocks, None)
         own = judge(LinearModel.from_matrix(space.A, space.states, None))
         warnings = examined.warnings
         if examined.stability.stable is None:

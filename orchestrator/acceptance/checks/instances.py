@@ -1,6 +1,6 @@
 """Whether instances of one FMU leave each other alone, and begin anew as new ones do."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -31,19 +31,29 @@ def independence(subject: Subject) -> CheckResult:
     """Leave an instance idle beside another one that runs; then run both, with different inputs."""
     if subject.description.one_instance:
         return not_applicable("independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess")
-    result: CheckResult | None = None
+    return _with_each_setting(subject, _independent)
+
+
+def _with_each_setting(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
+    """The first fault that is found with some parameters set, or else the result with the parameters as they are.
+
+    Raises
+    ------
+    ComponentError
+        With the parameters as they are; a setting with which the FMU does not work is passed over.
+    """
+    results = []
     for setting in settings(subject):
         try:
-            found = _independent(subject, setting)
+            found = look(subject, setting)
         except ComponentError:
             if not setting:
                 raise
-            continue  # it does not work so
+            continue
         if found.fault:
             return replace(found, evidence=f"{found.evidence}{with_settings(setting)}")
-        result = result or found
-    assert result is not None
-    return result
+        results.append(found)
+    return results[0]
 
 
 def _independent(subject: Subject, setting: Setting) -> CheckResult:
@@ -98,19 +108,10 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) 
 @check("reset", "Is it like new after fmi2Reset?", needs=SAME)
 def reset(subject: Subject) -> CheckResult:
     """Also with its tunable Booleans the other way: in the life before, and in the one after."""
-    result: CheckResult | None = None
-    for setting in settings(subject):
-        try:
-            found = _like_new(subject, setting)
-        except ComponentError as error:
-            if not setting:
-                return failed("reset", "reset fails", str(error))
-            continue  # it does not work so
-        if found.fault:
-            return replace(found, evidence=f"{found.evidence}{with_settings(setting)}")
-        result = result or found
-    assert result is not None
-    return result
+    try:
+        return _with_each_setting(subject, _like_new)
+    except ComponentError as error:
+        return failed("reset", "reset fails", str(error))
 
 
 def _like_new(subject: Subject, setting: Setting) -> CheckResult:
