@@ -6,6 +6,9 @@ from dataclasses import dataclass
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
+TERMINATED = 143
+"""Exit code after SIGTERM."""
+
 
 class CosimError(Exception):
     """Base of all errors that are the user's to mend; the command line prints them without a traceback."""
@@ -17,6 +20,10 @@ class InputError(CosimError):
     """Something given to the program cannot be used; nothing was run."""
 
     exit_code = 2
+
+
+class ResultsError(CosimError):
+    """Results cannot be written: the disk is full, or the folder is gone or closed to the user."""
 
 
 class FmuFileError(InputError):
@@ -48,6 +55,12 @@ class Problem:
 
     def __str__(self) -> str:
         return f"{self.place}: {self.text}" if self.place else self.text
+
+
+MOST_PROBLEMS = 200
+"""So many mistakes of one case are listed; looking for more would take long and help nobody."""
+
+TOO_MANY = Problem("", "there are more problems than are listed; mend these first")
 
 
 class CaseError(InputError):
@@ -101,6 +114,14 @@ class EndedError(CosimError):
             f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error"
             f"{said}; let the run stop by then"
         )
+
+
+class NotTakenUpError(CosimError):
+    """A component does not go on from a state that was kept of another instance of it."""
+
+    def __init__(self, component: str, reason: str) -> None:
+        self.component, self.reason = component, reason
+        super().__init__(f"component {component!r} does not go on from its state in a checkpoint: {reason}")
 
 
 class RunInterruptedError(CosimError):

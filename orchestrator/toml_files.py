@@ -8,6 +8,9 @@ from pydantic import BaseModel, ConfigDict
 
 from orchestrator.errors import InputError
 
+MOST_BYTES = 16 * 1024**2
+"""Of one file: a case with 100,000 events has about 12 MB."""
+
 
 class Table(BaseModel):
     """A table that knows all its keys."""
@@ -32,16 +35,23 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
     Raises
     ------
     InputError
-        If there is no such file, it cannot be read, or it is not TOML.
+        If there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not TOML.
     """
     source = f"{option} {path}".lstrip()
     try:
+        if (size := path.stat().st_size) > MOST_BYTES:
+            raise InputError(
+                f"{source}: {subject} has {size} bytes; at most {MOST_BYTES} are read, so move tables of numbers into "
+                "files of their own"
+            )
         text = path.read_text(encoding="utf-8")
         return text, tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{source}: {subject} cannot be read: {error.strerror}; {remedy}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{source}: it is not a TOML file: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{source}: its brackets nest too deeply to be read; {subject} nests at most five") from error
 
 
 def fault_of(detail: Any) -> str:

@@ -8,6 +8,9 @@ import pint
 
 _QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*")
 _POWERS = {"W", "VA", "var"}
+_ANGLES = ("radian", "degree", "arcminute", "arcsecond", "grade", "mil", "turn", "revolution")
+_TURNS = ("turn", "revolution")
+_PER_SECOND = "1 Hz is 2π rad/s, or 60 rpm"
 
 
 @cache
@@ -56,20 +59,39 @@ def to_unit(value: float | int | str, unit: str) -> float:
     declared = "dimensionless" if unit in ("", "1") else unit
     if {_kind(given), _kind(unit)} & _POWERS and _kind(given) != _kind(unit):
         raise ValueError(f"{value!r} is in {given}, but {needed} is needed")  # one dimension, three quantities
-    if "Hz" in given and "rad" in unit:
-        raise ValueError(f"{value!r} is in {given}, but {needed} is needed; 1 Hz is 2π rad/s")
     try:
+        alike = _counts_alike(given, declared)
         factor = float(_registry().Quantity(1, given).to(declared).magnitude)
     except pint.DimensionalityError as error:
         raise ValueError(f"{value!r} is in {given}, but {needed} is needed") from error
     except Exception as error:  # pint lets its parser's errors through
         raise ValueError(f"{value!r}: the unit {given!r} is unknown") from error
+    if not alike:
+        raise ValueError(f"{value!r} is in {given}, but {needed} is needed; {_PER_SECOND}")
     return float(f"{number * factor:.15g}")  # "100 us" is 1e-4 s and not 9.999999999999999e-05
 
 
 def _kind(unit: str) -> str:
     """``MW`` → ``W``: a unit of power without its prefix."""
     return next((power for power in sorted(_POWERS, key=len, reverse=True) if unit.endswith(power)), unit)
+
+
+def _counts_alike(given: str, needed: str) -> bool:
+    """Whether two units of one dimension both count cycles, both count angles, or neither; pint takes a cycle and a
+    radian for 1 both, and would lose the 2π between them.
+    """
+    one, other = (_registry().Quantity(1, unit) for unit in (given, needed))
+    (cycles, angles, turns), (cycles_needed, angles_needed, turns_needed) = map(_counted, (one, other))
+    turned = (turns and not angles_needed) or (turns_needed and not angles)
+    return cycles == cycles_needed and not turned
+
+
+def _counted(quantity: Any) -> tuple[float, bool, bool]:
+    """Power of the hertz in a unit, and whether it has angles, and whole turns."""
+    powers = {str(name): float(power) for name, power in quantity.unit_items()}
+    cycles = sum(power for name, power in powers.items() if name.endswith("hertz"))
+    angles, turns = (any(part in name for name in powers for part in parts) for parts in (_ANGLES, _TURNS))
+    return cycles, angles, turns
 
 
 def base_exponents(unit: str) -> tuple[float, dict[str, int]] | None:

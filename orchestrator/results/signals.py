@@ -5,6 +5,12 @@ import xarray as xr
 
 from orchestrator.cases.names import variables_of
 
+MOST_DRAWN = 200_000
+"""Rows up to which a signal is drawn as it is."""
+
+_AT_ONCE = 1_000_000
+"""Rows of a long signal that are read at once."""
+
 
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     """``"a.b"`` or ``"a.b - c.d"`` from a recorded dataset; None if a variable was not recorded.
@@ -19,6 +25,37 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
         return None
     first = dataset[names[0]]
     return first if len(names) == 1 else first - dataset[names[1]]
+
+
+def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.DataArray | None:
+    """A signal to be drawn: all of it, or of a long one the least and the largest value in each of many short spans.
+
+    A long one is read piece by piece.
+
+    Parameters
+    ----------
+    dataset
+        What was recorded.
+    expression
+        As `signal`.
+    most
+        Rows up to which a signal is drawn as it is.
+    """
+    rows = dataset.sizes["time"]
+    if rows <= most:
+        return signal(dataset, expression)
+    span = -(-rows // (most // 2))
+    piece = span * max(1, _AT_ONCE // span)
+    times, values = [], []
+    for begin in range(0, rows, piece):
+        part = signal(dataset.isel(time=slice(begin, begin + piece)), expression)
+        if part is None:
+            return None
+        seen, starts = part.values, np.arange(0, len(part), span)
+        extremes = np.column_stack([np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)])
+        values.append(extremes.ravel())
+        times.append(np.repeat(part["time"].values[starts], 2))
+    return xr.DataArray(np.concatenate(values), dims="time", coords={"time": np.concatenate(times)})
 
 
 def relative_difference(simulated: xr.DataArray, linear: xr.DataArray) -> float:

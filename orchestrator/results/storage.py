@@ -1,6 +1,7 @@
 """Results on disk: NetCDF with units, long names and provenance, and CSV beside it."""
 
 import csv
+import io
 import json
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -9,10 +10,17 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import scipy.io
 import xarray as xr
 from numpy.typing import NDArray
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.recorder import BLOCK_ROWS
+from orchestrator.results.netcdf import netcdf_image
+from orchestrator.safe_files import replacing, write_bytes, write_text
+
+_CSV_ROWS = 10_000
+"""Rows of a table that are written at a time."""
 
 
 def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
@@ -61,48 +69,122 @@ class Recorded(Protocol):
         """A row for each time and a column for each name."""
 
 
-def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:
-    """Recorded variables as a labelled dataset over time [s]."""
+def column_attributes(names: Iterable[str], prepared: PreparedScenario) -> dict[str, dict[str, str]]:
+    """Unit and long name of recorded variables and of the time, by name."""
     components = prepared.system.components
-    data = {}
-    for column, name in enumerate(recorder.names):
+    found = {"time": {"units": "s", "long_name": "Time"}}
+    for name in names:
         component, _, variable = name.partition(".")
         info = components[component].description.variables[variable]
-        attributes = {"units": info.unit, "long_name": f"{component}: {info.description}"}
-        data[name] = ("time", recorder.values[:, column].copy(), attributes)
-    time = ("time", recorder.times.copy(), {"units": "s", "long_name": "Time"})
+        found[name] = {"units": info.unit, "long_name": f"{component}: {info.description}"}
+    return found
+
+
+def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:
+    """Recorded variables as a labelled dataset over time [s]."""
+    attributes = column_attributes(recorder.names, prepared)
+    values = recorder.values
+    data = {name: ("time", values[:, k].copy(), attributes[name]) for k, name in enumerate(recorder.names)}
+    time = ("time", recorder.times.copy(), attributes["time"])
     return xr.Dataset(data, coords={"time": time}, attrs=provenance(prepared))
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write ``path``.nc and ``path``.csv."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    dataset.to_netcdf(path.with_suffix(".nc"), engine="scipy")
-    names = list(dataset.data_vars)
-    header = ",".join(["time [s]", *(f"{n} [{dataset[n].attrs['units']}]" for n in names)])
-    table = np.column_stack([dataset["time"].values, *(dataset[n].values for n in names)])
-    np.savetxt(
-        path.with_suffix(".csv"),
-        table,
-        delimiter=",",
-        header=header,
-        comments="",
-        fmt="%.10g",
-        encoding="utf-8",
+    """Write ``path``.nc and ``path``.csv of a recording in memory.
+
+    Raises
+    ------
+    ResultsError
+        If they cannot be written.
+    """
+    names = [str(name) for name in dataset.data_vars]
+    units = {name: dataset[name].attrs for name in ("time", *names)}
+    values = np.column_stack([dataset[n].values for n in names]) if names else np.empty((dataset.sizes["time"], 0))
+    chunk = max(1, min(BLOCK_ROWS, len(values)))
+    image = netcdf_image(names, dataset["time"].values, values, units, dataset.attrs, chunk)
+    write_bytes(path.with_suffix(".nc"), image)
+    save_csv(dataset, path.with_suffix(".csv"))
+
+
+def save_csv(dataset: xr.Dataset, path: Path) -> None:
+    """Write recorded signals over the time as a table, some rows at a time.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written.
+    """
+    names = [str(name) for name in dataset.data_vars]
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(
+        ["time [s]", *(safe_cell(f"{n} [{dataset[n].attrs['units']}]") for n in names)]
     )
+    rows = dataset.sizes["time"]
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        file.write(header.getvalue())
+        for begin in range(0, rows, _CSV_ROWS):
+            part = dataset.isel(time=slice(begin, begin + _CSV_ROWS))
+            table = np.column_stack([part["time"].values, *(part[n].values for n in names)])
+            np.savetxt(file, table, delimiter=",", fmt="%.10g")
+
+
+def safe_cell(value: Any) -> Any:
+    """A cell of a table; a text that a spreadsheet would take for a formula gets an apostrophe before it."""
+    if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")):
+        try:
+            float(value)
+        except ValueError:
+            return f"'{value}"
+    return value
 
 
 def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
-    """Write rows of equal keys as CSV."""
+    """Write rows of equal keys as CSV.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written.
+    """
     rows = list(rows)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else [])
-        writer.writeheader()
-        writer.writerows(rows)
+    file = io.StringIO(newline="")
+    writer = csv.writer(file)
+    names = list(rows[0]) if rows else []
+    writer.writerow([safe_cell(name) for name in names])
+    writer.writerows([safe_cell(row.get(name, "")) for name in names] for row in rows)
+    write_text(path, file.getvalue())
 
 
 def save_json(content: Any, path: Path) -> None:
-    """Write indented JSON."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    """Write indented JSON.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written.
+    """
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+
+
+def save_matrices(content: Mapping[str, Any], path: Path) -> None:
+    """Write matrices in MATLAB's format.
+
+    Raises
+    ------
+    ResultsError
+        If they cannot be written.
+    """
+    file = io.BytesIO()
+    scipy.io.savemat(file, dict(content))
+    write_bytes(path, file.getvalue())
+
+
+def save_netcdf(dataset: xr.Dataset, path: Path) -> None:
+    """Write a dataset of moderate size as NetCDF-3.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written.
+    """
+    write_bytes(path, bytes(dataset.to_netcdf(engine="scipy")))

@@ -1,0 +1,87 @@
+"""A checkpoint on disk: arrays and a header behind a checksum, whole or not there at all."""
+
+import hashlib
+import io
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import CosimError
+from orchestrator.safe_files import replacing
+
+Arrays = Mapping[str, NDArray[Any]]
+
+CHECKPOINTS = ".checkpoints"
+"""Folder for them among the results of a run."""
+
+_MARK = b"gfor-cosim checkpoint 1\n"
+_DIGEST = hashlib.sha256().digest_size
+_HEADER = "header"
+
+
+class DamagedCheckpointError(CosimError):
+    """A file is no checkpoint, or not the one that was written."""
+
+
+def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays) -> None:
+    """Write a checkpoint; the one that was there stays as ``.previous``, and a loss of power leaves one of both.
+
+    Parameters
+    ----------
+    path
+        Of the newest checkpoint.
+    header
+        Of JSON's types.
+    arrays
+        By name.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written; what was there is as it was.
+    """
+    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, **{_HEADER: text}, **arrays)
+    body = content.getbuffer()
+    with replacing(path) as partial:
+        with partial.open("wb") as file:
+            file.write(_MARK + hashlib.sha256(body).digest())
+            file.write(body)
+        if path.exists():
+            path.replace(previous(path))
+
+
+def previous(path: Path) -> Path:
+    """Where the checkpoint before the newest lies."""
+    return path.with_suffix(".previous")
+
+
+def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Header and arrays.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    DamagedCheckpointError
+        If a single bit is not as it was written.
+    """
+    content = path.read_bytes()
+    body = content[len(_MARK) + _DIGEST :]
+    if not content.startswith(_MARK):
+        raise DamagedCheckpointError(f"{path}: it does not begin as a checkpoint does")
+    if hashlib.sha256(body).digest() != content[len(_MARK) : len(_MARK) + _DIGEST]:
+        raise DamagedCheckpointError(f"{path}: its checksum does not fit what it holds")
+    try:
+        with np.load(io.BytesIO(body), allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data}
+        return json.loads(arrays.pop(_HEADER).tobytes()), arrays
+    except (EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        raise DamagedCheckpointError(f"{path}: {error}") from error

@@ -1,0 +1,209 @@
+"""``manifest.json``: which run left the files of a folder, and how each of them looked when it was written."""
+
+import hashlib
+import json
+import warnings
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from orchestrator.errors import InputError
+from orchestrator.results.storage import save_json, versions_of
+
+MANIFEST = "manifest.json"
+_FORMAT = 1
+_AGAIN = "make the results again, into an empty folder or the same one"
+
+
+class ResultsWarning(UserWarning):
+    """Results can be read, and are not as a finished run leaves them: no manifest, or the run goes on."""
+
+
+@dataclass(frozen=True)
+class WrittenFile:
+    """A file as a run wrote it: the run's id, SHA-256, size in bytes."""
+
+    run: str
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a manifest says.
+
+    Attributes
+    ----------
+    folder
+        That it is of.
+    files
+        By name. Several commands may have written into one folder.
+    scenarios
+        Folders in it, by the run that says so: those of the last run.
+    """
+
+    folder: Path
+    files: dict[str, WrittenFile]
+    scenarios: dict[str, str] = field(default_factory=dict)
+
+    def check(self, names: Iterable[str]) -> None:
+        """Compare files with what was written.
+
+        Parameters
+        ----------
+        names
+            Of the files; those that are not listed, and were written by nobody, are not looked at.
+
+        Raises
+        ------
+        InputError
+            If one is missing or was changed.
+        """
+        for name in names:
+            if name in self.files:
+                self._check(self.folder / name, self.files[name])
+
+    def _check(self, path: Path, written: WrittenFile) -> None:
+        try:
+            size = path.stat().st_size
+            same = size == written.bytes and sha256_of(path) == written.sha256
+        except OSError as error:
+            text = f"{path}: this file of run {written.run} cannot be read: {error.strerror}; {_AGAIN}"
+            raise InputError(text) from error
+        if size != written.bytes:
+            raise InputError(f"{path}: it has {size} bytes, and run {written.run} wrote {written.bytes}: it was cut "
+                             f"off, changed, or is of another run; {_AGAIN}")  # fmt: skip
+        if not same:
+            raise InputError(f"{path}: its content is not what run {written.run} wrote (SHA-256 differs): it was "
+                             f"damaged, changed, or is of another run; {_AGAIN}")  # fmt: skip
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def write_manifest(
+    folder: Path,
+    run: str,
+    names: Iterable[str],
+    scenarios: Iterable[str] = (),
+    before: Manifest | None = None,
+    about: Mapping[str, str] | None = None,
+) -> None:
+    """Write a folder's manifest, after its files.
+
+    Parameters
+    ----------
+    folder
+        With the files.
+    run
+        The run's id.
+    names
+        Of the files.
+    scenarios
+        Folders beside them that are of the same run.
+    before
+        What an earlier command said of the files' place: its files that are not written anew stay listed.
+    about
+        Of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written.
+    """
+    paths = {name: folder / name for name in sorted(names)}
+    files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}
+    listed = {**(before.files if before else {}), **files}
+    beside = dict.fromkeys(scenarios, run) or (before.scenarios if before else {})
+    entries = {name: asdict(listed[name]) for name in sorted(listed)}
+    content = {"format": _FORMAT, "run": run, "made_by": versions_of(["gfor-cosim"]), "files": entries}
+    save_json(content | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a folder; None where there is none, as in those of older versions.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    path = folder / MANIFEST
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        files = {
+            str(n): WrittenFile(str(f["run"]), str(f["sha256"]), int(f["bytes"])) for n, f in content["files"].items()
+        }
+        return Manifest(folder, files, {str(n): str(run) for n, run in content["scenarios"].items()})
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path}: it cannot be read as the list of a run's files: {error}; {_AGAIN}") from error
+
+
+def checked(folder: Path, names: Collection[str]) -> Manifest | None:
+    """The manifest of a folder in which these files are as they were written; warns where there is none.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or was changed.
+    """
+    manifest = read_manifest(folder)
+    if manifest is None or not manifest.files.keys() & {*names}:
+        text = f"{folder}: there is no {MANIFEST} of these results, so nobody can check them"
+        warnings.warn(text, ResultsWarning, stacklevel=3)
+        return None
+    manifest.check(names)
+    return manifest
+
+
+def check_one_run(folder: Path, names: Iterable[str], inner: Iterable[str]) -> None:
+    """Compare the files of a run, and those in the folders of its scenarios, with what one run wrote.
+
+    Parameters
+    ----------
+    folder
+        Of the run.
+    names
+        Of its files, of which the first has to be there.
+    inner
+        Names of files in the folder of each scenario.
+
+    Raises
+    ------
+    InputError
+        If one is of another run, missing, or changed.
+    """
+    there = [name for name in names if (folder / name).exists()]
+    manifest = checked(folder, there)
+    if manifest is None:
+        return
+    first = there[0]
+    if first not in manifest.files:
+        raise InputError(f"{folder / first}: {MANIFEST} beside it does not list it, so its run is unknown; {_AGAIN}")
+    run = manifest.files[first].run
+    for name in there:
+        found = manifest.files.get(name)
+        if found is None or found.run != run:
+            seen = "of no run that is known" if found is None else f"of run {found.run}"
+            raise InputError(
+                f"{folder}: {name} is {seen}, and {first} of run {run}: they do not belong together; {_AGAIN}"
+            )
+    for scenario, of in manifest.scenarios.items():
+        if of == run:
+            _check_scenario(folder, scenario, run, inner)
+
+
+def _check_scenario(folder: Path, scenario: str, run: str, names: Iterable[str]) -> None:
+    manifest = read_manifest(folder / scenario)
+    runs = {"no run that is known"} if manifest is None else {f.run for n, f in manifest.files.items() if n in {*names}}
+    if manifest is None or runs - {run}:
+        raise InputError(
+            f"{folder / scenario}: it is of run {', '.join(sorted(runs))}, and the summary in {folder} of run {run}: "
+            f"another run into this folder did not come to its end; {_AGAIN}"
+        )
+    manifest.check(names)

@@ -1,0 +1,248 @@
+"""A recording on the disk while it grows: a folder of small files, each of them whole, that are joined at the end."""
+
+import atexit
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.rows import Block
+from orchestrator.errors import InputError, ResultsError
+from orchestrator.results.manifest import ResultsWarning
+from orchestrator.results.netcdf import Attributes, join_netcdf, netcdf_image
+from orchestrator.results.room import require_room
+from orchestrator.results.storage import column_attributes, provenance
+from orchestrator.safe_files import flush, not_written, write_bytes
+
+FOLDER = "recording"
+"""Of the files of a recording that is not finished, in its scenario's folder."""
+
+
+TRAJECTORY = "trajectory.nc"
+"""A recording that is finished."""
+
+ENDED_EARLY = "ended_early"
+"""Attribute of a recording whose run ended before its stop time: the reason."""
+
+IN_MEMORY = 256_000_000
+"""Size of a recording up to which it is read as a whole [bytes]."""
+
+
+class RecordingFolder:
+    """Rows of a run in files ``000000000000.nc``, named by the number of their first row.
+
+    Each is a NetCDF-4 file, written at once; the last one is replaced as it grows. So every moment leaves a recording
+    that can be read, whatever ends the process.
+
+    Parameters
+    ----------
+    folder
+        Where the files go.
+    prepared
+        The scenario; what it was made from stands in each file.
+    further
+        More attributes of the files, such as the run's id.
+    """
+
+    def __init__(self, folder: Path, prepared: PreparedScenario, further: Attributes | None = None) -> None:
+        import h5py  # noqa: F401, PLC0415 - here rather than in the first step, whose time is measured
+
+        self.folder = folder
+        self._names = tuple(prepared.record)
+        self._units = column_attributes(prepared.record, prepared)
+        self._attributes: dict[str, Any] = provenance(prepared) | dict(further or {})
+        self._chunk = 0
+        self._rows: int | None = None  # until a run begins: then what lies there is of an earlier one
+
+    def begin(self, names: Sequence[str]) -> None:
+        """See `RowSink.begin`."""
+        self._names, self._chunk, self._rows = tuple(names), 0, 0
+        try:
+            rmtree(self.folder, ignore_errors=True)
+            self.folder.mkdir(parents=True)
+        except OSError as error:
+            raise not_written(self.folder, error) from error
+
+    def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+        """See `RowSink.keep`."""
+        self._chunk = max(self._chunk, len(times))
+        image = netcdf_image(self._names, times, values, self._units, self._attributes, max(1, len(times)))
+        if not self.folder.is_dir():
+            raise not_written(self.folder, FileNotFoundError(2, "No such file or directory"))
+        write_bytes(self.folder / f"{first:012d}.nc", image)
+        self._rows = first + len(times)
+
+    def resume(self, names: Sequence[str], rows: int) -> Iterator[Block]:
+        """See `RowSink.resume`."""
+        self._names = tuple(names)
+        for part in parts_of(self.folder):
+            first = int(part.stem)
+            if first >= rows:
+                part.unlink()
+                continue
+            times, values = _read(part, self._names)
+            if first + len(times) > rows:
+                self.keep(first, times[: rows - first], values[: rows - first])
+            self._rows = min(rows, first + len(times))
+            yield first, times[: rows - first], values[: rows - first]
+
+    def join(self, path: Path, further: Attributes | None = None) -> None:
+        """Write all as one file, and remove the parts.
+
+        Parameters
+        ----------
+        path
+            The file.
+        further
+            More attributes of it, such as `ENDED_EARLY`.
+
+        Raises
+        ------
+        ResultsError
+            If it cannot be written, or the parts are not those that the run has written; the parts stay.
+        """
+        parts = parts_of(self.folder)
+        found = rows_in(parts)
+        if self._rows is not None and found != self._rows:
+            raise ResultsError(
+                f"{self.folder}: {self._rows} rows were recorded, and {found} follow each other there without a gap: "
+                "something else changed the files meanwhile, so they are not taken for the run's; make the run again, "
+                "into another folder"
+            )
+        attributes = self._attributes | dict(further or {})
+        if not parts:
+            empty = np.empty((0, len(self._names)))
+            write_bytes(path, netcdf_image(self._names, np.empty(0), empty, self._units, attributes, 1))
+        else:
+            join_netcdf(parts, path, self._names, self._units, attributes)
+        rmtree(self.folder, ignore_errors=True)
+        flush(path.parent)
+
+
+def temporary_recording(prepared: PreparedScenario) -> RecordingFolder:
+    """A recording in the system's folder for temporary files; it is removed when the process ends.
+
+    Raises
+    ------
+    InputError
+        If there is no room for it.
+    """
+    folder = Path(mkdtemp(prefix="gfor_recording_"))
+    atexit.register(rmtree, folder, ignore_errors=True)
+    require_room([prepared], folder, csv=False)
+    return RecordingFolder(folder / FOLDER, prepared)
+
+
+def parts_of(folder: Path) -> list[Path]:
+    """Files of an unfinished recording, in their order."""
+    return sorted(path for path in folder.glob("*.nc") if path.stem.isdigit())
+
+
+def rows_in(parts: Sequence[Path]) -> int:
+    """Rows of an unfinished recording that follow each other without a gap, up to a part that cannot be read."""
+    import h5py  # noqa: PLC0415 - as below
+
+    rows = 0
+    for part in parts:
+        try:
+            with h5py.File(part, "r") as file:
+                if int(part.stem) != rows:
+                    break
+                rows += len(file["time"])
+        except (OSError, KeyError):
+            break
+    return rows
+
+
+def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
+
+    try:
+        with h5py.File(part, "r") as file:
+            return file["time"][...], np.column_stack([file[name][...] for name in names])
+    except (OSError, KeyError) as error:
+        raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
+
+
+class _Column(xr.backends.BackendArray):
+    """A column of all files of an unfinished recording, read when it is asked for."""
+
+    def __init__(self, parts: Sequence[Path], name: str, rows: int) -> None:
+        self._parts, self._name = parts, name
+        self.shape, self.dtype = (rows,), np.dtype(float)
+
+    def __getitem__(self, key: Any) -> Any:
+        return xr.core.indexing.explicit_indexing_adapter(
+            key, self.shape, xr.core.indexing.IndexingSupport.BASIC, self._all
+        )
+
+    def _all(self, key: tuple[Any, ...]) -> Any:
+        import h5py  # noqa: PLC0415 - as above
+
+        pieces = []
+        for part in self._parts:
+            with h5py.File(part, "r") as file:
+                pieces.append(file[self._name][...])
+        return np.concatenate(pieces)[: self.shape[0]][key]
+
+
+def open_recording(folder: Path) -> xr.Dataset:
+    """What an unfinished recording holds, also while it grows; signals are read when they are used.
+
+    Raises
+    ------
+    InputError
+        If there is none, or a file of it is missing or cannot be read.
+    """
+    import h5py  # noqa: PLC0415 - as above
+
+    parts = parts_of(folder)
+    if not parts:
+        raise InputError(f"{folder}: nothing was recorded yet")
+    attributes: Mapping[str, Any] = {}
+    units: dict[str, dict[str, Any]] = {}
+    rows = 0
+    for part in parts:
+        if int(part.stem) != rows:
+            raise InputError(f"{folder}: the rows from number {rows} on are missing; the run has to be made again")
+        try:
+            with h5py.File(part, "r") as file:
+                rows += len(file["time"])
+                if part == parts[0]:
+                    attributes = dict(file.attrs)
+                    units = {name: {k: file[name].attrs[k] for k in ("units", "long_name") if k in file[name].attrs}
+                             for name in file}  # fmt: skip
+        except (OSError, KeyError) as error:
+            raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
+    data = {
+        name: ("time", xr.core.indexing.LazilyIndexedArray(_Column(parts, name, rows)), found)
+        for name, found in units.items()
+    }
+    time = _Column(parts, "time", rows)._all((slice(None),))
+    data.pop("time")
+    return xr.Dataset(data, coords={"time": ("time", time, units["time"])}, attrs=attributes)
+
+
+def open_whole(path: Path) -> xr.Dataset:
+    """A finished recording: in memory if it is of moderate size, else with signals that are read when they are used."""
+    dataset = xr.open_dataset(path, cache=False)
+    if dataset.nbytes > IN_MEMORY:
+        return dataset
+    with dataset:
+        return dataset.load()
+
+
+def warn_of_early_end(dataset: xr.Dataset, label: str) -> None:
+    """Warn, where the caller of the caller stands, about a run that ended before its stop time."""
+    reason = dataset.attrs.get(ENDED_EARLY)
+    if reason is not None:
+        times = dataset["time"].values
+        reached = f", at t = {float(times[-1]):.6g} s" if len(times) else ""
+        warnings.warn(f"{label}: its run ended early{reached}: {reason}", ResultsWarning, stacklevel=3)

@@ -1,0 +1,158 @@
+"""Results beside their place until they are whole: then they are put there at once, with a manifest."""
+
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from secrets import token_hex
+from shutil import rmtree
+
+from orchestrator.errors import InputError
+from orchestrator.results.manifest import MANIFEST, Manifest, read_manifest, write_manifest
+from orchestrator.results.recording import ENDED_EARLY
+from orchestrator.safe_files import PARTIAL, flush, not_written
+
+_OLD = ".old-"
+_TRIES = 20
+
+
+def new_run_id() -> str:
+    """An id for all files of one command, which begins with the time (UTC)."""
+    return f"{datetime.now(UTC):%Y%m%dT%H%M%S}-{token_hex(4)}"
+
+
+class ScenarioFolder:
+    """The folder of one scenario's results, filled as ``<scenario>.part-<run id>`` beside its place.
+
+    Attributes
+    ----------
+    path
+        Where files go until `publish`.
+    place
+        Where they are afterwards.
+    """
+
+    def __init__(self, folder: Path, scenario: str, run: str) -> None:
+        self.run = run
+        self.place = folder / scenario
+        self.path = folder / f"{scenario}{PARTIAL}{run}"
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise not_written(self.path, error) from error
+
+    def discard(self) -> None:
+        """Remove what is there, unless something was recorded: that stays for whoever wants to read it."""
+        if not any(self.path.glob("*/*.nc")) and not any(self.path.glob("*.nc")):
+            rmtree(self.path, ignore_errors=True)
+
+    def publish(self, ended_early: str | None = None) -> Path:
+        """Put the folder in its place, whole; results of an earlier run that are there go.
+
+        Parameters
+        ----------
+        ended_early
+            Why the run ended before its stop time; None where it reached that.
+
+        Raises
+        ------
+        ResultsError
+            If it cannot be; all stays where it is.
+        """
+        try:
+            about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
+            write_manifest(self.path, self.run, _files(self.path), about=about)
+            flush(self.path)
+            _exchange(self.path, self.place, self.run)
+        except OSError as error:
+            raise not_written(self.place, error) from error
+        return self.place
+
+
+def _exchange(new: Path, place: Path, run: str) -> None:
+    old = place.with_name(f"{place.name}{_OLD}{run}")
+    for attempt in range(_TRIES):
+        with suppress(FileNotFoundError):
+            place.rename(old)
+        try:
+            new.rename(place)
+            break
+        except OSError:  # another run put its folder there in the meantime
+            if attempt == _TRIES - 1 or not place.exists():
+                if old.exists() and not place.exists():
+                    old.rename(place)
+                raise
+            rmtree(old, ignore_errors=True)
+    flush(place.parent)
+    if old.is_dir():
+        rmtree(old, ignore_errors=True)
+    else:
+        old.unlink(missing_ok=True)
+
+
+def mend(folder: Path) -> None:
+    """Bring back what a process that was killed had just put aside for its own results."""
+    for old in folder.glob(f"*{_OLD}*"):
+        place = old.with_name(old.name.partition(_OLD)[0])
+        with suppress(OSError):
+            if place.exists():
+                rmtree(old, ignore_errors=True)
+            else:
+                old.rename(place)
+
+
+def unfinished(folder: Path) -> list[Path]:
+    """Folders of scenarios whose run did not end, or still goes on."""
+    return sorted(path for path in folder.glob(f"*{PARTIAL}*") if path.is_dir() and not path.name.startswith(PARTIAL))
+
+
+@contextmanager
+def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Path]:
+    """A folder to write files to that are put into ``folder`` at the end, with a manifest of them.
+
+    Parameters
+    ----------
+    folder
+        Where the files go; others that are there stay.
+    run
+        The run's id.
+    scenarios
+        Folders in it that are of the same run.
+
+    Raises
+    ------
+    ResultsError
+        If they cannot be written; then none is put there.
+    """
+    path = folder / f"{PARTIAL}{run}"
+    try:
+        path.mkdir(parents=True)
+        yield path
+        names = _files(path)
+        write_manifest(path, run, names, scenarios, _readable(folder))
+        for name in [*names, MANIFEST]:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path / name, folder / name)
+        flush(folder)
+    except OSError as error:
+        raise not_written(folder, error) from error
+    finally:
+        rmtree(path, ignore_errors=True)
+
+
+def _readable(folder: Path) -> Manifest | None:
+    """What earlier commands said of a folder's files, without those that are gone; nothing where that is damaged."""
+    try:
+        found = read_manifest(folder)
+    except InputError:
+        return None
+    if found is None:
+        return None
+    return Manifest(folder, {n: f for n, f in found.files.items() if (folder / n).is_file()}, found.scenarios)
+
+
+def _files(folder: Path) -> list[str]:
+    """Names of all files below a folder, but for manifests and what is not finished."""
+    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
+    return sorted(name.as_posix() for name in found if not any(PARTIAL in part for part in name.parts))

@@ -1,0 +1,86 @@
+"""Files that are whole or absent: written beside their place, flushed to the disk, and renamed into it."""
+
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from orchestrator.errors import ResultsError
+
+PARTIAL = ".part-"
+"""Begins the names of files that are not finished, and stands in those of folders that are not."""
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write to; the file there gets the name ``path`` at the end, or is removed if something fails.
+
+    Raises
+    ------
+    ResultsError
+        If the file cannot be written; what had the name before stays.
+    """
+    partial = path.with_name(f"{PARTIAL}{os.getpid()}-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+        flush(partial)
+        partial.replace(path)
+        flush(path.parent)
+    except OSError as error:
+        raise not_written(path, error) from error
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file at once.
+
+    Raises
+    ------
+    ResultsError
+        As `replacing`.
+    """
+    with replacing(path) as partial:
+        partial.write_bytes(content)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file at once, in UTF-8 and with the lines' ends as they are.
+
+    Raises
+    ------
+    ResultsError
+        As `replacing`.
+    """
+    write_bytes(path, text.encode("utf-8"))
+
+
+def flush(path: Path) -> None:
+    """Have the system put a file or the entries of a folder on the disk; a system that cannot do it for folders may."""
+    try:
+        handle = os.open(path, os.O_RDONLY if path.is_dir() or os.name != "nt" else os.O_RDWR)
+    except PermissionError:
+        if path.is_dir():
+            return  # Windows opens no folders
+        raise
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF):
+            raise
+    finally:
+        os.close(handle)
+
+
+def not_written(path: Path, error: OSError) -> ResultsError:
+    """The error of a file that could not be written."""
+    remedy = {
+        errno.ENOSPC: "make room there, or choose another folder",
+        errno.EDQUOT: "make room there, or choose another folder",
+        errno.EFBIG: "raise the limit of a file's size (ulimit -f), or write less",
+        errno.ENOENT: "the folder was removed meanwhile; leave it in place while the command runs",
+    }.get(error.errno or 0, "choose a folder in which you may write")
+    return ResultsError(f"{path}: it cannot be written: {error.strerror or error}; {remedy}")
