@@ -77,7 +77,7 @@ class BoundComponent(Derived):
 
     def __init__(self, inner: Component, description: BoundDescription) -> None:
         self.name, self.description, self.inner = inner.name, description, inner
-        self._port, self._natives = description.port, description.natives
+        self._port, self._inner_names = description.port, description.inner_names
         self._start: dict[str, float] = {
             name: description.variables[name].start_number for name in START if name in description.variables
         }
@@ -98,17 +98,17 @@ class BoundComponent(Derived):
             raise
 
     def _fill(self) -> None:
-        adapter, native = self._adapter, self.description.native.variables
+        adapter, variables = self._adapter, self.description.inner.variables
         adapter.component = self.inner.pointer
         for field in ("set_real", "get_real"):
             setattr(adapter, field, ctypes.cast(getattr(self.inner, field), ctypes.c_void_p))
         adapter.step = ctypes.cast(self.inner.do_step, ctypes.c_void_p)
-        self._others = (_Other * max(1, len(self._natives)))()
-        for other, (name, own) in zip(self._others, self._natives.items(), strict=False):
+        self._others = (_Other * max(1, len(self._inner_names)))()
+        for other, (name, own) in zip(self._others, self._inner_names.items(), strict=False):
             signal = self._port.signals.get(name)
             other.factor, other.offset = (signal.factor, signal.offset) if signal else (1.0, 0.0)
-            other.reference = native[own].reference
-        adapter.others, adapter.n_others = ctypes.addressof(self._others), len(self._natives)
+            other.reference = variables[own].reference
+        adapter.others, adapter.n_others = ctypes.addressof(self._others), len(self._inner_names)
         self._fill_port(adapter.voltage, self._port.voltage)
         self._fill_port(adapter.current, self._port.current)
         adapter.omega = self._port.omega
@@ -119,7 +119,7 @@ class BoundComponent(Derived):
         field.form, field.angle_factor = int(phasor.form), phasor.angle_factor
         field.matrix[:] = phasor.matrix
         for place, variable in enumerate(phasor.variables):
-            field.references[place] = self.description.native.variables[variable].reference
+            field.references[place] = self.description.inner.variables[variable].reference
 
     def _scale(self) -> None:
         """What depends on the rating: several units in parallel, or one that was given another rating."""
@@ -168,11 +168,11 @@ class BoundComponent(Derived):
                 self._start_is_new = True
             elif not own and name in PORT:
                 self._write_port(name, float(value))
-            elif own or name in self._natives:
-                native = name if own else self._natives[name]
+            elif own or name in self._inner_names:
+                target = name if own else self._inner_names[name]
                 signal = None if own else self._port.signals.get(name)
                 scaled = signal is not None and self.description.variables[name].type == "Real"
-                self.inner.set({native: (value - signal.offset) / signal.factor if signal and scaled else value})
+                self.inner.set({target: (value - signal.offset) / signal.factor if signal and scaled else value})
             else:
                 raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
         self._scale()
@@ -197,7 +197,7 @@ class BoundComponent(Derived):
             elif self.description.variables[name].type == "Real":
                 found |= self.get([name])
             else:
-                found[name] = self.inner.values([self._natives[name]])[self._natives[name]]
+                found[name] = self.inner.values([self._inner_names[name]])[self._inner_names[name]]
         return found
 
     def _write_port(self, name: str, value: float) -> None:
@@ -224,11 +224,14 @@ class BoundComponent(Derived):
     def save_state(self) -> Any:
         """The FMU's state together with what the conversion remembers."""
         adapter = self._adapter
-        return self.inner.save_state(), tuple(adapter.v), adapter.time, adapter.angle
+        own = (*adapter.v, adapter.time, adapter.angle, float(self._start_is_new), *self._start.values())
+        return self.inner.save_state(), own
 
     def restore_state(self, state: Any) -> None:
-        inner, v, self._adapter.time, self._adapter.angle = state
-        self._adapter.v[:] = v
+        inner, (re, im, self._adapter.time, self._adapter.angle, new, *start) = state
+        self._adapter.v[:] = re, im
+        self._start, self._start_is_new = dict(zip(self._start, start, strict=True)), bool(new)
+        self._scale()
         self.inner.restore_state(inner)
 
     def free_state(self, state: Any) -> None:
@@ -236,12 +239,12 @@ class BoundComponent(Derived):
 
     def serialize_state(self, state: Any) -> bytes:
         """The FMU's own state as bytes, behind those of the conversion."""
-        inner, v, time, angle = state
-        return struct.pack("<4d", *v, time, angle) + self.inner.serialize_state(inner)
+        inner, own = state
+        return struct.pack(f"<{len(own)}d", *own) + self.inner.serialize_state(inner)
 
     def deserialize_state(self, content: bytes) -> Any:
-        re, im, time, angle = struct.unpack_from("<4d", content)
-        return self.inner.deserialize_state(content[32:]), (re, im), time, angle
+        form = struct.Struct(f"<{5 + len(self._start)}d")
+        return self.inner.deserialize_state(content[form.size :]), form.unpack_from(content)
 
     def reset(self) -> None:
         """Back to where it was after instantiation; the start values are sent again."""

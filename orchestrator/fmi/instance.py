@@ -3,7 +3,7 @@
 import filecmp
 from pathlib import Path
 
-from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.cache import cache_directory, intact
 from orchestrator.fmi.bound import BoundComponent, compiled_adapter
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
@@ -11,18 +11,22 @@ from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.protection import Protection
 
 
 def is_ours(path: Path) -> bool:
     """Whether an FMU is one that this machine's own toolchain built, or a copy of it to the last byte.
 
-    What a file says of itself does not count.
+    What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger.
     """
     built = cache_directory("fmus")
     if path.resolve().is_relative_to(built.resolve()):
-        return True
+        return intact(path)
     size = path.stat().st_size
-    return any(file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) for file in built.glob("*/*.fmu"))
+    return any(
+        file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) and intact(file)
+        for file in built.glob("*/*.fmu")
+    )
 
 
 def compile_adapters(description: FmuDescription) -> None:
@@ -35,9 +39,17 @@ def compile_adapters(description: FmuDescription) -> None:
     """
     if isinstance(description, BoundDescription):
         compiled_adapter()
-        description = description.native
+        description = description.inner
     if description.fmi_version == "3.0":
         adapter_path()
+
+
+def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
+    """Whether an FMU runs in a process of its own: as asked, else where it is not one of ours."""
+    if isolated is not None:
+        return isolated
+    native = description.inner if isinstance(description, BoundDescription) else description
+    return not is_ours(native.path)
 
 
 def open_component(
@@ -65,7 +77,14 @@ def open_component(
     """
     compile_adapters(description)
     if isinstance(description, BoundDescription):
-        return BoundComponent(open_component(name, description.native, directory, isolated=isolated), description)
-    if isolated or (isolated is None and not is_ours(description.path)):
+        return BoundComponent(open_component(name, description.inner, directory, isolated=isolated), description)
+    if is_isolated(description, isolated):
         return IsolatedComponent(name, description, directory)
     return LoadedComponent(name, description, directory)
+
+
+def protections_of(component: Component) -> tuple[Protection, ...]:
+    """What keeps a component's FMU from the rest of the machine; nothing where it runs in this process."""
+    if isinstance(component, BoundComponent):
+        return protections_of(component.inner)
+    return component.protections if isinstance(component, IsolatedComponent) else ()

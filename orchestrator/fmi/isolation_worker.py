@@ -1,16 +1,16 @@
-"""The process of an isolated FMU: loads it within limits, then does what the mailbox asks; started by `isolation`."""
+"""What the process of an isolated FMU does: loads it within limits, then answers the mailbox; `supervisor` calls it."""
 
 import ctypes
 import itertools
-import json
 import os
-import sys
 from collections.abc import Callable
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError, UnsupportedFmuError
 from orchestrator.fmi.component import Component
+from orchestrator.fmi.confinement import Means, protections
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, apply_limits
@@ -24,16 +24,25 @@ class Worker:
 
     def __init__(self, request: dict[str, Any]) -> None:
         folder = Path(request["folder"])
-        self._request, self._parent = request, request["parent"]
-        self._box = Mailbox(folder / "mailbox")
+        self._request, self._parent = request, os.getppid() if hasattr(os, "getppid") else 0
+        self._box = Mailbox(request["mailbox"])
+        self._close_mailbox(request["mailbox"])
         limits = Limits(**request["limits"])
         self._description = self._described()
         compile_adapters(self._description)
-        self._unlimited = apply_limits(limits, folder / "work")
+        means = Means(**request["means"])
+        lacking = apply_limits(limits, folder / "work", own_users=not means.namespaces)
+        self._protections = protections(means, lacking)
         on_message(limits.messages, lambda: self._box.head.steps + self._box.head.request, self._box.write_log)
         self._component: Component | None = None
         self._states: dict[int, Any] = {}
         self._next = itertools.count(1)
+
+    @staticmethod
+    def _close_mailbox(mailbox: int | str) -> None:
+        """It is mapped by now."""
+        if isinstance(mailbox, int):
+            os.close(mailbox)
 
     def _described(self) -> FmuDescription:
         return read_description(self._request["fmu"])
@@ -78,9 +87,9 @@ class Worker:
         assert self._component is not None
         return self._component
 
-    def do_begin(self) -> list[str]:
-        """Tell that from here on it is the FMU that takes time, and what could not be limited."""
-        return self._unlimited
+    def do_begin(self) -> list[tuple[str, bool, str]]:
+        """Tell that from here on it is the FMU that takes time, and what keeps it from the rest of the machine."""
+        return [astuple(protection) for protection in self._protections]
 
     def do_instantiate(self) -> None:
         if self._description.guid != self._request["guid"]:
@@ -133,5 +142,6 @@ class Worker:
         return number
 
 
-if __name__ == "__main__":
-    Worker(json.loads(sys.argv[1])).serve()
+def main(request: dict[str, Any]) -> None:
+    """Answer for one instance."""
+    Worker(request).serve()

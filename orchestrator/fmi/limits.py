@@ -1,28 +1,28 @@
-"""What a process that runs a foreign FMU may take and touch; called once, in that process, before the FMU is loaded.
+"""What a process that runs a foreign FMU may take; called once, in that process, before the FMU is loaded.
 
-On Linux memory and written files are limited by the kernel, and writing outside of one folder is refused by Landlock
-where the kernel has it (5.13 and later). Reading and the network are not limited. On macOS there is no Landlock, and on
-Windows none of these: there, only time is limited, from outside.
+These are the limits that the kernel keeps for each process. Those on all of an FMU's processes together are kept by
+`supervisor`, what they may touch by `confinement`. On Windows, only time and messages are limited.
 """
 
-import contextlib
-import ctypes
 import os
 import signal
-import struct
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
-_WRITING = 0b1_1111_1111_0010
-"""Landlock's rights to write, remove and make files, folders, devices, sockets, pipes and links (ABI 1)."""
-_REFER, _TRUNCATE = 1 << 13, 1 << 14
-_PATH_BENEATH = 1
-_NO_NEW_PRIVILEGES = 38
+from orchestrator.fmi.protection import CPU, DISK, MEMORY, TASKS
+
+_OUR_TASKS = 3
+"""Processes of ours around an FMU that count as its own."""
 
 TO_BEGIN = 60.0
 """Wall-clock time for a process to begin, before it comes to the FMU [s]: on a busy machine that is not the FMU's."""
+
+LEAST_MEMORY = 32.0
+"""With less, the worker itself cannot load an FMU and answer [MB]; such a limit was meant in another unit."""
+
+TOO_MUCH_MEMORY, TOO_MANY_TASKS, TOO_MUCH_DISK = 93, 94, 95
+"""Exit codes of a supervisor that ended an FMU's processes for what they took together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,44 +34,62 @@ class Limits:
     seconds
         Wall-clock time for one call.
     memory
-        Address space beyond what the process has before the FMU is loaded [bytes].
+        Address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
+        together have in use [bytes].
     output
         Largest file that it may write, its standard output included [bytes].
     messages
         Log messages in one call after which it counts as flooded.
+    disk
+        All files in its folder together [bytes].
+    tasks
+        Processes and threads that it may have at the same time.
+    cpu
+        Processor time that one of its processes may take [s].
     """
 
     seconds: float = 30.0
     memory: int = 4 * 1024**3
     output: int = 16 * 1024**2
     messages: int = 20_000
+    disk: int = 256 * 1024**2
+    tasks: int = 128
+    cpu: float = 7 * 86_400.0
 
 
-def apply_limits(limits: Limits, folder: Path) -> list[str]:
-    """Limit this process; returns in words what could not be limited.
+def apply_limits(limits: Limits, folder: Path, *, own_users: bool) -> list[str]:
+    """Limit this process and what it starts; returns the names of limits that the system does not have.
 
     Parameters
     ----------
     folder
-        The only folder in which it may still write.
+        In which it works.
+    own_users
+        Whether its user namespace is its own, so that the user's other processes do not count.
     """
     os.chdir(folder)
-    for name in ("TMPDIR", "TEMP", "TMP", "HOME"):
+    for name in ("TMPDIR", "TEMP", "TMP", "HOME", "USERPROFILE"):
         os.environ[name] = str(folder)
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "GFOR_COSIM_CACHE"):
+        os.environ.pop(name, None)
     if sys.platform == "win32":
-        return ["memory", "files"]
+        return [MEMORY, DISK, TASKS, CPU]
     import resource  # noqa: PLC0415 - not on Windows
 
-    missing = []
-    signal.signal(signal.SIGXFSZ, signal.SIG_DFL)  # Python ignores it; an FMU that floods a file must end
+    for excess in (signal.SIGXFSZ, signal.SIGXCPU):
+        signal.signal(excess, signal.SIG_DFL)  # Python ignores the first; an FMU that floods a file must end
     _lower(resource.RLIMIT_CORE, 0)
-    _lower(resource.RLIMIT_FSIZE, limits.output)
+    lacking = []
+    if own_users:
+        _lower(resource.RLIMIT_NPROC, limits.tasks + _OUR_TASKS)
+    if not _lower(resource.RLIMIT_CPU, int(limits.cpu)):
+        lacking.append(CPU)
+    if not _lower(resource.RLIMIT_FSIZE, limits.output):
+        lacking.append(DISK)
     now = _address_space()
     if now is None or not _lower(resource.RLIMIT_AS, now + limits.memory):
-        missing.append("memory")
-    if not _forbid_writing_outside(folder):
-        missing.append("files")
-    return missing
+        lacking.append(MEMORY)
+    return lacking
 
 
 def _lower(kind: int, value: int) -> bool:
@@ -93,32 +111,3 @@ def _address_space() -> int | None:
         return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     except OSError:
         return None
-
-
-def _forbid_writing_outside(folder: Path) -> bool:
-    """Landlock: from here on this process makes and changes files in one folder only; False where it is not there."""
-    if sys.platform != "linux":
-        return False
-    libc = ctypes.CDLL(None, use_errno=True)
-    libc.syscall.restype = ctypes.c_long
-    abi = libc.syscall(_CREATE_RULESET, None, ctypes.c_size_t(0), 1)
-    if abi < 1:
-        return False
-    rights = _WRITING | (_REFER if abi >= 2 else 0) | (_TRUNCATE if abi >= 3 else 0)
-    handled = ctypes.create_string_buffer(struct.pack("<Q", rights), 8)
-    ruleset = libc.syscall(_CREATE_RULESET, handled, ctypes.c_size_t(8), 0)
-    if ruleset < 0:
-        return False
-    try:
-        allowed = (folder, Path(os.devnull))
-        for path, wanted in zip(allowed, (rights, rights & (_TRUNCATE | 0b10)), strict=True):
-            with contextlib.suppress(OSError):
-                opened = os.open(path, os.O_PATH | os.O_CLOEXEC)
-                rule = ctypes.create_string_buffer(struct.pack("<Qi", wanted, opened), 12)
-                libc.syscall(_ADD_RULE, ruleset, _PATH_BENEATH, rule, 0)
-                os.close(opened)
-        if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0):
-            return False
-        return bool(libc.syscall(_RESTRICT_SELF, ruleset, 0) == 0)
-    finally:
-        os.close(ruleset)

@@ -1,7 +1,6 @@
 """An FMU in this process: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from numpy.typing import NDArray
 
+from fmus.toolchain.removal import remove_tree
 from orchestrator.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load, unload
@@ -182,7 +182,7 @@ class LoadedComponent(Derived):
                     pass  # an FMU that failed may refuse to terminate; it is freed all the same
                 fmu.freeInstance()
         if self._own_directory is not None:
-            shutil.rmtree(self._own_directory, ignore_errors=True)
+            remove_tree(self._own_directory)
             self._own_directory = None
 
     # -- values ----------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 /* A mailbox in memory that two processes share: one runs an FMU, the other calls it as if it were its own.
-   `mailbox.py` describes the same structure to Python.
+   `mailbox.py` describes the same structure to Python. The server's side is in the reach of a foreign FMU's code: what
+   the client needs to know for itself, and where in this memory it writes, stands in memory of its own (struct client).
 
    What is set waits until a step or a reading needs it, and a step brings the values along that were read after the
    last one: a communication step costs one exchange between the processes and not three. Many steps of one of several
@@ -46,7 +47,8 @@ static int is_orphan(int64_t parent) { return (int64_t)getppid() != parent; }
 #endif
 
 enum { MOST = 16384, TEXT = 1 << 24, LOG = 8192, ROOM = 1 << 18 };
-enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66, INTERRUPTED = 67 };
+enum { OK = 0, REFUSED = 3, DIED = 64, HUNG = 65, NOT_A_NUMBER = 66, INTERRUPTED = 67, TAMPERED = 68 };
+enum { MOST_STATUS = 5 }; /* of FMI's */
 enum { EXCHANGE = 1, TALK = 2, RUN = 3 };
 enum { SET = 1, STEP = 2, GET = 4 };
 
@@ -55,11 +57,9 @@ struct mailbox {
     volatile int32_t sleeping[2];    /* whether the server, or the client, waits in the kernel */
     int32_t kind, what, status;
     int32_t steps;
-    int64_t peer; /* the server's process, or on the server's side its parent */
-    double time, step, patience;
+    double time, step;
     int64_t n_set, n_get;
     int64_t text_length;
-    uint32_t bad_reference, fresh; /* fresh: `got` holds what was read after the last step, and nothing was set since */
     uint32_t set_references[MOST], get_references[MOST];
     double set_values[MOST], got[MOST];
     char text[TEXT];
@@ -70,12 +70,24 @@ struct mailbox {
     double room[ROOM];
 };
 
+/* The client's own memory. */
+struct client {
+    struct mailbox *box;
+    int64_t peer; /* the server's process */
+    double patience;
+    int64_t n_set, n_get;
+    int32_t number; /* of the newest question */
+    uint32_t bad_reference, fresh; /* fresh: `got` holds what was read after the last step, and nothing was set since */
+    uint32_t get_references[MOST];
+};
+
 /* How often a word is looked at before a process sleeps: worth it where the other one has a processor of its own, and a
    waste of time where both share one. So it is given up after some vain attempts, and tried again later. */
 enum { SPINS = 1000, VAIN = 4, LATER = 1000 };
 static int spins = SPINS, vain, sleeps;
 
 EXPORT size_t mailbox_size(void) { return sizeof(struct mailbox); }
+EXPORT size_t client_size(void) { return sizeof(struct client); }
 EXPORT size_t mailbox_offset(int which) {
     const size_t places[] = {offsetof(struct mailbox, text), offsetof(struct mailbox, log),
                              offsetof(struct mailbox, instance), offsetof(struct mailbox, set_references),
@@ -115,71 +127,90 @@ static void publish(volatile int32_t *word, int32_t value, volatile int32_t *sle
     if (__atomic_load_n(sleeping, __ATOMIC_SEQ_CST)) wake(word);
 }
 
-/* Has Python look for signals, which it does not by itself while C waits; *asked then says whether Ctrl-C was among them. */
+/* Has Python look for signals, which it does not by itself while C waits; *asked then says whether Ctrl-C was among them.
+   The other process is given a moment to answer, so that the run can be kept at a whole step. */
+enum { MOMENT = 2 };
 static int (*look)(void);
 static const volatile int *asked;
 EXPORT void mailbox_heed(int (*function)(void), const int *flag) { look = function, asked = flag; }
 
-/* Ask, and wait for the answer: the call's status, or DIED, HUNG or INTERRUPTED. */
-static int ask(struct mailbox *box, int32_t kind) {
-    const int32_t before = box->reply, number = before + 1;
+static int32_t next_number(int32_t number) { return (int32_t)((uint32_t)number + 1); }
+
+/* The status that the server left, one of FMI's. */
+static int answer_in(const struct mailbox *box) {
+    const int status = *(const volatile int32_t *)&box->status;
+    return status < OK || status > MOST_STATUS ? TAMPERED : status;
+}
+
+/* Ask, and wait for the answer: the call's status, or DIED, HUNG, INTERRUPTED or TAMPERED. */
+static int ask(struct client *client, int32_t kind) {
+    struct mailbox *box = client->box;
+    const int32_t before = client->number;
+    client->number = next_number(before);
     box->kind = kind;
-    publish(&box->request, number, &box->sleeping[0]);
-    const double end = seconds() + box->patience;
+    publish(&box->request, client->number, &box->sleeping[0]);
+    const double end = seconds() + client->patience;
+    double last = 0; /* moment for an answer after Ctrl-C */
     while (!changed(&box->reply, before, &box->sleeping[1])) {
-        if (is_gone(box->peer)) return box->reply == number ? box->status : DIED;
+        if (is_gone(client->peer)) return box->reply == client->number ? answer_in(box) : DIED;
         if (seconds() > end) return HUNG;
-        if (look && (look() || *asked)) return INTERRUPTED;
+        if (look && look()) return INTERRUPTED;
+        if (look && *asked) {
+            if (last == 0) last = seconds() + MOMENT;
+            if (seconds() > last) return INTERRUPTED;
+        }
     }
-    return box->status;
+    return box->reply == client->number ? answer_in(box) : TAMPERED;
 }
 
-static int exchange(struct mailbox *box, int what) {
-    box->what = what | (box->n_set ? SET : 0);
-    const int status = ask(box, EXCHANGE);
-    box->n_set = 0;
-    box->fresh = status <= 1 && (what & GET);
+static int exchange(struct client *client, int what) {
+    client->box->what = what | (client->n_set ? SET : 0);
+    client->box->n_set = client->n_set, client->box->n_get = client->n_get;
+    const int status = ask(client, EXCHANGE);
+    client->n_set = 0;
+    client->fresh = status <= 1 && (what & GET);
     return status;
 }
 
-EXPORT int mailbox_talk(struct mailbox *box) {
+EXPORT int mailbox_talk(struct client *client) {
     int status = OK;
-    if (box->n_set && (status = exchange(box, 0)) > 1) return status;
-    box->fresh = 0;
-    return ask(box, TALK);
+    if (client->n_set && (status = exchange(client, 0)) > 1) return status;
+    client->fresh = 0;
+    return ask(client, TALK);
 }
 
-EXPORT int client_set_real(struct mailbox *box, const unsigned *references, size_t n, const double *values) {
+EXPORT int client_set_real(struct client *client, const unsigned *references, size_t n, const double *values) {
     int status = OK;
     if (n > MOST) return REFUSED;
-    if (box->n_set + (int64_t)n > MOST && (status = exchange(box, 0)) > 1) return status;
-    memcpy(box->set_references + box->n_set, references, n * sizeof *references);
-    memcpy(box->set_values + box->n_set, values, n * sizeof *values);
-    box->n_set += (int64_t)n;
-    box->fresh = 0;
+    if (client->n_set + (int64_t)n > MOST && (status = exchange(client, 0)) > 1) return status;
+    memcpy(client->box->set_references + client->n_set, references, n * sizeof *references);
+    memcpy(client->box->set_values + client->n_set, values, n * sizeof *values);
+    client->n_set += (int64_t)n;
+    client->fresh = 0;
     return status;
 }
 
-EXPORT int client_get_real(struct mailbox *box, const unsigned *references, size_t n, double *values) {
+EXPORT int client_get_real(struct client *client, const unsigned *references, size_t n, double *values) {
     int status = OK;
     if (n > MOST) return REFUSED;
-    if (!box->fresh || (int64_t)n != box->n_get || memcmp(references, box->get_references, n * sizeof *references)) {
-        memcpy(box->get_references, references, n * sizeof *references);
-        box->n_get = (int64_t)n;
-        if ((status = exchange(box, GET)) > 1) return status;
+    if (!client->fresh || (int64_t)n != client->n_get || memcmp(references, client->get_references, n * sizeof *references)) {
+        memcpy(client->get_references, references, n * sizeof *references);
+        memcpy(client->box->get_references, references, n * sizeof *references);
+        client->n_get = (int64_t)n;
+        if ((status = exchange(client, GET)) > 1) return status;
     }
-    memcpy(values, box->got, n * sizeof *values);
+    memcpy(values, client->box->got, n * sizeof *values);
     for (size_t k = 0; k < n; ++k)
         if (!isfinite(values[k])) {
-            box->bad_reference = references[k];
+            client->bad_reference = references[k];
             return NOT_A_NUMBER;
         }
     return status;
 }
 
-EXPORT int client_do_step(struct mailbox *box, double time, double step, int no_set_state) {
-    box->time = time, box->step = step;
-    return exchange(box, STEP | GET);
+EXPORT int client_do_step(struct client *client, double time, double step, int no_set_state) {
+    client->box->time = time, client->box->step = step;
+    return exchange(client, STEP | GET);
 }
 
 static int serve(struct mailbox *box, void *component, get_set set_real, get_set get_real, do_step step) {

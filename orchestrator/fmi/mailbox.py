@@ -3,6 +3,7 @@
 import ctypes
 import json
 import mmap
+import os
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ MOST, ROOM = 16384, 1 << 18
 SET, STEP, GET = 1, 2, 4
 TALK, RUN = 2, 3
 OK = 0
-DIED, HUNG, NOT_A_NUMBER, INTERRUPTED = 64, 65, 66, 67
+DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68
 """Answers of a mailbox that no FMU gives; those of mailbox.c."""
 
 
@@ -37,15 +38,27 @@ class Head(ctypes.Structure):
         ("what", ctypes.c_int32),
         ("status", ctypes.c_int32),
         ("steps", ctypes.c_int32),
-        ("peer", ctypes.c_int64),
         ("time", ctypes.c_double),
         ("step", ctypes.c_double),
-        ("patience", ctypes.c_double),
         ("n_set", ctypes.c_int64),
         ("n_get", ctypes.c_int64),
         ("text_length", ctypes.c_int64),
+    )
+
+
+class Client(ctypes.Structure):
+    """``struct client``: what the asking side knows for itself, out of the other one's reach."""
+
+    _fields_ = (
+        ("box", ctypes.c_void_p),
+        ("peer", ctypes.c_int64),
+        ("patience", ctypes.c_double),
+        ("n_set", ctypes.c_int64),
+        ("n_get", ctypes.c_int64),
+        ("number", ctypes.c_int32),
         ("bad_reference", ctypes.c_uint32),
         ("fresh", ctypes.c_uint32),
+        ("get_references", ctypes.c_uint32 * MOST),
     )
 
 
@@ -81,10 +94,12 @@ def mailbox_library() -> Any:
     try:
         library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
-        raise InputError(f"the mailbox to an FMU's own process is compiled, and {error}; "
-                         "set isolated = false if you trust the FMU") from error  # fmt: skip
+        raise InputError(
+            f"the mailbox to an FMU's own process is compiled, and {error}; if you trust the FMU, set isolated = false "
+            "in the case and give --trust-fmus"
+        ) from error
     address, size = ctypes.c_void_p, ctypes.c_size_t
-    library.mailbox_size.restype = library.mailbox_offset.restype = size
+    library.mailbox_size.restype = library.mailbox_offset.restype = library.client_size.restype = size
     library.mailbox_talk.argtypes = [address]
     library.mailbox_serve.argtypes = [address, ctypes.c_int64, *[address] * 4]
     library.mailbox_host.argtypes = [address, ctypes.c_int64, address, ctypes.c_int64]
@@ -106,29 +121,53 @@ def unlocked_library() -> Any:
     return library
 
 
+def shared_memory(folder: Path) -> int | str:
+    """Room for a mailbox that another process can map, and nobody can shrink: a descriptor, or a file where need be."""
+    size = mailbox_library().mailbox_size()
+    if not hasattr(os, "memfd_create"):
+        path = folder / "mailbox"
+        with path.open("wb") as file:
+            file.truncate(size)
+        return str(path)
+    import fcntl  # noqa: PLC0415 - not on Windows
+
+    memory = os.memfd_create("gfor_mailbox", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    os.ftruncate(memory, size)
+    fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+    return memory
+
+
 class Mailbox:
-    """A file in memory that both processes map.
+    """Memory that two processes map.
+
+    Parameters
+    ----------
+    memory
+        As `shared_memory` gave it.
 
     Attributes
     ----------
-    address
-        Of the structure; it takes an instance's place in FMI calls.
     head
         Its first fields.
     run
         The fields of a question for many steps.
+    address
+        Of the shared structure.
+    client
+        The asking side's own memory; its address takes an instance's place in FMI calls.
     """
 
-    def __init__(self, path: Path, *, create: bool = False) -> None:
+    def __init__(self, memory: int | str) -> None:
         self.library = mailbox_library()
         size = self.library.mailbox_size()
-        if create:
-            with path.open("wb") as file:
-                file.truncate(size)
-        with path.open("r+b") as file:
-            self._memory = mmap.mmap(file.fileno(), size)
+        if isinstance(memory, int):
+            self._memory = mmap.mmap(memory, size)
+        else:
+            with open(memory, "r+b") as file:
+                self._memory = mmap.mmap(file.fileno(), size)
         self.head = Head.from_buffer(self._memory)
         self.address = ctypes.addressof(self.head)
+        self.client = Client(box=self.address)
         self._text, self._log, run, *arrays = (self.library.mailbox_offset(which) for which in range(6))
         self.run = MailboxRun.from_buffer(self._memory, run)
         self._arrays = arrays
@@ -157,12 +196,12 @@ class Mailbox:
         Raises
         ------
         ValueError
-            If it is not JSON.
+            If it is not JSON, or nested too deep.
         """
         length = self.head.text_length
         if not 0 <= length <= _TEXT:
             raise ValueError("the length of the text is out of bounds")
-        return json.loads(bytes(self._memory[self._text : self._text + length]))
+        return _read(bytes(self._memory[self._text : self._text + length]))
 
     def write_log(self, messages: list[tuple[int, str]]) -> None:
         """Leave the newest messages where they outlive the process that wrote them."""
@@ -176,14 +215,32 @@ class Mailbox:
         """The newest messages of the other side; none where they cannot be read."""
         content = bytes(self._memory[self._log : self._log + _LOG]).split(b"\0")[0]
         try:
-            return [(int(status), str(text)) for status, text in json.loads(content)]
-        except (ValueError, TypeError):
+            return [(int(status), str(text)) for status, text in _read(content)]
+        except (ValueError, TypeError, OverflowError):
             return []
 
     def clear_log(self) -> None:
         """Forget what the FMU has logged."""
         self._memory[self._log] = 0
 
+    def question(self) -> int:
+        """Have the other side do what the text says, and wait: a status of FMI's, or one that none gives."""
+        return int(self.library.mailbox_talk(ctypes.addressof(self.client)))
+
     def function(self, name: str, *arguments: Any) -> Any:
         """A pointer to one of its functions, of FMI's form."""
         return ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *arguments)((name, self.library))
+
+
+def _read(content: bytes) -> Any:
+    """A JSON value from a process that is not trusted.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise ValueError("it is nested too deep") from None

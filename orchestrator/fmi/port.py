@@ -139,40 +139,41 @@ class BoundDescription(FmuDescription):
 
     Attributes
     ----------
-    native
+    inner
         What its file says.
-    natives
-        For every variable here that is not the port's: the FMU's own name of it.
+    inner_names
+        For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of
+        the port's is called ``native.<name>`` here.
     """
 
-    native: FmuDescription
+    inner: FmuDescription
     port: PortMap
-    natives: Mapping[str, str]
+    inner_names: Mapping[str, str]
 
     @classmethod
-    def of(cls, native: FmuDescription, port: PortMap) -> Self:
+    def of(cls, inner: FmuDescription, port: PortMap) -> Self:
         """Describe an FMU through a port map whose variables were checked."""
-        natives = {name: m.variable for name, m in port.signals.items()}
-        for name in native.variables:
+        inner_names = {name: m.variable for name, m in port.signals.items()}
+        for name in inner.variables:
             if name not in port.taken:
-                natives[f"native.{name}" if name in (*PORT, *START, *natives) else name] = name
+                inner_names[f"native.{name}" if name in (*PORT, *START, *inner_names) else name] = name
         variables = _port_variables(port)
-        for number, (name, own) in enumerate(natives.items()):
-            variables[name] = _passed(native, port, name, own, len(PORT) + number)
-        shared = {f.name: getattr(native, f.name) for f in fields(FmuDescription)}
-        renamed = {own: name for name, own in natives.items()}
+        for number, (name, own) in enumerate(inner_names.items()):
+            variables[name] = _passed(inner, port, name, own, len(PORT) + number)
+        shared = {f.name: getattr(inner, f.name) for f in fields(FmuDescription)}
+        renamed = {own: name for name, own in inner_names.items()}
         shared |= {
             "variables": variables,
-            "states": tuple(renamed.get(s, s) for s in native.states) if set(native.states) <= set(renamed) else (),
-            "rates": tuple(renamed.get(s, s) for s in native.rates) if set(native.rates) <= set(renamed) else (),
-            "output_dependencies": _dependencies(native, port, renamed),
+            "states": tuple(renamed.get(s, s) for s in inner.states) if set(inner.states) <= set(renamed) else (),
+            "rates": tuple(renamed.get(s, s) for s in inner.rates) if set(inner.rates) <= set(renamed) else (),
+            "output_dependencies": _dependencies(inner, port, renamed),
             "gives_directional_derivatives": False,  # they are the FMU's own variables', not the port's
         }
-        return cls(**shared, native=native, port=port, natives=natives)
+        return cls(**shared, inner=inner, port=port, inner_names=inner_names)
 
 
-def _passed(native: FmuDescription, port: PortMap, name: str, own: str, reference: int) -> VariableInfo:
-    info = native.variables[own]
+def _passed(inner: FmuDescription, port: PortMap, name: str, own: str, reference: int) -> VariableInfo:
+    info = inner.variables[own]
     signal = port.signals.get(name)
     if signal is None or info.type == "Boolean":
         return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
@@ -209,7 +210,7 @@ def _info(
 
 
 def _dependencies(
-    native: FmuDescription, port: PortMap, renamed: Mapping[str, str]
+    inner: FmuDescription, port: PortMap, renamed: Mapping[str, str]
 ) -> dict[str, tuple[str, ...] | None]:
     """What the outputs depend on directly, in the new names; None where the FMU does not say."""
 
@@ -220,7 +221,7 @@ def _dependencies(
         through = ("v_re", "v_im") if set(names) & set(port.voltage.variables) else ()
         return (*through, *seen)
 
-    known = {own: translated(native.output_dependencies.get(own)) for own in native.outputs}
+    known = {own: translated(inner.output_dependencies.get(own)) for own in inner.outputs}
     currents = [known.get(own) for own in port.current.variables]
     through: tuple[str, ...] | None = None
     if all(c is not None for c in currents):
@@ -230,3 +231,8 @@ def _dependencies(
     power = None if through is None else tuple(dict.fromkeys(("v_re", "v_im", *through)))
     found = {"i_re": through, "i_im": through, "p": power, "q": power}
     return found | {renamed[own]: needs for own, needs in known.items() if own in renamed}
+
+
+def without_binding(description: FmuDescription) -> FmuDescription:
+    """What an FMU's file says: where it is behind a binding, of the FMU there."""
+    return description.inner if isinstance(description, BoundDescription) else description

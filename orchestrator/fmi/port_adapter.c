@@ -78,7 +78,7 @@ static int read_current(struct adapter *a, double *i) {
 }
 
 EXPORT int adapter_set_real(struct adapter *a, const unsigned *references, size_t n, const double *values) {
-    unsigned native[CHUNK];
+    unsigned inner[CHUNK];
     double converted[CHUNK];
     size_t waiting = 0;
     int worst = 0, status, voltage = 0;
@@ -89,25 +89,25 @@ EXPORT int adapter_set_real(struct adapter *a, const unsigned *references, size_
         }
         if (references[k] < FIRST_OTHER || references[k] - FIRST_OTHER >= (uint64_t)a->n_others) return 3;
         const struct other *o = &a->others[references[k] - FIRST_OTHER];
-        native[waiting] = o->reference, converted[waiting++] = (values[k] - o->offset) / o->factor;
+        inner[waiting] = o->reference, converted[waiting++] = (values[k] - o->offset) / o->factor;
         if (waiting == CHUNK) {
-            if ((status = a->set_real(a->component, native, waiting, converted)) > worst) worst = status;
+            if ((status = a->set_real(a->component, inner, waiting, converted)) > worst) worst = status;
             waiting = 0;
         }
     }
-    if (waiting && (status = a->set_real(a->component, native, waiting, converted)) > worst) worst = status;
+    if (waiting && (status = a->set_real(a->component, inner, waiting, converted)) > worst) worst = status;
     if (voltage && (status = send_voltage(a, a->time)) > worst) worst = status;
     return worst;
 }
 
 EXPORT int adapter_get_real(struct adapter *a, const unsigned *references, size_t n, double *values) {
-    unsigned native[CHUNK];
+    unsigned inner[CHUNK];
     double fetched[CHUNK], i[2] = {0, 0};
     size_t places[CHUNK], waiting = 0;
     int worst = 0, status, current = 0;
     for (size_t k = 0; k <= n; ++k) {
         if (waiting && (k == n || waiting == CHUNK)) {
-            if ((status = a->get_real(a->component, native, waiting, fetched)) > worst) worst = status;
+            if ((status = a->get_real(a->component, inner, waiting, fetched)) > worst) worst = status;
             for (size_t w = 0; w < waiting; ++w) {
                 const struct other *o = &a->others[references[places[w]] - FIRST_OTHER];
                 values[places[w]] = o->factor * fetched[w] + o->offset;
@@ -118,7 +118,7 @@ EXPORT int adapter_get_real(struct adapter *a, const unsigned *references, size_
         const unsigned reference = references[k];
         if (reference >= FIRST_OTHER) {
             if (reference - FIRST_OTHER >= (uint64_t)a->n_others) return 3;
-            native[waiting] = a->others[reference - FIRST_OTHER].reference, places[waiting++] = k;
+            inner[waiting] = a->others[reference - FIRST_OTHER].reference, places[waiting++] = k;
             continue;
         }
         if (reference >= I_RE && !current) {

@@ -3,8 +3,9 @@
 import signal
 from pathlib import Path
 
-from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
 from orchestrator.fmi.messages import FLOODED
+from orchestrator.fmi.process_tree import MOST_FILES
 
 _WINDOWS_FAULTS = 0x80000000
 """On Windows, a process that dies of a fault ends with that fault's status, which is at least this."""
@@ -28,6 +29,15 @@ def fault_of_exit(code: int, limits: Limits) -> tuple[str, str]:
         return "output flood", f"more than {limits.messages} log messages"
     if code < 0 and -code == getattr(signal, "SIGXFSZ", None):
         return "output flood", f"more than {limits.output} bytes written"
+    if code < 0 and -code == getattr(signal, "SIGXCPU", None):
+        return "processor time", f"more than {limits.cpu:g} s in one process"
+    if code == TOO_MUCH_MEMORY:
+        return "memory", f"its processes used more than {limits.memory} bytes together, and were ended"
+    if code == TOO_MANY_TASKS:
+        return "too many processes", f"more than {limits.tasks} processes and threads, which were ended"
+    if code == TOO_MUCH_DISK:
+        much = f"{limits.disk} bytes or {MOST_FILES} files and folders"
+        return "disk", f"its files came to more than {much}, or could not be counted; its processes were ended"
     if code < 0:
         return "crash", f"its process died with {_name_of_signal(-code)}"
     if code >= _WINDOWS_FAULTS:

@@ -6,6 +6,7 @@ the first one for which anything else happened.
 
 import io
 import json
+import os
 import random
 import re
 import shutil
@@ -18,6 +19,7 @@ from orchestrator.binding.draft import draft_binding
 from orchestrator.errors import FmuFileError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.landlock import landlock_version, restrict
 from orchestrator.fmi.limits import Limits, apply_limits
 
 XML = "modelDescription.xml"
@@ -187,7 +189,9 @@ def main(seed: int, count: int, folder: Path, sources: list[Path]) -> dict[str, 
     inner = folder / "a" / "b" / "c"
     inner.mkdir(parents=True)
     around = sorted(folder.rglob("*"))
-    apply_limits(Limits(memory=1 << 30, output=128 << 20), folder)
+    apply_limits(Limits(memory=1 << 30, output=128 << 20), folder, own_users=False)
+    if landlock_version():
+        restrict([Path("/")], [folder, Path(os.devnull)])
     found = {"accepted": 0, "refused": 0}
     for number in range(seed, seed + count):
         chance = random.Random(number)

@@ -48,7 +48,7 @@ def test_a_missing_file(tmp_path):
 
 
 def test_a_folder(tmp_path):
-    refused(tmp_path, "there is no such file", "give the path")
+    refused(tmp_path, "it is a folder", "give the path")
 
 
 def test_a_file_that_is_not_a_zip_archive(tmp_path):

@@ -159,3 +159,64 @@ def test_the_handler_of_others_stays(taken):
     with calls:
         ctrl_c()
     assert heard == [os.getpid()]
+
+
+# -- SIGTERM -----------------------------------------------------------------------------------------
+
+
+def test_sigterm_does_what_ctrl_c_does():
+    reached = []
+
+    def command():
+        with calls:
+            signal.raise_signal(signal.SIGTERM)
+            reached.append("end of the call")
+
+    before = signal.getsignal(signal.SIGTERM)
+    with calls.terminable():
+        with pytest.raises(KeyboardInterrupt):
+            command()
+        assert calls.terminated
+    assert reached == ["end of the call"]
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+_TWICE = """
+import signal
+from orchestrator.fmi.interrupts import calls
+
+with calls.terminable(), calls:
+    signal.raise_signal(signal.SIGTERM)
+    print("still here", flush=True)
+    signal.raise_signal(signal.SIGTERM)
+    print("and here", flush=True)
+"""
+
+
+def test_a_second_sigterm_ends_the_process_at_once():
+    result = subprocess.run([sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False, timeout=60)
+    assert (result.returncode, result.stdout) == (-signal.SIGTERM, "still here\n")
+
+
+def test_the_command_line_ends_with_the_code_of_sigterm(gfor, monkeypatch):
+    from orchestrator.cli import info  # noqa: PLC0415
+
+    monkeypatch.setattr(info, "run", lambda options: signal.raise_signal(signal.SIGTERM))
+    assert gfor("info", "a.fmu") == (143, "", "ended by SIGTERM\n")
+
+
+def test_an_interrupt_that_python_swallows_is_asked_for_again():
+    class Ending:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    def command():
+        Ending()  # Python lets no error out of its end
+        reached.append("after it")
+        with calls:
+            reached.append("in a call")
+
+    reached = []
+    with calls.terminable(), pytest.raises(KeyboardInterrupt):
+        command()
+    assert reached == ["after it", "in a call"]

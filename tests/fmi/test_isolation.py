@@ -23,6 +23,7 @@ from orchestrator.fmi.instance import is_ours, open_component
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.fmi.process_tree import descendants
 from tests.acceptance.gallery.build import build
 from tests.acceptance.gallery.members import converter
 
@@ -195,8 +196,9 @@ def test_memory_and_files_are_limited(box, tmp_path):
     writer = box("writer", FAULT_WRITE=f'"{outside}"')
     with IsolatedComponent("writer", writer) as component:
         stepped(initialised(component), 1)
-        work = component._folder / "work"
-        assert (work / "inside.txt").read_text() == "inside"
+        *_, worker = descendants(component._process._process.pid)
+        work = component._process.folder / "work"
+        assert Path(f"/proc/{worker}/root{work}/inside.txt").read_text() == "inside"
     assert not outside.exists()
     assert not work.exists()
 

@@ -1,0 +1,129 @@
+"""A process for a foreign FMU, from its start to its end, for whoever talks to it through its mailbox."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from fmus.toolchain.temporary import own_folder, remove
+from orchestrator.fmi.confinement import LAYERS
+from orchestrator.fmi.environment import environment
+from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.mailbox import Mailbox, mailbox_library, shared_memory
+from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.protection import Protection
+
+_PATIENCE = 5.0
+"""Time in which a supervisor ends all that it watches over [s]; then it is ended itself."""
+
+
+class ConfinedProcess:
+    """A worker, started behind a supervisor (`supervisor`).
+
+    Parameters
+    ----------
+    worker
+        Module whose function ``main`` does what the mailbox asks.
+    request
+        What it is told, beside what is told to every worker.
+    readable
+        Files and folders that it may read.
+    limits
+        What it may take.
+
+    Attributes
+    ----------
+    box
+        The mailbox between this process and the worker.
+    protections
+        What keeps it from the rest of the machine; empty until the worker has told.
+    """
+
+    def __init__(self, worker: str, request: Mapping[str, Any], readable: Sequence[Path], limits: Limits) -> None:
+        self._limits, self.protections = limits, tuple[Protection, ...]()
+        self.folder = own_folder("isolated")
+        memory: int | str = ""
+        try:
+            memory = shared_memory(self.folder)
+            self.box = Mailbox(memory)
+            (self.folder / "work").mkdir()
+            libraries = Path(mailbox_library()._name).parent
+            told = {
+                **request,
+                "worker": worker,
+                "mailbox": memory,
+                "folder": str(self.folder),
+                "readable": [str(path.resolve()) for path in (*readable, libraries)],
+                "limits": asdict(limits),
+                "layers": list(LAYERS),
+                "parent": os.getpid(),
+            }
+            with (self.folder / "output").open("ab") as output:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "orchestrator.fmi.supervisor", json.dumps(told)],
+                    stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True, env=environment(),
+                    pass_fds=(memory,) if isinstance(memory, int) else (),
+                )  # fmt: skip
+        except BaseException:
+            remove(self.folder)
+            raise
+        finally:
+            if isinstance(memory, int):
+                os.close(memory)
+        handle = getattr(self._process, "_handle", None)  # Windows
+        self.box.client.peer = self._process.pid if handle is None else int(handle)
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    @property
+    def group(self) -> int:
+        """Number of the process group that all of its processes are in."""
+        return self._process.pid
+
+    def wait(self, seconds: float) -> bool:
+        """Give it some time to end; whether it did."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        return not self.running
+
+    def fault(self) -> tuple[str, str]:
+        """Name of the fault that ended it, and what happened, once it has ended or is about to."""
+        if not self.wait(_PATIENCE):
+            self.end()
+            return "tampering", "it said that it ended, and had not"
+        return fault_of_exit(self._process.returncode, self._limits)
+
+    def last_words(self) -> str:
+        """The end of what it wrote to its output."""
+        return last_line(self.folder / "output")
+
+    def end(self) -> None:
+        """End it and all that it started; its folder stays."""
+        process = self._process
+        if process.poll() is None and sys.platform != "win32":
+            assert process.stdin is not None
+            with contextlib.suppress(OSError):
+                os.write(process.stdin.fileno(), b".")
+            self.wait(_PATIENCE)
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        if hasattr(os, "killpg"):
+            with contextlib.suppress(ProcessLookupError, PermissionError):  # nothing is left of it
+                os.killpg(process.pid, signal.SIGKILL)
+        if process.stdin is not None and not process.stdin.closed:
+            process.stdin.close()
+
+    def close(self) -> None:
+        """End it, and remove what was written for it."""
+        self.end()
+        remove(self.folder)

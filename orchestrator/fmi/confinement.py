@@ -1,0 +1,180 @@
+"""What the process of a foreign FMU may touch: closed once, by itself, before it has a second thread or any library.
+
+Several means of Linux overlap: namespaces (`namespaces`), Landlock, a filter of system calls (`seccomp`), and no
+capabilities. Each is used where the machine has it; `protections` says what they come to.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from orchestrator.fmi.landlock import landlock_version, restrict
+from orchestrator.fmi.linux import drop_capabilities, no_new_privileges, on_known_machine
+from orchestrator.fmi.protection import (
+    ATTRIBUTES,
+    CPU,
+    DISK,
+    END,
+    ENVIRONMENT,
+    MEMORY,
+    NETWORK,
+    PROCESSES,
+    READING,
+    TASKS,
+    WRITING,
+    Protection,
+    in_order,
+)
+from orchestrator.fmi.seccomp import filter_calls
+
+LAYERS = ("namespaces", "landlock", "seccomp")
+"""Means that can be left out one by one: tests try each alone."""
+
+_SYSTEM = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.conf",
+           "/etc/ld.so.conf.d", "/etc/alternatives", "/etc/localtime", "/etc/timezone", "/sys/devices/system",
+           "/nix/store", "/gnu/store",
+           "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")  # fmt: skip
+"""What programs and libraries read; nothing of a user's."""
+
+_OF_THE_KERNEL = ("/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/filesystems", "/proc/sys/vm",
+                  "/proc/sys/kernel/osrelease")  # fmt: skip
+
+
+@dataclass
+class Means:
+    """Which means are in force.
+
+    Attributes
+    ----------
+    namespaces
+        Empty where they are, else why not; likewise ``landlock`` and ``seccomp``.
+    own_processes
+        Whether /proc shows its own processes only.
+    read_only
+        Whether it sees every folder but its own read-only, with a limit on the size of its own.
+    version
+        Of Landlock.
+    supervised
+        Whether another process watches over its end.
+    """
+
+    namespaces: str = "not tried"
+    own_processes: bool = False
+    read_only: bool = False
+    version: int = 0
+    landlock: str = "not tried"
+    seccomp: str = "not tried"
+    supervised: bool = False
+
+
+def confine(means: Means, layers: Sequence[str], work: Path, readable: Iterable[Path]) -> None:
+    """Close this process off; ``means`` is completed.
+
+    Parameters
+    ----------
+    means
+        What is in force already.
+    layers
+        Which of `LAYERS` may be used.
+    work
+        The folder in which it may write.
+    readable
+        What it may read beside the system's libraries and Python's own folders.
+    """
+    if sys.platform != "linux":
+        means.landlock = means.seccomp = f"{sys.platform} has none"
+        return
+    no_new_privileges()
+    means.version = landlock_version()
+    means.landlock = _tried("landlock" in layers, lambda: _restrict(means, work, readable))
+    if means.landlock:
+        means.version = 0
+    drop_capabilities()
+    means.seccomp = _tried(
+        "seccomp" in layers and on_known_machine(),
+        lambda: filter_calls(
+            attributes=not means.read_only,
+            ipc=bool(means.namespaces),
+            own_process=os.getpid() if means.namespaces else None,
+            signals=means.version < 6,
+        ),
+    )
+
+
+def _tried(wanted: bool, means: Callable[[], None]) -> str:
+    """Why a means is not in force; empty where it is."""
+    if not wanted:
+        return "left out, or unknown on this processor"
+    try:
+        means()
+    except OSError as error:
+        return f"the kernel refuses: {error.strerror}"
+    return ""
+
+
+def _restrict(means: Means, work: Path, readable: Iterable[Path]) -> None:
+    if len(os.listdir("/proc/self/task")) > 1:
+        raise OSError(0, "there is a second thread already")
+    proc = ["/proc"] if means.own_processes else list(_OF_THE_KERNEL)
+    own = [Path("/dev/shm")] if means.read_only else []
+    restrict([*map(Path, [*_SYSTEM, *proc]), *python_folders(), *readable], [work, Path(os.devnull), *own])
+
+
+def python_folders() -> list[Path]:
+    """Where Python and its packages are, the user's home folder itself and what is above it left out."""
+    home = Path(os.environ.get("HOME") or "/").resolve()
+    named = [sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path, *os.environ.get("LD_LIBRARY_PATH", "").split(":")]
+    found = {Path(name).resolve() for name in named if name and os.path.isabs(name)}
+    for package in ("orchestrator", "fmus"):  # installed for development, they may lie anywhere
+        spec = find_spec(package)
+        found |= {Path(place).resolve() for place in (spec and spec.submodule_search_locations) or ()}
+    return sorted(path for path in found if path != home and path not in home.parents)
+
+
+def protections(means: Means, lacking: Iterable[str]) -> tuple[Protection, ...]:
+    """What the means come to, one `Protection` for each name.
+
+    Parameters
+    ----------
+    means
+        What is in force.
+    lacking
+        Limits that the system does not have.
+    """
+    spaces, filtered, linux = not means.namespaces, not means.seccomp, sys.platform == "linux"
+    landlock, files = means.landlock or "", "read-only mounts"
+    no_spaces = f"no namespaces: {means.namespaces}"
+    no_landlock = f"no Landlock: {landlock}"
+
+    def first(*ways: tuple[bool, str], otherwise: str) -> tuple[bool, str]:
+        used = [name for there, name in ways if there]
+        return bool(used), " and ".join(used) if used else otherwise
+
+    found = {
+        END: first((spaces and means.supervised, "a process namespace"),
+                   (not spaces and means.supervised and linux, "a supervisor that adopts orphans"),
+                   (means.supervised and not linux, "a supervisor, for its process group only"),
+                   otherwise="nobody watches over it"),
+        PROCESSES: first((spaces, "a process namespace"), (means.version >= 6, "Landlock"),
+                         (filtered and not spaces and means.version < 6, "a filter of system calls"),
+                         otherwise=no_spaces),
+        NETWORK: first((filtered, "a filter of system calls"), otherwise=(
+            f"sockets of a path only are left open; {means.seccomp}" if spaces else f"no filter: {means.seccomp}")),
+        WRITING: first((not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock),
+        ATTRIBUTES: first((means.read_only, files), (filtered and not means.read_only, "a filter of system calls"),
+                          otherwise=no_spaces),
+        READING: first((not landlock, "Landlock"), otherwise=no_landlock),
+        ENVIRONMENT: (True, "a new environment"),
+        MEMORY: first((True, "a limit for each process"), (linux and means.supervised, "a watch over their sum"),
+                      otherwise=""),
+        DISK: first((True, "a limit for each file"), (means.read_only, "a folder in memory of limited size"),
+                    (linux and means.supervised and not means.read_only, "a watch over their sum"), otherwise=""),
+        TASKS: first((spaces, "limits of its namespaces"), (linux and means.supervised, "a watch"),
+                     otherwise="nothing on this system limits it"),
+        CPU: (True, "a limit for each process"),
+    }  # fmt: skip
+    found |= dict.fromkeys(lacking, (False, "this system does not limit it"))
+    return in_order(Protection(name, *said) for name, said in found.items())

@@ -1,0 +1,91 @@
+"""Calls of the Linux kernel for which Python has no function."""
+
+import ctypes
+import os
+import platform
+import sys
+from functools import cache
+from typing import Any
+
+NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = 0x10000000, 0x20000000, 0x40000000, 0x00020000, 0x08000000
+"""Flags of ``unshare`` and ``clone``, one for each namespace."""
+
+_DIES_WITH_PARENT, _DROP_CAPABILITY, _NO_NEW_PRIVILEGES, _SUBREAPER = 1, 24, 38, 36
+_CAPABILITIES = 64
+"""More than any kernel has."""
+
+
+@cache
+def libc() -> Any:
+    """The C library, whose `syscall` gives what the kernel returned."""
+    library = ctypes.CDLL(None, use_errno=True)
+    library.syscall.restype = ctypes.c_long
+    return library
+
+
+def call(number: int, *arguments: Any) -> int:
+    """A system call by its number.
+
+    Raises
+    ------
+    OSError
+        As the kernel refuses it.
+    """
+    found = int(libc().syscall(ctypes.c_long(number), *arguments))
+    if found < 0:
+        error = ctypes.get_errno()
+        raise OSError(error, os.strerror(error))
+    return found
+
+
+def _done(found: int) -> None:
+    if found:
+        error = ctypes.get_errno()
+        raise OSError(error, os.strerror(error))
+
+
+def on_known_machine() -> bool:
+    """Whether this is Linux on a processor whose system calls are known here, with 64-bit Python."""
+    return sys.platform == "linux" and platform.machine() in ("x86_64", "aarch64") and sys.maxsize > 2**32
+
+
+def unshare(flags: int) -> None:
+    """Leave the namespaces that are shared with the parent."""
+    _done(libc().unshare(flags))
+
+
+def mount(source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None) -> None:
+    """Mount a file system.
+
+    Parameters
+    ----------
+    source, target, kind
+        What, where, and the file system's name.
+    flags, data
+        As ``mount(2)`` takes them.
+    """
+    texts = [None if text is None else os.fsencode(text) for text in (source, target, kind, data)]
+    _done(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))
+
+
+def die_with_parent(signal: int) -> None:
+    """Have the kernel send a signal to this process when the thread that made it ends."""
+    libc().prctl(_DIES_WITH_PARENT, ctypes.c_ulong(signal), 0, 0, 0)
+
+
+def adopt_orphans() -> bool:
+    """Become the parent of every descendant whose own parent ends."""
+    return sys.platform == "linux" and not libc().prctl(_SUBREAPER, ctypes.c_ulong(1), 0, 0, 0)
+
+
+def no_new_privileges() -> None:
+    """Give up what set-uid programs would grant; Landlock and seccomp ask for it."""
+    _done(libc().prctl(_NO_NEW_PRIVILEGES, ctypes.c_ulong(1), 0, 0, 0))
+
+
+def drop_capabilities() -> None:
+    """Give up every capability, for good."""
+    for number in range(_CAPABILITIES):
+        libc().prctl(_DROP_CAPABILITY, ctypes.c_ulong(number), 0, 0, 0)
+    header = (ctypes.c_uint32 * 2)(0x20080522, 0)
+    _done(libc().capset(header, (ctypes.c_uint32 * 6)()))

@@ -1,0 +1,186 @@
+"""The process between gfor and a foreign FMU: it closes the FMU's process off, watches over it, and ends with gfor.
+
+Three processes stand in a row. The *supervisor* is what gfor starts; it waits for gfor's word or end. The *keeper* is
+the first process of the FMU's own process namespace, where there is one: with it all others there end, whatever they
+did to hide. The *worker* alone has the FMU's code in it.
+
+No library but Python's own is imported here: the worker closes itself off before numpy brings threads.
+"""
+
+import contextlib
+import importlib
+import json
+import os
+import select
+import signal
+import struct
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fmus.toolchain.removal import remove_tree
+from orchestrator.fmi.confinement import Means, confine
+from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
+from orchestrator.fmi.linux import adopt_orphans, die_with_parent
+from orchestrator.fmi.namespaces import enter_namespaces, mount_read_only
+from orchestrator.fmi.process_tree import descendants, end_descendants, size_of, size_of_removed, usage
+
+_LOOK = 100
+"""Time after which it is looked what the FMU's processes take [ms]."""
+_OURS = 256 * 1024**2
+"""Memory that the worker may have in use before the FMU is loaded [bytes]; it takes some 100 MB."""
+_LINUX = sys.platform == "linux"
+
+
+def main(request: dict[str, Any]) -> None:
+    """Supervise the worker that a request names; on Windows, be it."""
+    means, work = Means(), Path(request["folder"]) / "work"
+    if sys.platform == "win32":
+        means.namespaces = means.landlock = means.seccomp = "Windows has none"
+        _work(request, means)
+    if os.getppid() != request["parent"]:  # it ended before this process could look
+        _exit()
+    means.supervised = True
+    means.namespaces = "left out"
+    if "namespaces" in request["layers"]:
+        means.namespaces = _entered()
+    adopt_orphans()
+    told, tell = os.pipe()
+    alive, living = os.pipe()
+    keeper = os.fork()
+    if not keeper:
+        os.close(told)
+        os.close(living)
+        _keep(request, means, work, tell, alive)
+    os.close(tell)
+    os.close(alive)
+    _supervise(request, told, work, means)
+
+
+def _exit(code: int = 0) -> NoReturn:
+    os._exit(code)
+
+
+def _entered() -> str:
+    """Why this process is not in namespaces of its own; empty where it is."""
+    if not _LINUX:
+        return f"{sys.platform} has none"
+    try:
+        enter_namespaces()
+    except OSError as error:
+        return f"the system forbids user namespaces ({error.strerror})"
+    return ""
+
+
+# -- the supervisor -----------------------------------------------------------------------------------
+
+
+def _supervise(request: dict[str, Any], told: int, work: Path, means: Means) -> NoReturn:
+    """Wait for the end of the worker or of gfor, whichever comes first."""
+    limits, me = Limits(**request["limits"]), os.getpid()
+    poll = select.poll()
+    poll.register(0, select.POLLIN)
+    poll.register(told, select.POLLIN)
+    while True:
+        ready = [descriptor for descriptor, _ in poll.poll(_LOOK)]
+        if told in ready:
+            word = os.read(told, 4)
+            end_descendants(me)
+            _end_as(struct.unpack("<i", word)[0] if len(word) == 4 else -signal.SIGKILL)
+        orphan = os.getppid() != request["parent"]
+        if orphan or 0 in ready:
+            end_descendants(me)
+            if orphan or not os.read(0, 1):  # nobody is left to do it
+                remove_tree(Path(request["folder"]))
+            if not _LINUX:
+                os.killpg(os.getpgrp(), signal.SIGKILL)
+            _end_as(-signal.SIGKILL)
+        if excess := _excess(limits, me, work):
+            end_descendants(me)
+            _exit(excess)
+
+
+def _excess(limits: Limits, process: int, work: Path) -> int:
+    """Exit code that names what all processes together take too much of; 0 for nothing."""
+    if not _LINUX:
+        return 0
+    most = limits.memory + _OURS
+    theirs = descendants(process)[1:]  # the keeper comes first, and is ours
+    used = usage(theirs, most)
+    if used.memory > most:
+        return TOO_MUCH_MEMORY
+    if used.tasks > limits.tasks:
+        return TOO_MANY_TASKS
+    size = size_of(work, limits.disk)
+    if size <= limits.disk:
+        size += size_of_removed(theirs, limits.disk - size)
+    return TOO_MUCH_DISK if size > limits.disk else 0
+
+
+def _end_as(status: int) -> NoReturn:
+    """End as the worker did: with its exit code, or by its signal."""
+    if status < 0:
+        with contextlib.suppress(OSError, ValueError):
+            signal.signal(-status, signal.SIG_DFL)
+        os.kill(os.getpid(), -status)
+        signal.pause()
+    _exit(status)
+
+
+# -- the keeper ---------------------------------------------------------------------------------------
+
+
+def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: int) -> NoReturn:
+    """Start the worker, reap all that ends, tell how the worker ended, and end with it."""
+    if _LINUX:
+        die_with_parent(signal.SIGKILL)
+        if select.select([alive], [], [], 0)[0]:  # the supervisor ended before that
+            _exit()
+    _attach(Path(os.devnull), 0)
+    if not means.namespaces:
+        try:
+            lacking = mount_read_only(work, int(request["limits"]["disk"]))
+            means.read_only, means.own_processes = "files" not in lacking, "processes" not in lacking
+        except OSError:
+            pass  # `confine` knows what that leaves open
+    adopt_orphans()
+    me = os.getpid()
+    worker = os.fork()
+    if not worker:
+        os.close(tell)
+        os.close(alive)
+        if _LINUX:
+            die_with_parent(signal.SIGKILL)
+            if os.getppid() != me:
+                _exit()
+        _work(request, means)
+    while True:
+        ended, status = os.waitpid(-1, 0)
+        if ended == worker:
+            code = os.waitstatus_to_exitcode(status)
+            end_descendants(me)
+            os.write(tell, struct.pack("<i", code))
+            _exit()
+
+
+def _attach(path: Path, descriptor: int) -> None:
+    opened = os.open(path, os.O_RDONLY)
+    os.dup2(opened, descriptor)
+    os.close(opened)
+
+
+# -- the worker ---------------------------------------------------------------------------------------
+
+
+def _work(request: dict[str, Any], means: Means) -> NoReturn:
+    """Close this process off and do what gfor asks."""
+    folder = Path(request["folder"])
+    confine(means, request["layers"], folder / "work", map(Path, request["readable"]))
+    request["means"] = asdict(means)
+    importlib.import_module(request["worker"]).main(request)
+    _exit()
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))
