@@ -19,7 +19,7 @@ S_N, P_0 = 1500.0, 0.9
 
 @dataclass(frozen=True)
 class OuterControl:
-    """Droops and POD controllers, and what they give: frequency, voltage reference, supplementary references [pu]."""
+    """Droops and POD controllers, and their outputs: frequency, voltage reference, supplementary references [pu]."""
 
     droop: Droop
     omega: ca.SX
@@ -30,7 +30,9 @@ class OuterControl:
 
 @dataclass(frozen=True)
 class Converter:
-    """What every variant shows: current into the grid (network frame), control signals, magnitudes inside [pu, S_n]."""
+    """Outputs of every variant: current into the grid (network frame), control signals, internal magnitudes [pu,
+    S_n].
+    """
 
     current: Phasor
     control: OuterControl
@@ -48,24 +50,37 @@ def grid_forming_converter() -> Model:
     return m.build()
 
 
-def declare_converter(m: ModelBuilder, port: DevicePort) -> Converter:
-    """Everything behind a port, whatever its inputs are."""
+def declare_converter(m: ModelBuilder, port: DevicePort, measured: ca.SX | None = None) -> Converter:
+    """Everything behind a port, whatever its inputs are; ``measured`` as `outer_control`."""
     electrical = declare_filter(m, port)
     droop = declare_droop(m, electrical.initial, power(electrical.u, electrical.i_g.value))
-    control = outer_control(m, droop, port.omega_b)
+    control = outer_control(m, droop, port.omega_b, measured)
     v_c = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref)
     filter_equations(m, electrical, port, v_c, droop.theta, control.omega)
     current = electrical.i_g.value.rotated(droop.theta)
     return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude())
 
 
-def outer_control(m: ModelBuilder, droop: Droop, omega_b: ca.SX) -> OuterControl:
-    """Both POD controllers around the droops, and the angle that follows."""
+def outer_control(m: ModelBuilder, droop: Droop, omega_b: ca.SX, measured: ca.SX | None = None) -> OuterControl:
+    """Both POD controllers around the droops, and the angle that follows.
+
+    Parameters
+    ----------
+    m
+        The model it belongs to.
+    droop
+        The droops.
+    omega_b
+        Rated angular frequency [rad/s].
+    measured
+        Frequency that the POD controllers act on [pu]; by default the one that the converter imposes itself.
+    """
     # The POD acts on the frequency that its own output changes. Only states lie between them (T_f),
     # so each controller can be given the deviation symbolically: first w as a function of ΔP, then ΔP.
     omega = m.algebraic("w")
-    delta_p = pod(m, "pod_p", omega - 1, sign=-1, T_S1=0.20, T_S2=0.37)
-    delta_q = pod(m, "pod_q", omega - 1, sign=+1, T_S1=0.26, T_S2=0.29)
+    seen = omega if measured is None else measured
+    delta_p = pod(m, "pod_p", seen - 1, sign=-1, T_S1=0.20, T_S2=0.37)
+    delta_q = pod(m, "pod_q", seen - 1, sign=+1, T_S1=0.26, T_S2=0.29)
     m.close(omega, frequency(droop, delta_p))
     m.derivative(droop.theta, omega_b * (omega - 1))
     return OuterControl(droop, omega, voltage_reference(droop, delta_q), delta_p, delta_q)

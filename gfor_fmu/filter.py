@@ -42,7 +42,7 @@ class FilterData:
 
 @dataclass(frozen=True)
 class Filter(FilterData):
-    """With states and algebraic quantities.
+    """The filter with its states and algebraic quantities.
 
     ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
     """
@@ -94,7 +94,7 @@ def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, 
     f
         The filter as it is declared.
     port
-        Gives the bus voltage and the breaker's position.
+        The port, which gives the bus voltage and the breaker's position.
     v_c
         The converter's own voltage, in its own frame [pu, S_n].
     theta

@@ -17,7 +17,7 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
     m
         The converter's model.
     f
-        The filter as it is declared.
+        The declared filter.
     omega_b
         Base angular frequency [rad/s].
     w

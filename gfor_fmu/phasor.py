@@ -2,7 +2,7 @@
 
 Filter, inner loops, feed-forwards and transformer settle within a few milliseconds, and are algebraic here: the
 voltage control holds u = u_ref, so that the emf is u_ref·e^{jθ}, a function of the droops' and the POD controllers'
-states alone. The current limit is not represented; ``current_limit`` tells when it would act.
+states alone. The current limit is not represented; ``current_limit`` shows when it would act.
 """
 
 import casadi as ca
@@ -48,7 +48,7 @@ def grid_forming_converter_phasor() -> Model:
 
 
 def _capacitor_current(f: FilterData, u: Phasor) -> Phasor:
-    """Into the capacitor with its series resistance, at rated frequency."""
+    """Current into the capacitor with its series resistance, at rated frequency."""
     return Phasor(0.0, f.B_c) * u / Phasor(1.0, f.R_cap * f.B_c)
 
 

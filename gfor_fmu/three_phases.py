@@ -1,9 +1,9 @@
 """The same converter with three instantaneous phase voltages in, three phase currents out, in SI units: for EMT tools.
 
-The network frame stands at the angle φ = φ_0 + ω_b·t. A master holds inputs during a communication step H. Were the
-phase voltages themselves held in the equations, the voltage would stand still while the frame turns on, and lag behind
-by ω_b·H/2 on average. So φ is held as well: what is held is the voltage's image in the network frame, the phasor at
-the communication point, exactly as in the variant with v_re and v_im.
+The network frame stands at the angle φ = φ_0 + ω_b·t. A master holds inputs during a communication step H. If only the
+phase voltages were held, the voltage would stand still while the frame turns on, and would lag by ω_b·H/2 on average.
+Therefore φ is held as well. This holds the voltage's phasor in the network frame at its value of the communication
+point, exactly as in the variant with v_re and v_im.
 """
 
 import casadi as ca

@@ -1,7 +1,7 @@
 """Loads whose active current keeps its magnitude: i = I_0·v/|v|, in phase with the voltage, so that P = I_0·|v|.
 
-At a bus without capacitance v = Σ i / G, so a load that is nothing but a current would leave |v| without an equation.
-It is therefore the conductance of its operating point, G = P/v_0², and a correction that follows with a lag:
+At a bus without capacitance v = Σ i / G, and a load that consists of a current only would leave |v| without an
+equation. It is therefore the conductance of its operating point, G = P/v_0², and a correction that follows with a lag:
 
     i = G·v + c,    τ·dc/dt = (G·v_0·v/|v| − G·v) − c
 
@@ -42,7 +42,7 @@ def declare_current_load(m: ModelBuilder, load: Load, declared: DeclaredLoad, bu
     m
         The grid's model.
     load
-        Where it is, and its name.
+        The load's bus and name.
     declared
         The same load as a constant impedance, as `declare_load` returns it.
     buses
@@ -64,7 +64,7 @@ def declare_current_load(m: ModelBuilder, load: Load, declared: DeclaredLoad, bu
 
 
 def current_load_equation(m: ModelBuilder, load: CurrentLoad) -> None:
-    """τ·dc/dt = G·(v_0/|v| − 1)·v − c, and what the load draws."""
+    """Give the equation τ·dc/dt = G·(v_0/|v| − 1)·v − c, and declare the load's power."""
     v, G = load.bus.v, load.load.G
     wanted = v * (G * (load.bus.v_0.magnitude() / v.magnitude() - 1))
     rate = (wanted - load.correction) * (1 / load.tau)

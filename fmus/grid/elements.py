@@ -1,4 +1,4 @@
-"""Elements of a network as parameters and states: what each adds to its buses, and its own equation."""
+"""Elements of a network as parameters and states: the contribution of each to its buses, and its own equation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
 
 @dataclass
 class Bus:
-    """What meets at a bus: injected current, conductance, susceptance; its voltage once known."""
+    """The sums at a bus: injected current, conductance, susceptance; and its voltage once it is known."""
 
     v_0: Phasor
     injected: Phasor
@@ -30,13 +30,13 @@ class Branch:
     Attributes
     ----------
     current
-        The state; behind the ratio, where there is one.
+        The state with the current; behind the ratio, if there is one.
     drawn
-        What it takes from its from bus.
+        Current that the branch takes from its from bus.
     ratio
         Complex ratio at the from side.
     connected
-        1 or 0; None where it cannot be opened.
+        1 for a connected branch, 0 for an open one; None for a branch that cannot be opened.
     """
 
     current: Phasor
@@ -59,7 +59,7 @@ class DeclaredLoad:
 
 
 Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
-"""Puts an inductor of reactance X [pu, 100 MVA], of which ``scale`` times is drawn, between a bus and earth."""
+"""Puts an inductor of reactance X [pu, 100 MVA] between a bus and earth; the bus feeds ``scale`` times its current."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def declare_bus(m: ModelBuilder, name: str) -> Bus:
 
 
 def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
-    """Declare a device's current; returned is what reaches the bus."""
+    """Declare a device's current; returns the current that reaches the bus."""
     with m.scope(port.name):
         current = Phasor(
             m.input("i_re", "pu", "Current injected by the device, real part", base=SYSTEM_BASE),
@@ -137,20 +137,21 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
 def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> list[Branch]:
     """An inductor whose state is its current at scale 1.
 
-    ``scale`` times of it is drawn: a load that is switched off and on again comes back without a direct component.
+    The bus feeds ``scale`` times this current. A load that is switched off and on again therefore comes back without a
+    direct component.
 
     Parameters
     ----------
     m
         The grid's model.
     bus
-        What is drawn is taken from what is injected there.
+        The bus whose injected current is reduced by the inductor's.
     name
-        Of the bus.
+        Name of the bus.
     X
         Reactance [pu, 100 MVA].
     scale
-        So many times the state is drawn.
+        Factor from the state to the current drawn.
     """
     current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
     drawn = current * scale
@@ -172,7 +173,7 @@ def declare_load(
     buses
         By name; that of the load is changed.
     alone
-        Whether nothing else determines the voltage of its bus: then it cannot be switched off.
+        Whether this load alone determines the voltage of its bus, and therefore cannot be switched off.
     inductor
         Declares the inductor of a load that draws reactive power.
     """
@@ -234,7 +235,9 @@ def declare_shunt(
 
 
 def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
-    """Declare the capacitance of every bus that has none of its own, where the network has it."""
+    """Declare the stray capacitance of every bus without capacitance of its own, if the network has stray
+    capacitance.
+    """
     floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
     if floating:
         text = "Capacitance to earth of every bus that has none of its own"
@@ -246,7 +249,7 @@ def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
 def declare_network_outputs(
     m: ModelBuilder, network: Network, buses: dict[str, Bus], drawn: list[Phasor], fed: list[Phasor]
 ) -> None:
-    """Declare all voltages, what every line draws from its from bus, and what every device feeds.
+    """Declare the outputs: all voltages, the power of every line at its from bus, and the power of every device.
 
     Parameters
     ----------
@@ -257,9 +260,9 @@ def declare_network_outputs(
     buses
         By name, with their voltages.
     drawn
-        What every line draws from its from bus, in the order of the lines: network frame [pu, 100 MVA].
+        Current of every line at its from bus, in the order of the lines: network frame [pu, 100 MVA].
     fed
-        What every device feeds, in the order of the ports: network frame [pu, 100 MVA].
+        Current of every device, in the order of the ports: network frame [pu, 100 MVA].
     """
     for name, bus in buses.items():
         with m.scope(name):

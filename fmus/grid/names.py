@@ -1,4 +1,4 @@
-"""How a grid names the variables of its lines, for models and for those who set and read them."""
+"""Names of the variables of a grid's lines, for the models and for programs that set and read the variables."""
 
 from collections.abc import Iterable
 
@@ -6,7 +6,9 @@ _DATA = ("X", "R", "B", "tap", "shift")
 
 
 def line_variable(line: str, quantity: str) -> str:
-    """Name of a line's variable: its data are such as ``X_tie``, all others such as ``tie.connected``."""
+    """Name of a line's variable: its data have names such as ``X_tie``, all other variables names such as
+    ``tie.connected``.
+    """
     return f"{quantity}_{line}" if quantity in _DATA else f"{line}.{quantity}"
 
 

@@ -7,10 +7,11 @@ from typing import Literal
 from fmus.grid.names import line_variable
 
 SMALLEST_REACTANCE = 1e-5
-"""Of a line [pu, 100 MVA]."""
+"""Smallest reactance of a line [pu, 100 MVA]."""
 
 OPEN_CHARGING = 1e-3
-"""Part of an open line's charging that stays, so that a bus which only this line supports keeps a defined voltage."""
+"""Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
+voltage."""
 
 ActivePower = Literal["impedance", "current"]
 """How a load's active power follows its voltage: with its square, or in proportion."""
@@ -45,7 +46,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage; by |v|², unless ``active`` says else."""
+    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage. Its power varies with |v|², unless ``active``
+    gives another law for P.
+    """
 
     name: str
     bus: str
@@ -56,7 +59,9 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Shunt:
-    """An admittance to earth: what it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an inductor."""
+    """An admittance to earth, by the power that it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an
+    inductor.
+    """
 
     name: str
     bus: str
@@ -74,13 +79,14 @@ class Port:
 
 @dataclass(frozen=True)
 class Network:
-    """Buses with what is connected to them.
+    """Buses, and the elements that are connected to them.
 
     Attributes
     ----------
     stray_B
-        Capacitance to earth [pu, 100 MVA] of every bus that has none of its own (charging, capacitor). With 0 such a
-        bus needs a load with P > 0. A unit behind a weak load needs it, too: there v = Σi/G jumps with its current.
+        Capacitance to earth [pu, 100 MVA] of every bus without capacitance of its own (charging, capacitor). If it is
+        0, such a bus needs a load with P > 0. A unit at a bus with a weak load needs the stray capacitance as well: v =
+        Σi/G would jump with the unit's current.
 
     Raises
     ------
@@ -104,7 +110,9 @@ class Network:
             raise ValueError(f"network {self.name!r}: " + "; ".join(problems))
 
     def has_capacitance(self, bus: str) -> bool:
-        """Whether the bus voltage is a state: line charging, a capacitive load or shunt, or the stray one is there."""
+        """Whether the bus voltage is a state, because of line charging, a capacitive load or shunt, or stray
+        capacitance.
+        """
         return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self.needs_stray(bus)
 
     def needs_stray(self, bus: str) -> bool:
@@ -112,7 +120,7 @@ class Network:
         return self.stray_B > 0 and not self._has_fixed_capacitance(bus)
 
     def hangs_on(self, load: Load) -> bool:
-        """Whether this load alone determines its bus's voltage, so that it cannot be switched off."""
+        """Whether this load alone determines its bus's voltage, and therefore cannot be switched off."""
         if self._has_fixed_capacitance(load.bus) or self.needs_stray(load.bus):
             return False
         if capacitive := self._capacitive_loads(load.bus):
@@ -120,7 +128,7 @@ class Network:
         return load.p_mw > 0 and not self._has_conductance(load.bus, without=load)
 
     def loads_decide(self, bus: str) -> bool:
-        """Whether nothing but switchable loads determines the bus's voltage."""
+        """Whether only switchable loads determine the bus's voltage."""
         return not (self._has_fixed_capacitance(bus) or self.needs_stray(bus)) and (
             bool(self._capacitive_loads(bus)) or not any(s.bus == bus and s.g_mw > 0 for s in self.shunts)
         )

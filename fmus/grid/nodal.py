@@ -7,16 +7,16 @@ Admittances = dict[str, dict[str, Phasor]]
 
 
 def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None:
-    """Add to one element.
+    """Add a value to one element of the matrix.
 
     Parameters
     ----------
     Y
-        It is changed in place.
+        The admittances, which are changed in place.
     row, column
         Names of buses; the row is there already.
     value
-        In the unit of the others.
+        The admittance to add, in the unit of the others.
     """
     Y[row][column] = Y[row].get(column, ZERO) + value
 

@@ -2,8 +2,8 @@
 
     (Y + Σ y)·v = Σ y·e          solved directly from the newest emfs whenever an output is read: there is no state
 
-Elements, parameters and outputs are those of `grid`; what is said there of constant-impedance loads, ratios and open
-lines holds here.
+Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
+described there.
 """
 
 import casadi as ca
@@ -99,7 +99,7 @@ def _add_line(Y: Admittances, line: Line, values: LineValues) -> None:
 
 
 def _drawn(line: Line, values: LineValues, buses: dict[str, Bus]) -> Phasor:
-    """What a line takes from its from bus, without its charging."""
+    """Current of a line at its from bus, without its charging."""
     v_from, v_to = buses[line.from_bus].v, buses[line.to_bus].v
     if values.ratio is None:
         return (v_from - v_to) * _series(values)

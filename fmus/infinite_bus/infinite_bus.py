@@ -1,8 +1,8 @@
 """Infinite bus: a source behind R + jX, a bus with capacitance and a load, and one device.
 
-What happens to it can be told from outside, by tunable parameters, or beforehand, by times: masters that change no
-parameter while they run can then see a voltage dip or a load step as well. Those times are kept by a clock of the
-FMU's own, which runs only where it is asked to, so that without it the system can stand still.
+A voltage dip or a load step can be set by tunable parameters during the run, or beforehand by times, for masters that
+change no parameter while they run. A clock inside the FMU compares these times. The clock runs only if it is enabled,
+because a running clock is a state that never stands still.
 """
 
 import casadi as ca
@@ -13,7 +13,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
 
 TOLERANCE = 1e-9
-"""How much before its time [s] something happens: far more than the clock's rounding, far less than an internal step.
+"""A dip or step happens this much before its time [s]: far more than the clock's rounding, far less than an internal
+step.
 
 A Runge-Kutta step that ends at that time sees it in its last stage, with a sixth of its weight.
 """
@@ -63,7 +64,7 @@ def _operating_point(m: ModelBuilder) -> tuple[Phasor, Phasor]:
 
 
 def _clock(m: ModelBuilder) -> ca.SX:
-    """Time since the start [s], or 0 for ever."""
+    """Time since the start [s], or always 0 if the clock is not enabled."""
     with m.scope("clock"):
         runs = m.switch("runs", False, "What has a time happens at it; without the clock nothing does")
         t = m.state("t", 0.0, "s", "Time since the start")
@@ -87,7 +88,7 @@ def _load(m: ModelBuilder, v_0: Phasor, t: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _source(m: ModelBuilder, start: Phasor, t: ca.SX, omega_b: ca.SX) -> Phasor:
-    """The source's voltage: its own frequency, and less of it in a dip."""
+    """The source's voltage, with its own frequency, and reduced in a dip."""
     with m.scope("source"):
         E = m.calculated("E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus")
         theta = m.state("theta", start.angle(), "rad", "Voltage angle of the source")

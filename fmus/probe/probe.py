@@ -1,9 +1,9 @@
 """The probe pair: a.y feeds b.u and b.y feeds a.u.
 
 Both are slow lags with a gain; b passes part of its input on directly, a passes nothing. Every difference between
-masters leaves its mark on a.y and b.y: who steps first, what the inputs hold in the first step (the start values of u
-are neither 0 nor what the partner gives), whether inputs are extrapolated, and whether outputs are recorded with the
-inputs of the step or with those of the next.
+masters changes a.y and b.y: the order of the steps, the values of the inputs in the first step (the start values of u
+differ from 0 and from the partner's output), the extrapolation of inputs, and the recording of outputs with the inputs
+of the step or of the next one.
 """
 
 from fmus.toolchain.model import Model

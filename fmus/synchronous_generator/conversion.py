@@ -3,8 +3,8 @@
 Each axis is a magnetising reactance with two rotor branches beside it: branch 1 slow (field, or first
 q damper), branch 2 fast (damper). Reactances and resistances are per unit on the stator base.
 
-X' = X says that the slow branch is not there, X'' = X' that the fast one is not: its reactance is then 1/`_NOTHING`
-times X_m, so that its state is there and has no effect.
+X' = X means that the slow branch is missing, X'' = X' that the fast one is missing. A missing branch has 1/`_NOTHING`
+times the reactance X_m: its state exists but has no effect.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 _NOTHING = 1e-9
-"""Admittance of a branch that is not there, in parts of 1/X_m."""
+"""Admittance of a missing branch, as a part of 1/X_m."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class RotorBranches:
 
 
 def classical(a: AxisData, omega_b: ca.SX) -> RotorBranches:
-    """Textbook formulas: the branches are taken as active one after the other."""
+    """Textbook formulas, which assume that the branches act one after the other."""
     X_m = a.X - a.X_l
     X_1 = X_m * (a.X1 - a.X_l) / ca.fmax(X_m - a.X1 + a.X_l, _NOTHING * (a.X1 - a.X_l))
     R_1 = (X_m + X_1) / (omega_b * a.T10)
@@ -55,7 +55,7 @@ def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
     X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each.
     """
     X_m = a.X - a.X_l
-    # The time constant of a fast branch that is not there means nothing, and must not pass for the slow one's.
+    # The time constant of a missing fast branch has no meaning, and must not be taken for that of the slow branch.
     T20 = ca.if_else(a.X1 - a.X2 <= _NOTHING * a.X, ca.fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)
     T1, T2 = a.T10 * a.X1 / a.X, T20 * a.X2 / a.X1
     # X(s) − X_l = (X_m + n1·s + n2·s²) / ((1 + s·T'_0)(1 + s·T''_0))
@@ -76,7 +76,7 @@ def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
 
 
 def convert(a: AxisData, omega_b: ca.SX, use_exact: ca.SX) -> RotorBranches:
-    """The one or the other, chosen when the FMU is initialised."""
+    """The branches by one of the two ways, chosen when the FMU is initialised."""
     e, c = exact(a, omega_b), classical(a, omega_b)
     pairs = zip((e.X_1, e.R_1, e.X_2, e.R_2), (c.X_1, c.R_1, c.X_2, c.R_2), strict=True)
     return RotorBranches(*(ca.if_else(use_exact, one, other) for one, other in pairs))

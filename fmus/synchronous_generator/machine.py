@@ -26,7 +26,7 @@ FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: magnetising and leakage reactance, rotor branches, states and what follows from them.
+    """One axis: magnetising and leakage reactance, rotor branches, states, and quantities that follow from them.
 
     ``emf`` is the flux behind the subtransient reactance; stator current and air-gap flux are
     linear in it and in the stator flux.
@@ -86,7 +86,9 @@ class Axis:
 
 @dataclass(frozen=True)
 class Start:
-    """What others start from: |v_t|, field voltage and current, torque; bus voltage and current, rotor's frame."""
+    """Start values for exciter and governor: |v_t|, field voltage and current, torque; bus voltage and current in the
+    rotor's frame.
+    """
 
     v_t: ca.SX
     E_fd: ca.SX
@@ -157,7 +159,7 @@ def declare_machine(
     data
         Defaults of the parameters.
     stator_flux
-        Declares ψ̃_d and ψ̃_q: as states, or as what a model without stator transients closes.
+        Declares ψ̃_d and ψ̃_q: as states, or as algebraic signals that a model without stator transients closes.
     """
     with m.scope("transformer"):
         R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
@@ -228,8 +230,8 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
 def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
     """Rates of ψ_q, ψ_d, ψ_f, ψ_1d, ψ_1q, ψ_2q.
 
-    Behind an open breaker the stator's flux follows the rotor's in such a way that the current fades as every open
-    breaker's does; the voltage at the breaker is then what the stator's equation leaves for it.
+    Behind an open breaker the stator's flux follows the rotor's such that the current fades like that of every open
+    breaker. The voltage at the breaker then follows from the stator's equation.
     """
     psi_f, psi_1d, psi_1q, psi_2q = _rotor_flux_rates(g, port, E_fd)
     v = port.v.rotated(-g.delta)

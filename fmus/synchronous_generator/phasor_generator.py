@@ -14,19 +14,9 @@ taken from i_q through a short lag, so that the emf follows from states alone; i
 
 import casadi as ca
 
-from fmus.synchronous_generator.data import (
-    IEEE118,
-    IEEEG1_NTS631,
-    IEEEG1_STAMP,
-    SG1,
-    SG2,
-    GovernorData,
-    MachineData,
-)
-from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
-from fmus.synchronous_generator.generator import declare_generator_outputs
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
+from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -36,31 +26,28 @@ from fmus.toolchain.port import DevicePort, device_port
 
 def synchronous_generator_ac4a_phasor() -> Model:
     """`synchronous_generator_ac4a` without stator transients."""
-    return _generator("ac4a", ac4a, IEEE118, IEEEG1_STAMP)
+    return _generator(AC4A)
 
 
 def synchronous_generator_st1_phasor() -> Model:
     """`synchronous_generator_st1` without stator transients."""
-    return _generator("st1", st1, SG2, IEEEG1_NTS631)
+    return _generator(ST1)
 
 
 def synchronous_generator_st4b_phasor() -> Model:
     """`synchronous_generator_st4b` without stator transients."""
-    return _generator("st4b", st4b, SG1, IEEEG1_NTS631)
+    return _generator(ST4B)
 
 
-def _generator(name: str, exciter: Exciter, data: MachineData, governor: GovernorData) -> Model:
-    m = phasor_builder(
-        f"synchronous_generator_{name}_phasor",
-        f"Synchronous generator with {name.upper()} exciter, IEEEG1 governor and step-up transformer (phasor type)",
-    )
-    port = device_port(m, data.S_n, data.P_0)
-    g = declare_machine(m, port, data, stator_flux=lambda m, name, start, text: m.algebraic(name))
+def _generator(variant: Variant) -> Model:
+    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"))
+    port = device_port(m, variant.data.S_n, variant.data.P_0)
+    g = declare_machine(m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name))
     emf = Phasor(g.d.emf, g.q.emf) * g.w
     _close_stator(m, g, port, emf)
     v_t = _terminal_voltage(g, port, emf)
-    E_fd, _ = exciter(m, g.start, lambda E: v_t, g.field_current)
-    P_m = ieeeg1(m, g.w, g.start.T_e, governor)
+    E_fd, _ = variant.exciter(m, g.start, lambda E: v_t, g.field_current)
+    P_m = ieeeg1(m, g.w, g.start.T_e, variant.governor)
     rotor_equations(m, g, port, E_fd, P_m)
 
     impedance = Phasor(g.R, g.d.X_between)

@@ -1,6 +1,7 @@
 """The zip archive of an FMU or SSP, the same bytes for the same contents."""
 
 import hashlib
+import io
 import uuid
 import zipfile
 from collections.abc import Mapping
@@ -26,6 +27,18 @@ def guid_of(digest: str) -> str:
     return "{" + str(uuid.uuid5(NAMESPACE, digest)) + "}"
 
 
+def packed(contents: Mapping[str, bytes]) -> bytes:
+    """The archive of members given by path: the same bytes for the same members."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _TIMESTAMP)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, content)
+    return buffer.getvalue()
+
+
 def write_archive(target: Path, contents: Mapping[str, bytes]) -> Path:
     """Write an FMU; the file appears whole or not at all.
 
@@ -38,11 +51,6 @@ def write_archive(target: Path, contents: Mapping[str, bytes]) -> Path:
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_suffix(f".{uuid.uuid4().hex}.part")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in contents.items():
-            entry = zipfile.ZipInfo(name, _TIMESTAMP)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            archive.writestr(entry, content)
+    partial.write_bytes(packed(contents))
     partial.replace(target)
     return target

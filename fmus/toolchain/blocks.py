@@ -1,9 +1,10 @@
 """Transfer-function blocks: each gives its equation and its own steady state.
 
 A block declares its state in the builder's current scope and returns its output signal. ``initial``
-is the steady-state value of its input, an expression of parameters. Where a block may be left out
-by a time constant of zero, as the block diagrams of the literature mean it, it passes its input
-through; its state then follows the input with `BYPASS_TIME` and is seen by nobody.
+is the steady-state value of its input (of `proportional_integral`: of its output), an expression of
+parameters. Where a block may be left out by a time constant of zero, as the block diagrams of the
+literature mean it, it passes its input through; its state then follows the input with `BYPASS_TIME`
+and is seen by nobody.
 """
 
 import casadi as ca

@@ -28,7 +28,7 @@ def build_model(name: str, **arguments: Any) -> Model:
     Raises
     ------
     KeyError
-        If no model has that name; the message lists those there are.
+        If no model has that name; the message lists all models.
     """
     model = _factory(name)(**arguments)
     if not isinstance(model, Model):

@@ -8,18 +8,17 @@ import hashlib
 import re
 import subprocess
 import sys
-import tempfile
-import uuid
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import require
+from fmus.toolchain.temporary import own_folder, remove, sweep_partial_files
 from fmus.toolchain.universal_binary import universal_binary
 
 TARGETS = {
-    # FMI platform -> zig targets of the machines that it stands for
+    # FMI platform -> zig targets of the machines with this platform
     "linux64": ("x86_64-linux-gnu.2.17",),
     "win64": ("x86_64-windows-gnu",),
     "darwin64": ("x86_64-macos", "aarch64-macos"),
@@ -48,7 +47,9 @@ _PREBUILT = Path(__file__).with_name("prebuilt")
 
 @cache
 def recipe() -> tuple[str, ...]:
-    """What decides beside the source what a library holds: part of every name that is a hash of contents."""
+    """Everything except the source that determines a library's contents. It is part of every hash that names a
+    library.
+    """
     return (*FLAGS, *_MAC_FLAGS, f"ziglang {version('ziglang')}")
 
 
@@ -58,7 +59,7 @@ def host_platform() -> str | None:
 
 
 def compile_library(source: str, platform: str) -> Path:
-    """Compile C source to a shared library, or return what was compiled from it before.
+    """Compile C source to a shared library, or return the library that was compiled from it before.
 
     Where a platform stands for several machines, the library holds code for each (a universal binary).
 
@@ -75,6 +76,8 @@ def compile_library(source: str, platform: str) -> Path:
         If the platform is unknown.
     RuntimeError
         If the compiler fails; its own text is in the message.
+    CacheError
+        If the library cannot be kept.
     """
     if platform not in TARGETS:
         raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
@@ -83,9 +86,7 @@ def compile_library(source: str, platform: str) -> Path:
         return compile_for(source, targets[0], ending)
     thin = [compile_for(source, target, ending) for target in targets]
     library = thin[0].with_name(f"{thin[0].stem}_universal{ending}")
-    if not library.exists():
-        _put(universal_binary([path.read_bytes() for path in thin]), library)
-    return library
+    return library if intact(library) else keep(library, universal_binary([path.read_bytes() for path in thin]))
 
 
 def compile_here(*files: Path) -> Path:
@@ -116,11 +117,14 @@ def prebuild(*files: Path) -> None:
     """
     source = joined_source(*files)
     for platform in TARGETS:
-        _put(compile_library(source, platform).read_bytes(), _prebuilt(source, platform))
+        library = _prebuilt(source, platform)
+        library.parent.mkdir(parents=True, exist_ok=True)
+        library.write_bytes(compile_library(source, platform).read_bytes())
+        library.chmod(0o755)
 
 
 def _prebuilt(source: str, platform: str) -> Path:
-    """Where the package has the library of a source, if it brought one; another source has another name."""
+    """Path of a source's library in the package, if the package contains one. Another source gives another name."""
     key = hashlib.sha256("\0".join([source, platform, *FLAGS, *_MAC_FLAGS]).encode()).hexdigest()[:32]
     return _PREBUILT / f"{key}{ENDINGS[platform]}"
 
@@ -147,24 +151,18 @@ def compile_for(source: str, target: str, ending: str) -> Path:
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS
     key = hashlib.sha256("\0".join([source, target, *recipe()]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
-    if library.exists():
+    if intact(library):
         return library
-    with tempfile.TemporaryDirectory(prefix="gfor_compile_") as folder:
-        c_file, built = Path(folder) / "source.c", Path(folder) / f"library{ending}"
+    sweep_partial_files(cache_directory("libraries").parent)
+    folder = own_folder("compile")
+    try:
+        c_file, built = folder / "source.c", folder / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
         compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
         command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
         result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         if result.returncode:
             raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}")
-        _put(built.read_bytes(), library)
-    return library
-
-
-def _put(content: bytes, library: Path) -> None:
-    """Write a library at once: others, perhaps on other machines, may be compiling the same."""
-    library.parent.mkdir(parents=True, exist_ok=True)
-    partial = library.with_suffix(f".{uuid.uuid4().hex}.part")
-    partial.write_bytes(content)
-    partial.chmod(0o755)
-    partial.replace(library)
+        return keep(library, built.read_bytes())
+    finally:
+        remove(folder)

@@ -1,4 +1,4 @@
-"""What each unknown of a model depends on, from the sparsity of its equations.
+"""The variables that each unknown of a model depends on, from the sparsity of its equations.
 
 Variables are named by their FMI value reference.
 """
@@ -13,7 +13,7 @@ from fmus.toolchain.model import Model
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A variable that is computed, and those it is computed from."""
+    """A computed variable, and the variables that it is computed from."""
 
     reference: int
     known: tuple[int, ...]
@@ -29,7 +29,7 @@ class Structure:
 
 
 def structure(model: Model) -> Structure:
-    """Outputs and derivatives by inputs and states; what initialisation computes by parameters and inputs."""
+    """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs."""
     np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
     nx, ny = len(model.states), len(model.outputs)
     parameters, inputs = np.arange(np_), np_ + nc + np.arange(nu)
@@ -68,7 +68,7 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _pattern(function: ca.Function, output: int, input_: int) -> np.ndarray:
-    """Which element of an output depends on which element of an input, as a Boolean matrix."""
+    """Boolean matrix: whether each element of an output depends on each element of an input."""
     pattern = function.jac_sparsity(output, input_)
     matrix = np.zeros(pattern.shape, dtype=bool)
     rows, columns = pattern.get_triplet()

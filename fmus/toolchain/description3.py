@@ -1,12 +1,19 @@
 """modelDescription.xml of FMI 3.0 for co-simulation, from a model's declarations."""
 
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
-from fmus.toolchain.dependencies import Unknown, structure
-from fmus.toolchain.description import TOOL, attributes_of, derivative_unit, write_log_categories, write_units
+from fmus.toolchain.description_common import (
+    TOOL,
+    described_variables,
+    root_element,
+    text_of,
+    unknowns,
+    write_definitions,
+)
 from fmus.toolchain.model import Model
 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+"""FMI 2.0's name of a type → FMI 3.0's."""
 
 
 def model_description_3(model: Model, token: str, identifier: str, tool: str) -> bytes:
@@ -21,15 +28,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     tool
         Name and version for ``generationTool``.
     """
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token,
-        description=model.title,
-        generationTool=tool,
-        variableNamingConvention="structured",
-    )
+    root = root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(
         root,
         "CoSimulation",
@@ -40,38 +39,20 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
         providesDirectionalDerivatives="true",
         providesAdjointDerivatives="true",
     )
-    write_units(root, model)
-    write_log_categories(root, "fmi3")
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
+    write_definitions(root, model, "fmi3")
     _variables(root, model)
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
     SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
-    indent(root)
-    text: str = tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+    return text_of(root)
 
 
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(model.variables):
-        attributes, kind, own = attributes_of(variable)
-        common = {"name": variable.name, "valueReference": str(reference), "description": variable.text}
-        SubElement(variables, _TYPES[kind], {**common, **attributes, **own})
-    for state in model.states:
-        name = f"der({state.name})"
-        SubElement(
-            variables,
-            "Float64",
-            name=name,
-            valueReference=str(model.value_references[name]),
-            description=f"Time derivative of {state.name}",
-            causality="local",
-            variability="continuous",
-            initial="calculated",
-            unit=derivative_unit(state),
-            derivative=str(model.value_references[state.name]),
-        )
+    for variable in described_variables(model):
+        state = variable.derivative_of
+        more = {} if state is None else {"derivative": str(state)}
+        SubElement(variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more})
     SubElement(
         variables,
         "Float64",
@@ -85,18 +66,8 @@ def _variables(root: Element, model: Model) -> None:
 
 
 def _structure(root: Element, model: Model) -> None:
-    known = structure(model)
     element = SubElement(root, "ModelStructure")
-
-    def write(name: str, unknowns: tuple[Unknown, ...]) -> None:
-        for unknown in unknowns:
-            SubElement(
-                element,
-                name,
-                valueReference=str(unknown.reference),
-                dependencies=" ".join(map(str, unknown.known)),
-            )
-
-    write("Output", known.outputs)
-    write("ContinuousStateDerivative", known.derivatives)
-    write("InitialUnknown", known.initial)
+    for kind, group in unknowns(model).items():
+        for unknown in group:
+            dependencies = " ".join(map(str, unknown.known))
+            SubElement(element, kind, valueReference=str(unknown.reference), dependencies=dependencies)

@@ -4,23 +4,23 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
-from fmus.toolchain.archive import write_archive
-from fmus.toolchain.cache import cache_directory
+from fmus.toolchain.archive import packed, write_archive
+from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.model import Model
 
 
 class Recipe(Protocol):
-    """What one kind of FMU is made from, for one model.
+    """The recipe for one kind of FMU of one model.
 
     Attributes
     ----------
     model
-        What is exported.
+        The exported model.
     digest
         Hash over everything that the FMU is made from [hex].
     cache_prefix
-        Begins the name of the folder in which this machine's FMU is kept.
+        First part of the name of the folder that holds this machine's FMU.
     """
 
     model: Model
@@ -28,7 +28,7 @@ class Recipe(Protocol):
     cache_prefix: str
 
     def default_platforms(self) -> tuple[str, ...]:
-        """Platforms to compile for where nobody names any [FMI 2.0 names]."""
+        """Default platforms to compile for [FMI 2.0 names]."""
 
     def host_platforms(self) -> tuple[str, ...]:
         """Platforms to compile for where the FMU is for this machine alone [FMI 2.0 names].
@@ -79,20 +79,22 @@ def export(
 
 
 def cached(recipe: Recipe) -> Path:
-    """Return this machine's FMU, building it only if it was not built before.
+    """Return this machine's FMU, building it if it was not built before, or was changed since.
 
     Raises
     ------
     RuntimeError
         If no such FMU can be made for this machine.
+    CacheError
+        If it cannot be kept.
     """
     platforms = recipe.host_platforms()
     folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
     target = folder / f"{recipe.model.name}.fmu"
-    return target if target.exists() else export(recipe, folder, platforms)
+    return target if intact(target) else keep(target, packed(recipe.contents(platforms)))
 
 
 def this_machine() -> tuple[str, ...]:
-    """The platform of this machine, or none where there is no compiler target for it."""
+    """The platform of this machine; empty if the compiler has no target for it."""
     host = host_platform()
     return (host,) if host else ()

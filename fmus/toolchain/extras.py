@@ -10,11 +10,16 @@ EXTRAS = {
     "pandapower": "networks",
     "skrf": "black-box",
     "distributed": "cluster",
+    "helics": "federation",
 }
 """Name of a library in an import → extra of this distribution that installs it."""
 
 
-class MissingLibraryError(RuntimeError):
+class SetupError(Exception):
+    """What was asked needs another set-up of this machine; the message says what the user can change."""
+
+
+class MissingLibraryError(SetupError, RuntimeError):
     """A library that an extra installs is needed, and is not installed."""
 
 

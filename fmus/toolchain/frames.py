@@ -80,8 +80,8 @@ def polar(magnitude: Scalar, angle: Scalar) -> Phasor:
 def of_phases(values: Phases, angle: Scalar) -> Phasor:
     """Instantaneous values of three phases as one complex quantity in a frame at ``angle`` [rad].
 
-    (2/3)·(a + b·e^{j2π/3} + c·e^{−j2π/3})·e^{−j·angle}: a balanced cosine keeps its amplitude. What the phases
-    have in common, the zero sequence, drops out.
+    (2/3)·(a + b·e^{j2π/3} + c·e^{−j2π/3})·e^{−j·angle}: a balanced cosine keeps its amplitude. The common part of the
+    phases, the zero sequence, is removed.
     """
     a, b, c = values
     return Phasor((2 * a - b - c) / 3, (b - c) / ca.sqrt(3)).rotated(-angle)

@@ -117,13 +117,13 @@ class ModelBuilder:
         base
             What 1 pu is, such as ``"S_n"``; required where the unit is ``pu``.
         minimum, maximum
-            Bounds; None where there is none.
+            Bounds; None for an unbounded side.
         tunable
             Whether it can be set at any communication point, not only before initialisation.
         type
             In the equations an Integer or a Boolean is a number as well.
         source
-            Where the default comes from; empty where that is not said.
+            Source of the default value; empty if it is not given.
         """
         return self._declare(
             Parameter(

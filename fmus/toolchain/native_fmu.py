@@ -25,12 +25,12 @@ _FOLDERS_3 = {
 
 
 class NativeFmu:
-    """Everything that a native FMU is made from, with one hash over all of it.
+    """All parts of a native FMU, with one hash over them.
 
     Parameters
     ----------
     model
-        What to export.
+        The exported model.
     version
         Of FMI.
     """

@@ -1,4 +1,4 @@
-"""The C source of a native FMU: kernel, exact derivatives, what the instance knows of its model, and FMI around it.
+"""The C source of a native FMU: kernel, exact derivatives, the data of the model, and the functions of FMI.
 
 One translation unit per version of FMI, with nothing in it but the C library.
 """
@@ -16,13 +16,13 @@ _SHORTEST_TEXT = 640
 
 
 def identity_source(guid: str, digest: str) -> str:
-    """What stands before the source: the FMU's identity. The digest [hex] also marks the states that it saves."""
+    """The text before the source: the FMU's identity. The digest [hex] also marks the states that the FMU saves."""
     identity = ", ".join(str(b) for b in bytes.fromhex(digest)[:16])
     return f"static const char GUID[] = {_string(guid)};\nstatic const unsigned char IDENTITY[16] = {{{identity}}};\n"
 
 
 def native_source(model: Model, version: FmiVersion) -> str:
-    """Source of the FMU's binary, but for its identity, which follows from this text."""
+    """Source of the FMU's binary without its identity, which is a hash of this text."""
     parts = [
         "#define KERNEL static",
         c_source(model, derivative_functions(model)),
@@ -71,7 +71,7 @@ def _adjoint(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function
 
 
 def _data(model: Model) -> str:
-    """What the instance knows of its model, as C declarations."""
+    """Data of the model for the instance, as C declarations."""
     parameters, rules = model.parameters, model.requirement_texts
     texts = [*rules, *model.value_references]
     start = [p.start for p in parameters] + [u.start for u in model.inputs]

@@ -36,11 +36,12 @@ class SourceEmf:
 
 
 def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
-    """Declare what is to be known of the master; return the emf in the middle of the step done and of that to come.
+    """Declare the master's step and delay as parameters; return the emf in the middle of the last step and of the next
+    step.
 
-    A master holds the bus voltage during a step, so that it is half a step old on average. With the emfs of the middle
-    of the coming step the network's voltages are those of the middle. The emf turns with its frame, and its components
-    in that frame move as a derivative with a short lag tells, so that all of it follows from states.
+    A master holds the bus voltage during a step, and so the voltage is half a step old on average. With the emfs of the
+    middle of the coming step the network's voltages are those of the middle. The emf turns with its frame. A derivative
+    with a short lag gives the motion of its components in that frame. Both emfs therefore follow from states alone.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
 def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor) -> None:
     """Declare the port's outputs: current and powers as every device has them, emf and admittance.
 
-    Current and powers are read after a step, with the voltage that was held in it: they are those of its middle.
+    Current and powers are read after a step, with the voltage that was held in the step, and therefore hold for its
+    middle.
 
     Parameters
     ----------

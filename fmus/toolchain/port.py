@@ -1,4 +1,4 @@
-"""The port through which a device meets the grid, and the power-flow figures it starts from.
+"""The port between a device and the grid, and the power-flow values from which the device starts.
 
 A device takes the bus voltage and gives the current of its transformer, both in the network frame.
 The current is a state, so a device has no direct feed-through at its port.
@@ -45,7 +45,7 @@ class DevicePort:
     connected: ca.SX
 
     def through_breaker(self, closed: Phasor, opened: Phasor) -> Phasor:
-        """What holds behind a closed breaker, or behind an open one."""
+        """The first value behind a closed breaker, the second behind an open one."""
         return closed * self.connected + opened * (1 - self.connected)
 
 

@@ -1,7 +1,7 @@
 """The variables of a device's port and the system base: names, units, texts and limits as plain data.
 
-Models declare their port from them, and the orchestrator gives a foreign FMU behind a binding the same one, so this
-module imports no CasADi.
+Models declare their port from them, and the orchestrator gives a bound foreign FMU the same port. Therefore this module
+imports no CasADi.
 """
 
 from fmus.toolchain.variables import Input, Output, Parameter
@@ -19,7 +19,7 @@ P = Output("p", "pu", "Active power into the bus", base="S_n")
 Q = Output("q", "pu", "Reactive power into the bus", base="S_n")
 
 S_N = Parameter("S_n", "MVA", "Rated apparent power, the device's base", minimum=1e-3)
-"""Each device has a start value of its own; so has `P_0`."""
+"""Each device has its own start value; the same holds for `P_0`."""
 
 P_0 = Parameter("P_0", "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
 Q_0 = Parameter("Q_0", "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
@@ -29,7 +29,8 @@ V_0 = Parameter(
 THETA_0 = Parameter("theta_0", "rad", "Power flow: voltage angle at the bus")
 
 S_BASE = Parameter("S_base", "MVA", "Base power of the network", start=SYSTEM_BASE_MVA, minimum=1e-3)
-"""Our devices have it; what is coupled must leave it at its start, because networks are in pu of that base."""
+"""Parameter of our devices. Coupled devices must leave it at its start value, because networks are in pu of that
+base."""
 
 INPUTS = (V_RE, V_IM)
 OUTPUTS = (I_RE, I_IM, P, Q)

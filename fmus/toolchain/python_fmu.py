@@ -24,7 +24,7 @@ _SLAVE, _WRAPPER = (Path(__file__).with_name(name) for name in ("slave.py", "wra
 
 
 class PythonFmu:
-    """Everything that a Python-backed FMU is made from, with one hash over all of it."""
+    """All parts of a Python-backed FMU, with one hash over them."""
 
     cache_prefix = ""
 
@@ -40,7 +40,7 @@ class PythonFmu:
         self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
 
     def default_platforms(self) -> tuple[str, ...]:
-        """That of this machine."""
+        """The platform of this machine."""
         return this_machine()
 
     def host_platforms(self) -> tuple[str, ...]:
@@ -73,7 +73,7 @@ class PythonFmu:
 
 
 def _slave_data(model: Model) -> dict[str, object]:
-    """What the slave knows of its model."""
+    """Data of the model for the slave."""
     first_input = len(model.parameters) + len(model.calculated)
     start = {index: p.start for index, p in enumerate(model.parameters)}
     start |= {first_input + index: i.start for index, i in enumerate(model.inputs)}

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Sequence
 
 _MAGIC = 0xCAFEBABE
-_ALIGNMENT = 14  # of each library's place in the file, as a power of two: the page size of the newer processors
+_ALIGNMENT = 14  # alignment of each library in the file, as a power of two: the page size of the newer processors
 _THIN = b"\xcf\xfa\xed\xfe"
 
 

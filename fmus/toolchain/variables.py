@@ -1,4 +1,4 @@
-"""What a model tells the world about each of its quantities: declared once, used everywhere.
+"""Declarations of a model's quantities: written once, used everywhere.
 
 A declaration becomes a line of the modelDescription, a row of the README's table, the bounds that
 the slave enforces and the unit that a case file is checked against.
@@ -84,7 +84,7 @@ class CalculatedParameter(Variable):
 
 @dataclass(frozen=True, slots=True)
 class Input(Variable):
-    """A quantity that the master sets at communication points and that is held in between."""
+    """A quantity that the master sets at communication points, and that keeps its value in between."""
 
     start: float = 0.0
 

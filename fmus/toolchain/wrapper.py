@@ -1,8 +1,8 @@
 """pythonfmu's binaries, which go into every Python-backed FMU, with a fault of the Linux one mended.
 
-When a process ends, that library gives up its interpreter twice: once as C++ does with every static object, and once
-in a function ``finalizePythonInterpreter`` of its own, which by then counts down in memory that was freed. Now and then
-the process aborts of it, after complete results. The second time is left out.
+When a process ends, that library releases its interpreter twice: once by the destructor of a static C++ object, and
+once in its function ``finalizePythonInterpreter``, which then changes a counter in freed memory. Now and then this
+aborts the process after complete results. The second release is left out.
 """
 
 import struct
@@ -32,7 +32,7 @@ def _mended(binary: bytes) -> bytes:
 
 
 def _offset_of(binary: bytes, function: bytes) -> int | None:
-    """Where in a 64-bit ELF file a function that it exports begins."""
+    """Offset of an exported function in a 64-bit ELF file."""
     (table,) = struct.unpack_from("<Q", binary, 40)
     size, count = struct.unpack_from("<HH", binary, 58)
     # of every section: type, address, offset, size, link, size of an entry

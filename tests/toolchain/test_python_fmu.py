@@ -30,6 +30,7 @@ _CONVERTER_OPEN |= {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
     "gfor_abc": _CONVERTER_OPEN,
+    "gfor_pod_input": _CONVERTER_OPEN,
     "gfor_phasor": _CONVERTER_OPEN | {"communication_step": 5e-3},
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.

@@ -1,0 +1,84 @@
+"""What tells the catalogue's generators apart, and what all of them show: with stator transients and without alike."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.synchronous_generator.data import (
+    IEEE118,
+    IEEEG1_NTS631,
+    IEEEG1_STAMP,
+    SG1,
+    SG2,
+    GovernorData,
+    MachineData,
+)
+from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
+from fmus.synchronous_generator.machine import Machine
+from fmus.toolchain.model_builder import ModelBuilder
+
+
+@dataclass(frozen=True)
+class Variant:
+    """An excitation system, and default values of machine and governor.
+
+    Attributes
+    ----------
+    name
+        Of the exciter, as models are called: ``st4b``.
+    exciter
+        Declares it.
+    data, governor
+        Default values.
+    """
+
+    name: str
+    exciter: Exciter
+    data: MachineData
+    governor: GovernorData
+
+    def model_name(self, suffix: str = "") -> str:
+        """Name of the model; the suffix is a stabiliser's, or that of another model of the stator."""
+        return "_".join(["synchronous_generator", self.name, *([suffix] if suffix else [])])
+
+    def title(self, kind: str, stabilizer: str = "") -> str:
+        """The model's title; ``kind`` says how its stator is modelled, such as ``phasor type``."""
+        extra = f" {stabilizer.upper()} stabiliser," if stabilizer else ""
+        return (
+            f"Synchronous generator with {self.name.upper()} exciter,{extra} IEEEG1 governor and step-up transformer "
+            f"({kind})"
+        )
+
+
+AC4A = Variant("ac4a", ac4a, IEEE118, IEEEG1_STAMP)
+"""The generators of the IEEE 118-bus case."""
+
+ST1 = Variant("st1", st1, SG2, IEEEG1_NTS631)
+"""SG2 of the two-area case."""
+
+ST4B = Variant("st4b", st4b, SG1, IEEEG1_NTS631)
+"""SG1 of the two-area case, and with PSS2A SG1 of the grid code's two-area system."""
+
+
+def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_fd: ca.SX, P_m: ca.SX) -> None:
+    """Declare what a generator shows beside its port.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    machine
+        Gives speed, angle and torque.
+    v_t
+        Voltage magnitude at the terminal [pu, S_n].
+    E_fd
+        Field voltage; 1 pu gives 1 pu of voltage on open circuit.
+    P_m
+        Mechanical power [pu, S_n].
+    """
+    m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
+    m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
+    m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")
+    m.output("E_fd", E_fd, "pu", "Field voltage; 1 gives 1 pu on open circuit", base="E_fd")
+    m.output("P_m", P_m, "pu", "Mechanical power", base="S_n")
+    m.output("T_e", machine.torque, "pu", "Electrical torque", base="S_n")

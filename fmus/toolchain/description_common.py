@@ -1,0 +1,162 @@
+"""What modelDescription.xml says in FMI 2.0 and in FMI 3.0 alike, from a model's declarations.
+
+`description` and `description3` write the rest: the names that a version gives its elements, and their order.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from fmus.toolchain.dependencies import Unknown, structure
+from fmus.toolchain.model import Model
+from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
+
+TOOL = "gfor-cosim"
+
+_CALCULATED = {"causality": "local", "variability": "continuous", "initial": "calculated"}
+
+
+@dataclass(frozen=True)
+class DescribedVariable:
+    """A variable as both versions declare it.
+
+    Attributes
+    ----------
+    reference
+        Value reference; FMI 2.0's index is greater by one, as the file lists variables in this order.
+    attributes
+        Name, value reference, text, causality, variability and initial.
+    kind
+        Name of the type in FMI 2.0.
+    own
+        Attributes of the type: start, bounds and unit.
+    derivative_of
+        Value reference of the state whose time derivative it is; None for all others.
+    """
+
+    reference: int
+    attributes: Mapping[str, str]
+    kind: str
+    own: Mapping[str, str]
+    derivative_of: int | None = None
+
+
+def root_element(model: Model, version: str, identity: Mapping[str, str], tool: str) -> Element:
+    """The file's outermost element.
+
+    Parameters
+    ----------
+    model
+        What the FMU computes.
+    version
+        Of FMI.
+    identity
+        The attribute that tells one FMU from another.
+    tool
+        Name and version for ``generationTool``. No date is written: equal contents give equal files.
+    """
+    attributes = {
+        "fmiVersion": version,
+        "modelName": model.name,
+        **identity,
+        "description": model.title,
+        "generationTool": tool,
+        "variableNamingConvention": "structured",
+    }
+    return Element("fmiModelDescription", attributes)
+
+
+def write_definitions(root: Element, model: Model, prefix: str) -> None:
+    """Declare units, categories of messages (``prefix`` is ``fmi2`` or ``fmi3``) and the default experiment."""
+    _write_units(root, model)
+    _write_log_categories(root, prefix)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
+
+
+def described_variables(model: Model) -> Iterator[DescribedVariable]:
+    """All variables in the order of their value references; the states' time derivatives come last."""
+    for reference, variable in enumerate(model.variables):
+        attributes, kind, own = _attributes_of(variable)
+        yield DescribedVariable(reference, _named(variable.name, reference, variable.text) | attributes, kind, own)
+    for state in model.states:
+        name = f"der({state.name})"
+        reference = model.value_references[name]
+        yield DescribedVariable(
+            reference,
+            _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED,
+            "Real",
+            {"unit": _derivative_unit(state)},
+            model.value_references[state.name],
+        )
+
+
+def unknowns(model: Model) -> dict[str, tuple[Unknown, ...]]:
+    """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0."""
+    known = structure(model)
+    return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
+
+
+def text_of(root: Element) -> bytes:
+    """The file's text."""
+    indent(root)
+    text: str = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def _derivative_unit(state: State) -> str:
+    return f"{state.unit}/s"
+
+
+def _named(name: str, reference: int, text: str) -> dict[str, str]:
+    return {"name": name, "valueReference": str(reference), "description": text}
+
+
+def _write_log_categories(root: Element, prefix: str) -> None:
+    categories = SubElement(root, "LogCategories")
+    for status in ("Warning", "Discard", "Error", "Fatal"):
+        description = f"Messages with {prefix}{status} status"
+        SubElement(categories, "Category", name=f"logStatus{status}", description=description)
+    SubElement(categories, "Category", name="logAll", description="All messages")
+
+
+def _write_units(root: Element, model: Model) -> None:
+    """Every unit in use."""
+    used = {v.unit for v in model.variables} | {_derivative_unit(s) for s in model.states}
+    definitions = SubElement(root, "UnitDefinitions")
+    for unit in sorted(used):
+        element = SubElement(definitions, "Unit", name=unit)
+        exponents = {key: f"{value:g}" for key, value in UNITS[unit].items()}
+        if exponents:
+            SubElement(element, "BaseUnit", exponents)
+
+
+def _attributes_of(variable: Variable) -> tuple[dict[str, str], str, dict[str, str]]:
+    """Causality, variability and initial; the type's name in FMI 2.0; and the attributes that the type has."""
+    match variable:
+        case Parameter(type=kind):
+            attributes = {
+                "causality": "parameter",
+                "variability": "tunable" if variable.tunable else "fixed",
+                "initial": "exact",
+            }
+            return attributes, kind, _parameter_type(variable)
+        case CalculatedParameter():
+            attributes = {"causality": "calculatedParameter", "variability": "fixed", "initial": "calculated"}
+            return attributes, "Real", {"unit": variable.unit}
+        case Input():
+            attributes = {"causality": "input", "variability": "continuous"}
+            return attributes, "Real", {"unit": variable.unit, "start": repr(float(variable.start))}
+        case Output():
+            attributes = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+            return attributes, "Real", {"unit": variable.unit}
+        case _:
+            return _CALCULATED, "Real", {"unit": variable.unit}
+
+
+def _parameter_type(parameter: Parameter) -> dict[str, str]:
+    if parameter.type == "Boolean":
+        return {"start": "true" if parameter.start else "false"}
+    convert = int if parameter.type == "Integer" else float
+    bounds = {"min": parameter.minimum, "max": parameter.maximum, "start": parameter.start}
+    attributes = {key: repr(convert(value)) for key, value in bounds.items() if value is not None}
+    return attributes if parameter.type == "Integer" else {"unit": parameter.unit, **attributes}

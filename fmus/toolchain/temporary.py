@@ -1,0 +1,107 @@
+"""Temporary folders that say by a lock whose they are: those whose owner is gone are removed at the next start.
+
+A process that is killed removes nothing. The lock of a folder ends with the last process that holds it open, also in
+another container and when a process number is used again.
+"""
+
+import contextlib
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from fmus.toolchain.removal import remove_tree
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+_LOCKED, _NEW = "gfor_locked_", "gfor_new_"
+"""Beginnings of the names of folders that have their lock, and of those that get it within microseconds."""
+_YOUNG = 60.0
+"""Age below which a new folder may not have its lock yet [s]."""
+_ABANDONED = 7 * 86_400.0
+"""Age at which a folder counts as left behind where there are no locks [s]."""
+_UNFINISHED = 3600.0
+"""Age of a file that is still being written at which nobody writes it any more [s]; it takes seconds."""
+
+_locks: dict[Path, int] = {}
+_swept = set[Path]()
+
+
+def own_folder(kind: str) -> Path:
+    """A new temporary folder of this process's own; `remove` removes it."""
+    parent = Path(tempfile.gettempdir())
+    if parent not in _swept:
+        _swept.add(parent)
+        sweep(parent)
+    for other in [path for path in _locks if not path.exists()]:  # removed by other means
+        os.close(_locks.pop(other))
+    if fcntl is None:
+        return Path(tempfile.mkdtemp(prefix=f"{_LOCKED}{kind}_"))
+    new = Path(tempfile.mkdtemp(prefix=f"{_NEW}{kind}_"))
+    lock = os.open(new, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:  # some network drives have no locks
+        os.close(lock)
+        return new
+    folder = new.with_name(_LOCKED + new.name.removeprefix(_NEW))
+    new.rename(folder)
+    _locks[folder] = lock
+    return folder
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder, and give its lock back."""
+    remove_tree(folder)
+    if (lock := _locks.pop(folder, None)) is not None:
+        os.close(lock)
+
+
+def sweep(parent: Path) -> list[Path]:
+    """Remove the user's folders whose owners are gone; returns them.
+
+    A folder that cannot be removed stays, and the others are removed all the same: no start fails for what an earlier
+    one left behind.
+    """
+    names: list[str] = []
+    with contextlib.suppress(OSError):
+        names = os.listdir(parent)
+    gone = []
+    for name in names:
+        folder = parent / name
+        with contextlib.suppress(Exception):
+            if name.startswith((_LOCKED, _NEW)) and _is_left_behind(folder):
+                remove_tree(folder)
+                gone.append(folder)
+    return gone
+
+
+def _is_left_behind(folder: Path) -> bool:
+    try:
+        seen = folder.lstat()
+        age = time.time() - seen.st_mtime
+        if fcntl is None:
+            return age > _ABANDONED
+        if seen.st_uid != os.getuid() or (folder.name.startswith(_NEW) and age < _YOUNG):
+            return False
+        opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(opened)
+    return True
+
+
+def sweep_partial_files(folder: Path) -> None:
+    """Remove files that somebody began to write below a folder and that nobody finished within an hour."""
+    for path in folder.rglob("*.part"):
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > _UNFINISHED:
+                path.unlink()
