@@ -31,6 +31,15 @@ from orchestrator.units import to_unit
         ("3", "1", 3.0),
         ("10 %", "1", 0.1),
         ("3", "", 3.0),
+        ("2 kHz", "Hz", 2000.0),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("1 revolution/s", "rad/s", 2 * math.pi),
+        ("180 deg/s", "rad/s", math.pi),
+        ("3 s^-1", "1/s", 3.0),
+        ("3 rad/s", "1/s", 3.0),
+        ("0.5 Hz/s", "Hz/s", 0.5),
+        ("1 MW/Hz", "kW/Hz", 1000.0),
+        ("0.25 turn", "rad", math.pi / 2),
     ],
 )
 def test_a_quantity_in_the_declared_unit(value, unit, expected):
@@ -74,9 +83,29 @@ def test_a_decimal_comma_or_a_blank_inside_a_number_is_refused_or_understood(val
     assert converted == pytest.approx(meant)
 
 
-def test_a_frequency_is_not_taken_for_an_angular_frequency():
-    try:
-        converted = to_unit("50 Hz", "rad/s")
-    except ValueError:
-        return
-    assert converted == pytest.approx(2 * math.pi * 50)
+@pytest.mark.parametrize(
+    ("value", "unit"),
+    [
+        ("50 Hz", "rad/s"),
+        ("50 Hz", "deg/s"),
+        ("50 Hz", "rpm"),
+        ("60 Hz", "1/s"),
+        ("2 kHz", "rad/s"),
+        ("314.159 rad/s", "Hz"),
+        ("18000 deg/s", "Hz"),
+        ("1 revolution/s", "Hz"),
+        ("1 rpm", "Hz"),
+        ("60 s^-1", "Hz"),
+        ("60 rpm", "1/s"),
+        ("3 s^-1", "rpm"),
+        ("1 turn", "1"),
+        ("1 rad/s/s", "Hz/s"),
+        ("1 MW/Hz", "MW*s/rad"),
+        ("1 MW*s/rad", "MW/Hz"),
+    ],
+)
+def test_cycles_and_angles_are_not_taken_for_one_another(value, unit):
+    """A conversion that loses the 2π gives a plausible wrong number."""
+    with pytest.raises(ValueError, match="is needed; 1 Hz is 2π rad/s, or 60 rpm") as caught:
+        to_unit(value, unit)
+    assert str(caught.value).startswith(repr(value))

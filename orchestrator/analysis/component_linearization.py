@@ -1,6 +1,6 @@
 """Linear model of one running FMU over one communication step, by perturbation of its states and inputs.
 
-Where an FMU gives directional derivatives, they are the independent way to the same.
+Where an FMU gives directional derivatives, these give the same model in an independent way.
 """
 
 from collections.abc import Mapping, Sequence
@@ -8,31 +8,19 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.analysis.derivative_check import check_derivatives
+from orchestrator.analysis.differences import PerturbedStep
 from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.held_inputs import over_held_inputs
 from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED
+from orchestrator.analysis.perturbation import perturb
 from orchestrator.analysis.response_check import ContinuousModel, check_response
 from orchestrator.analysis.state_access import StateAccess
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.loop import Exchange
 from orchestrator.errors import AnalysisError
-from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.linear_model import EmbeddedModel
-
-PERTURBATIONS = (1e-5, 1e-6, 1e-7, 1e-8)
-"""Central differences are taken with the first and with twice of it, relative to max(1, |value|), and should agree. A
-column where they do not, as a limit or a dead band is close by, is taken anew with the next size."""
-
-_AGREE, _SMALL = 5e-3, 1e-2
-"""Two sizes agree where every element differs by less than this part of its size, and of this rate [1/s]. In smooth
-systems, up to the IEEE 118-bus one, the part is at most 3e-4; where a signal runs into its limit it is a half."""
-
-_EVEN = 0.1
-"""An element whose answers up and down differ by more than this part belongs to a limit on one side; in smooth systems
-it is at most 0.05."""
 
 
 class StepMap(NamedTuple):
@@ -51,27 +39,29 @@ class ComponentLinearization:
     Attributes
     ----------
     states, inputs, outputs
-        Names; inputs and outputs are the connected ones, and after them the inputs that were asked for.
+        Names. The connected inputs and outputs come first, then the requested inputs.
     A, B, C, D
         Of the step map, shapes (n, n), (n, m), (p, n), (p, m).
     observed
-        Names of the outputs that were asked for.
+        Names of the requested outputs.
     C_o, D_o
-        Their rows, shapes (q, n), (q, m).
+        Rows of C and D for the requested outputs, shapes (q, n), (q, m).
     A_c, B_c
-        Of the continuous model, from the FMU's own derivatives; None where it declares none or they were not asked for.
+        A and B of the continuous model, from the FMU's own derivatives; None if the FMU declares no derivatives or they
+        were not requested.
     disagreement
         Largest difference of an element of A, B, C or D between the two perturbation sizes.
     source
-        How it was found: ``perturbed``, ``directional``, ``packed`` or ``identified``.
+        Origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``.
     variants
-        Other answers to the same question, which should hardly differ: from the other perturbation size, and from
-        perturbing to one side only; where some took a smaller size, from twice the usual one. Empty where nothing was
-        perturbed.
+        The same matrices, computed in other ways, which should hardly differ: with the other perturbation size, and
+        with a perturbation to one side only. Where some columns have a smaller size, also with twice the usual size.
+        Empty for a model that was not perturbed.
     narrow
-        The perturbation, relative to max(1, |value|), of states and inputs that took a smaller one than usual.
+        Size of the perturbation, relative to max(1, |value|), by the name of each state or input that needed a smaller
+        size than usual.
     doubtful
-        States and inputs for which no two sizes agreed, or that are answered differently up and down.
+        States and inputs for which no two sizes agreed, or whose differences upwards and downwards deviate.
     """
 
     name: str
@@ -103,7 +93,7 @@ def linearize_component(
     *,
     derivatives: bool = False,
 ) -> ComponentLinearization:
-    """Perturb one component around where it is, and put it back.
+    """Perturb one component around its present state, and restore that state.
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
 
@@ -116,12 +106,12 @@ def linearize_component(
     step_size
         Communication step to linearise over [s].
     inputs, observed
-        Tunable parameters or open inputs, and outputs, that matter beside the connected ones.
+        Tunable parameters or open inputs, and outputs, in addition to the connected ones.
     derivatives
         Also difference the FMU's own derivatives, if it declares them; it costs a third more.
     """
     component = exchange.component
-    StateAccess(component)  # refuses what can be neither perturbed nor looked up
+    StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
     if (inside := embedded_model(component)) is not None:
         return _from_inside(exchange, inside, time, step_size, inputs, observed)
     names = component.description.states
@@ -129,38 +119,40 @@ def linearize_component(
     n, p = len(names), len(exchange.outputs.names)
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
-    small, large, usual, narrow, doubtful = _two_sizes(component, entries, exits, time, step_size, rates)
+    found = perturb(PerturbedStep(component, entries, exits, time, step_size), rates)
 
     def step_map(after: Matrix, outputs: Matrix) -> StepMap:
         return StepMap(after[:, :n], after[:, n:], outputs[:p, :n], outputs[:p, n:])
 
-    found, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
+    small, large = found.small, found.large
+    one, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
     return ComponentLinearization(
         component.name,
         names,
         entries,
         exchange.outputs.names,
-        *found,
+        *one,
         observed=tuple(observed),
         C_o=small.outputs[p:, :n],
         D_o=small.outputs[p:, n:],
         A_c=small.slopes[:, :n] if len(rates) == n and derivatives else None,
         B_c=small.slopes[:, n:] if len(rates) == n and derivatives else None,
-        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(found, other, strict=True)),
+        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)),
         variants=(
             other,
             step_map(small.after_up, small.outputs_up),
-            *([step_map(usual.after, usual.outputs)] if narrow else []),
+            *([step_map(found.usual.after, found.usual.outputs)] if found.narrow else []),
         ),
-        narrow=narrow,
-        doubtful=doubtful,
+        narrow=found.narrow,
+        doubtful=found.doubtful,
     )
 
 
 def linearize_by_derivatives(
     exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
 ) -> ComponentLinearization:
-    """The same from the FMU's own directional derivatives, without a perturbation and without a step.
+    """The component's linear model from the FMU's own directional derivatives, without a perturbation and without a
+    step.
 
     The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
     The derivatives are compared with differences of the FMU's own variables, or where its states cannot be set with
@@ -258,135 +250,3 @@ def _over_step(
         disagreement=0.0,
         source=source,
     )
-
-
-class _Differences(NamedTuple):
-    """Columns of d(x⁺), d(y) and d(ẋ) by every state, then every input; ``_up`` from the perturbation upwards only."""
-
-    after: Matrix
-    outputs: Matrix
-    slopes: Matrix
-    after_up: Matrix
-    outputs_up: Matrix
-
-
-def _two_sizes(
-    component: Component,
-    inputs: Sequence[str],
-    exits: Sequence[str],
-    time: float,
-    step_size: float,
-    rates: Sequence[str],
-) -> tuple[_Differences, _Differences, _Differences, dict[str, float], tuple[str, ...]]:
-    """Differences of one size, of twice that size, and of twice the usual size, which is smaller for few; with these
-    few's sizes by name, and the names of what is doubtful.
-
-    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
-    """
-    names = (*component.description.states, *inputs)
-    columns: Sequence[int] = range(len(names))
-    found: tuple[_Differences, _Differences] | None = None
-    one_sided = np.zeros(len(names), dtype=bool)
-    narrow: dict[str, float] = {}
-    for size in PERTURBATIONS:
-        # The derivatives need no second size: they are differenced over no step.
-        pair = (
-            _differences(component, names, columns, exits, time, step_size, size, rates),
-            _differences(component, names, columns, exits, time, step_size, 2 * size, ()),
-        )
-        floor = _SMALL * PERTURBATIONS[0] / size
-        at_rest = np.eye(len(component.description.states), len(names))[:, columns]
-        one, other = ((d.after - at_rest, d.outputs) for d in pair)
-        apart = _apart(one, other, _AGREE, floor * step_size, floor)
-        if found is None:
-            found, usual = pair, _Differences(*(part.copy() for part in pair[1]))
-            upwards = pair[0].after_up - at_rest, pair[0].outputs_up
-            one_sided = _apart(one, upwards, _EVEN, floor * step_size, floor)
-        else:
-            for kept, new in zip(found, pair, strict=True):
-                for part in _Differences._fields:
-                    agreeing = [k for k in range(len(columns)) if not apart[k]]
-                    if part.endswith("_up"):
-                        agreeing = [k for k in agreeing if not one_sided[columns[k]]]
-                    whole, again = getattr(kept, part), getattr(new, part)
-                    if whole.size:
-                        whole[:, [columns[k] for k in agreeing]] = again[:, agreeing]
-            narrow |= {names[k]: size for k, disagree in zip(columns, apart, strict=True) if not disagree}
-        columns = [k for k, disagree in zip(columns, apart, strict=True) if disagree]
-        if not columns:
-            break
-    assert found is not None
-    return *found, usual, narrow, tuple(name for k, name in enumerate(names) if k in columns or one_sided[k])
-
-
-def _apart(one: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix], share: float, *floors: float) -> NDArray[np.bool_]:
-    """Columns in which two answers, each the states' change and d(y), differ by more than a share of what is there.
-
-    Parameters
-    ----------
-    floors
-        Added to what is there, of the states' change and of the outputs.
-    """
-    far = [
-        (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=0)
-        for a, b, floor in zip(one, other, floors, strict=True)
-    ]
-    return np.asarray(far[0] | far[1])
-
-
-def _differences(
-    component: Component,
-    names: Sequence[str],
-    varied: Sequence[int],
-    exits: Sequence[str],
-    time: float,
-    step_size: float,
-    size: float,
-    rates: Sequence[str],
-) -> _Differences:
-    """One column for each of ``varied``, which are places in ``names``."""
-    z_0 = RealBatch(component, names).read().copy()
-    after, outputs, slopes = (RealBatch(component, group) for group in (component.description.states, exits, rates))
-    columns = tuple(np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes))
-    upwards = tuple(np.zeros_like(column) for column in columns[:2])
-    saved = component.save_state()
-    try:
-        outputs_0, slopes_0 = outputs.read().copy(), slopes.read().copy()
-        component.step(time, step_size)
-        after_0 = after.read().copy()
-        component.restore_state(saved)
-        for k, place in enumerate(varied):
-            perturbed, value = RealBatch(component, [names[place]]), z_0[place]
-            step = size * max(1.0, abs(value))
-            signs = _allowed_signs(component, names[place], value, step)
-            for sign in signs:
-                perturbed.values[0] = value + sign * step
-                perturbed.write()
-                for batch, column in zip((outputs, slopes), columns[1:], strict=True):
-                    column[k] += sign * batch.read()
-                component.step(time, step_size)
-                columns[0][k] += sign * after.read()
-                if sign == signs[0]:
-                    upwards[0][k], upwards[1][k] = sign * (after.values - after_0), sign * (outputs.values - outputs_0)
-                component.restore_state(saved)
-            if len(signs) == 1:
-                for column, at_rest in zip(columns, (after_0, outputs_0, slopes_0), strict=True):
-                    column[k] -= signs[0] * at_rest
-            for column in columns:
-                column[k] /= len(signs) * step
-            for column in upwards:
-                column[k] /= step
-    finally:
-        component.restore_state(saved)
-        component.free_state(saved)
-    return _Differences(*(column.T for column in (*columns, *upwards)))
-
-
-def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:
-    """Directions of a perturbation that stay within a parameter's declared bounds; both, where none does."""
-    info = component.description.variables[name]
-    if info.causality != "parameter":
-        return (+1.0, -1.0)
-    above = info.maximum is None or value + step <= info.maximum
-    below = info.minimum is None or value - step >= info.minimum
-    return tuple(sign for sign, within in ((+1.0, above), (-1.0, below)) if within) or (+1.0, -1.0)

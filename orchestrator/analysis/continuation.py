@@ -1,4 +1,6 @@
-"""Following one mode while a parameter changes, by its eigenvectors, with the linear model at any value at hand."""
+"""Following one mode by its eigenvectors while a parameter changes. The linear model can be computed for any value of
+the parameter.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,10 +15,10 @@ from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 _SAME = 0.6
-"""Similarity from which two modes of neighbouring models count as one and the same."""
+"""Least similarity with which two modes of neighbouring models count as the same mode."""
 
 _SHORTEST = 1 / 64
-"""Smallest part of a path that is gone in one stride."""
+"""Length of the shortest stride, as a part of the path."""
 
 _NEIGHBOURS = 8
 
@@ -33,13 +35,13 @@ class Eigenpair:
     right: Vector
 
     def similarity(self, other: "Eigenpair") -> float:
-        """How much the two are the same mode, from 0 to about 1; above 1 only near a double eigenvalue."""
+        """Similarity of two modes, from 0 to about 1; it exceeds 1 only near a double eigenvalue."""
         mine, theirs = (self.left[None], self.right[None]), (other.left[None], other.right[None])
         return float(similarity(*mine, *theirs).item())
 
 
 def eigenpairs(model: LinearModel, lowest_hz: float, highest_hz: float) -> tuple[list[Eigenpair], Vector]:
-    """The pairs of a frequency range [Hz], one of each conjugate two, and all eigenvalues [rad/s]."""
+    """The eigenpairs of a frequency range [Hz], one of each conjugate pair, and all eigenvalues [rad/s]."""
     lambdas, left, right = eigenvectors(model)
     chosen = in_range(lambdas, lowest_hz, highest_hz)
     return [_pair(complex(lambdas[k]), left[:, k], right[:, k]) for k in chosen], lambdas
@@ -72,7 +74,7 @@ def follow_along(start: Eigenpair, model_at: Callable[[float], LinearModel], beg
     Raises
     ------
     AnalysisError
-        If even a short stride leaves it open which mode it is.
+        If the mode cannot be recognised even after the shortest stride.
     """
     shortest = abs(end - begin) * _SHORTEST
     here, pair, stride = begin, start, end - begin

@@ -1,8 +1,9 @@
-"""Whether the linear model of a coupled system answers as its FMUs do; asked where an FMU is not one of ours.
+"""Comparison of a coupled system's linear model with the response of its FMUs. It is made for systems with a foreign
+FMU.
 
-A step map is found from single communication steps and from the states that the FMUs declare. What it says is wrong in
-silence where an FMU keeps more states than it declares, or where a controller is sampled and a step contains no sample.
-So all states are disturbed a little, the FMUs are run for a while, and they must follow z⁺ = A·z.
+A step map is found from single communication steps and from the states that the FMUs declare. It is wrong without any
+sign if an FMU has undeclared states, or if a controller is sampled and a step contains no sample. Therefore all states
+are disturbed a little, the FMUs run for a while, and their states must follow z⁺ = A·z.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
+from orchestrator.analysis.delays import links_of, values_on_the_way
 from orchestrator.analysis.linear_model import HELD, IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.stability import Stability
@@ -19,37 +21,37 @@ from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, ComponentError
 from orchestrator.fmi.instance import is_ours
-from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.port import without_binding
 
 SIZES = (1e-4, 1e-5)
 """Disturbances of the states, relative to max(1, |value|); a smaller one is tried where the larger does not agree."""
 
 LARGEST_ERROR = 0.05
-"""Of the response's size in the same window. Our own converter in the two-area system stays at 0.25 %; growth that a
-model lacks passes any figure."""
+"""Accepted error, as a part of the response's size in the same window. Our own converter in the two-area system stays
+at 0.25 %. The error of a model that lacks a growing mode exceeds every limit."""
 
 _FLOOR = 0.01
-"""A window's response counts as no smaller than this part of the state's largest, and of the disturbance itself: below
-it are the integrators' tolerances."""
+"""Least size to which errors are related, as a part of the state's largest response and of the disturbance. Smaller
+responses lie within the integrators' tolerances."""
 
 _SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
-"""A response is followed for so long [s], but for no more than so much of the computer's time [s], and at least for so
-many simulated seconds; where they are fewer than the last figure, the verdict says so."""
+"""Longest simulated time for which a response is followed [s], longest computing time for it [s], least simulated time
+[s], and the simulated time below which the verdict states how short it was [s]."""
 
 _SAMPLE, _WINDOWS = 5e-3, 10
 """Time between compared points [s], and windows in which errors are taken relative to the response."""
 
 _DENSE = 500
-"""Up to so many states a power of the step map costs less than its steps one by one."""
+"""Up to this number of states, a power of the step map costs less than single steps."""
 
 _STANDS, _MOVES = 1e-10, 1e-7
-"""Elements of a step map that differ less from those of a state that stands still are rounding; declared derivatives
-that say more for a step are not."""
+"""A state stands still if its elements of the step map differ from those of a constant by less than the first figure,
+which is rounding. It should move if its declared derivatives, times the step, exceed the second figure."""
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Where the FMUs' own response leaves the linear model's most.
+    """The largest difference of the FMUs' response from that of the linear model.
 
     Attributes
     ----------
@@ -73,26 +75,25 @@ def foreign_components(master: Master) -> list[str]:
     """Components whose FMU this machine's own toolchain did not build."""
     found = []
     for name, plan in master.system.components.items():
-        description = plan.description
-        native = description.native if isinstance(description, BoundDescription) else description
-        if not is_ours(native.path):
+        if not is_ours(without_binding(plan.description).path):
             found.append(name)
     return found
 
 
 def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Stability) -> Stability:
-    """The verdict, or "not known" where a foreign FMU does not answer as the linear model that calls it stable.
+    """The verdict on a system, or "not known" if the linear model calls it stable and the response of a foreign FMU
+    differs.
 
     Parameters
     ----------
     master
-        At the operating point that the model is of; it is left as it was.
+        The running system at the model's operating point; it is restored.
     blocks
         The linearised components.
     model
         The step map composed of the blocks.
     stability
-        The verdict on that model.
+        The verdict on ``model``.
     """
     if not stability.stable:
         return stability
@@ -108,7 +109,9 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
 
 
 def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
-    """Why a component has no usable step map: its states do not move in a step, though their derivatives say so."""
+    """The reason why a component has no usable step map: its states stand still in a step although their derivatives
+    are not zero.
+    """
     for name in foreign:
         c = blocks.components[name]
         rows = np.abs(np.hstack([c.A - np.eye(len(c.A)), c.B])).max(axis=1, initial=0.0) <= _STANDS
@@ -127,7 +130,9 @@ def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
 
 
 def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tuple[str, str]:
-    """How the FMUs' response departs from the model's, and what limits an agreement; empty where nothing does."""
+    """Sentences on the difference between the FMUs' response and the model's, or on limits of the comparison; empty
+    without either.
+    """
     try:
         found = worst_disagreement(master, model)
     except ComponentError as error:
@@ -158,7 +163,7 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     settable = np.concatenate([
         np.full(len(c.description.states), c.description.states_are_settable) for c in master.components.values()
     ])  # fmt: skip
-    # Signs that follow no pattern reach every mode; the same in every call.
+    # Random signs excite every mode. They are the same in every call.
     shape = np.random.default_rng(1).choice([-1.0, 1.0], len(x_0)) * np.maximum(1.0, np.abs(x_0)) * settable
     every = max(1, round(_SAMPLE / master.clock.step_size))
     best: Disagreement | None = None
@@ -186,13 +191,16 @@ def _response(
 def _run(
     master: Master, state: CoupledState, model: LinearModel, x: Matrix, every: int, times: int | None
 ) -> tuple[Matrix, Matrix]:
-    """States at every so many steps from x on, for so many times or as long as there is time; z at the start."""
+    """States from x on at regular numbers of steps, until the wanted number of times or the computing time is reached;
+    and z at the start.
+    """
     held = [master.output_names.index(name.removesuffix(HELD)) for name in model.names if name.endswith(HELD)]
     interval = every * master.clock.step_size
     rows: list[Matrix] = []
     with state.put_back():
         state.write(x)
-        z = np.concatenate([state.read(), master.y[held]])
+        on_the_way = values_on_the_way(master, model.names, links_of(master))
+        z = np.concatenate([state.read(), master.y[held], on_the_way])
         began = perf_counter()
         while len(rows) < (times or round(_SECONDS / interval)):
             late = times is None and perf_counter() - began > _WALL
@@ -204,7 +212,7 @@ def _run(
 
 
 def _predicted(model: LinearModel, z: Matrix, every: int, times: int) -> Matrix:
-    """States after every so many steps, shape (times, n)."""
+    """States that the model gives at the same times, shape (times, n)."""
     power = np.linalg.matrix_power(model.A, every) if len(z) <= _DENSE else None
     rows = []
     for _ in range(times):

@@ -12,7 +12,7 @@ from orchestrator.coupling.master import Master
 
 
 class CoupledState:
-    """States of all components, with a way to try a step from any of them and come back.
+    """The states of all components. A step can be tried from any state and taken back.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class CoupledState:
     Raises
     ------
     AnalysisError
-        If a component does not.
+        If a component does not let its states be set.
     """
 
     def __init__(self, master: Master) -> None:
@@ -43,11 +43,13 @@ class CoupledState:
         self.settle()
 
     def settle(self) -> None:
-        """Exchange outputs until they stop changing; two passes do, unless feed-through is chained."""
+        """Exchange outputs until they stop changing; two passes do, unless feed-through is chained.
+
+        Over a connection with a delay all arrives at once, as if it had long been so.
+        """
         for _ in range(2):
             for name in [name for group in self._master.schedule.groups for name in group]:
-                self._master.exchange_inputs(name)
-                self._master.exchanges[name].outputs.read()
+                self._master.renew(name)
 
     def step_from(self, x: Matrix) -> Matrix:
         """States one communication step after ``x``; the system is put back where it was."""
@@ -58,12 +60,15 @@ class CoupledState:
 
     @contextmanager
     def put_back(self) -> Iterator[None]:
-        """Whatever is done meanwhile, put all FMUs, the coupled outputs and the clock back to where they were."""
+        """On leaving ``with``, restore all FMUs, the coupled outputs and the clock."""
         saved, y, index = self._save()
+        wires = self._master.wires.state()
         try:
-            yield
+            with self._master.wires.quiet():
+                yield
         finally:
             self._restore(saved, y, index)
+            self._master.wires.restore(wires)
 
     def _save(self) -> tuple[dict[str, Any], Matrix, int]:
         master = self._master

@@ -1,8 +1,8 @@
 """The critical modes of a large system, without its full spectrum: sparse shift-and-invert search.
 
-Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ finds the eigenvalues nearest to σ. All that lie
-nearer than the farthest one found are then known, so that discs around a few points cover the region in which
-critical modes lie: a range of frequencies, from well into instability to a damping that nobody worries about.
+Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ finds the eigenvalues nearest to σ. All
+eigenvalues nearer than the farthest one found are then known. Discs around a few points cover the region of the
+critical modes: a range of frequencies, from well into instability to a damping that needs no attention.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,17 +28,17 @@ from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 DENSE = 200
-"""Up to so many states the full spectrum is cheaper."""
+"""Up to this number of states, the full spectrum is cheaper."""
 
 _STRETCH = 1.35
 """The range is first cut into stretches whose ends have this ratio: the region is a wedge, so discs grow upwards."""
 
 _AT_A_TIME = (20, 80)
-"""Eigenvalues looked for around one point: first, and at most where they do not reach far enough. Many equal units
-have many equal local modes, so that a small number may never get past such a crowd."""
+"""Numbers of eigenvalues to find around one point: the first number, and the largest one if the first does not reach
+far enough. Many equal units have many equal local modes, and a small number would find only these."""
 
 _SMALLEST = 1e-4
-"""A cell of the region is not cut below this size, relative to its place."""
+"""Smallest size of a cell of the region, relative to its distance from 0."""
 
 _UNSTABLE_MARGIN = 0.1
 """How far into instability the region reaches: to this negative damping ratio."""
@@ -59,12 +59,12 @@ def find_critical_modes(
     lowest_hz, highest_hz
         Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
     damping
-        Modes with less than this are found, all of them; between 0 and 0.9. Negative damping is searched to −0.1.
+        Damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of −0.1.
 
     Raises
     ------
     AnalysisError
-        If the range is not one, or Arnoldi's method does not converge.
+        If the range is empty or begins at 0, or Arnoldi's method does not converge.
     """
     if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
@@ -134,7 +134,7 @@ class _Cell:
         return max(abs(corner - self.centre) for corner in self.corners)
 
     def holds(self, value: complex) -> bool:
-        """A cell owns its lower edges, and not the upper ones."""
+        """Whether a point lies in the cell, which includes its lower edges but not the upper ones."""
         return self.low <= value.imag < self.high and self.least <= damping_ratio(value) < self.most
 
     def halves(self) -> tuple["_Cell", "_Cell"]:
@@ -147,7 +147,7 @@ class _Cell:
 
 
 def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[Mode]:
-    """Cover the region with discs: more eigenvalues around a point where few do not reach, else smaller cells."""
+    """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[Mode] = []
     edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()
     waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
@@ -174,7 +174,7 @@ class Search:
     sigma
         The point in the plane of A's own eigenvalues.
     reach
-        Distance in that plane up to which every eigenvalue was found last.
+        Distance from ``sigma`` up to which the last search has found every eigenvalue.
     """
 
     def __init__(self, model: LinearModel, centre: complex) -> None:
@@ -194,7 +194,7 @@ class Search:
         return self._values
 
     def reaching(self, radius: float) -> NDArray[np.complex128] | None:
-        """So many eigenvalues that none nearer than ``radius`` is missing; None if those are too many."""
+        """All eigenvalues nearer than ``radius``; None if there are too many."""
         count, most = _AT_A_TIME
         while count <= most:
             values = self.nearest(count)
@@ -204,11 +204,11 @@ class Search:
         return None
 
     def modes(self, chosen: Sequence[int]) -> list[Mode]:
-        """Modes of some of the values that were found last."""
+        """Modes of some of the eigenvalues of the last search."""
         return [make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
 
     def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:
-        """Eigenvalue, left and right eigenvector of some of the values that were found last."""
+        """Eigenvalue, left and right eigenvector of some of the eigenvalues of the last search."""
         if not chosen:
             return []
         nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))

@@ -1,4 +1,4 @@
-"""Whether an FMU's directional derivatives are those of its own variables, by differences of these."""
+"""Comparison of an FMU's directional derivatives with differences of its variables."""
 
 from collections.abc import Sequence
 
@@ -10,19 +10,22 @@ from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 
 SIZES = (1e-5, 2e-5)
-"""Central differences are taken with both, relative to max(1, |value|): their disagreement says how good they are."""
+"""Two sizes of central differences, relative to max(1, |value|). The difference between both results shows their
+accuracy."""
 
 AGREES = 1e-4
 """Largest difference of an element from its central difference, relative to it: a hundredth of a point of damping."""
 
 _NEARBY = (1e-7, 1e-9, 1e-11)
-"""Sizes that are tried where a limit lies within the first ones."""
+"""Smaller sizes, which are tried if a limit lies within the first ones."""
 
 _BENT, _FITS = 0.1, 0.01
-"""A quotient that changes by more than the first part depends on the size; one within the second part fits."""
+"""A difference quotient that changes by more than the first part depends on the size. A quotient that differs by less
+than the second part confirms the derivative."""
 
 _ROUNDING = 1e-8
-"""The same relative to the largest element of its row: rounding in the row's terms, over the size of a difference."""
+"""Accepted difference relative to the largest element of the row, caused by rounding in the row's terms, divided by the
+size of the difference."""
 
 
 def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
@@ -35,9 +38,9 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
     given
         Shape (unknowns, knowns).
     unknowns
-        Variables that are derived, one a row: rates and outputs.
+        Variables whose derivatives are given, one for each row: rates and outputs.
     knowns
-        Variables by which they are derived, one a column: states and inputs.
+        Variables by which the unknowns are differentiated, one for each column: states and inputs.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def _right_nearby(
     knowns: Sequence[str],
     doubted: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Which doubted elements are right for smaller changes, where the larger one has run into a limit.
+    """The doubted elements that are right for smaller changes; the larger change has run into a limit.
 
     Only an element whose difference quotient depends on the size is looked at again: a wrong derivative of something
     linear stays wrong.
@@ -89,7 +92,7 @@ def _right_nearby(
 def _central_differences(
     component: Component, unknowns: Sequence[str], knowns: Sequence[str], sizes: Sequence[float] = SIZES
 ) -> list[Matrix]:
-    """With each size, shape (unknowns, knowns)."""
+    """Central differences with each size, shape (unknowns, knowns)."""
     before = RealBatch(component, knowns).read().copy()
     perturbed, follows = [RealBatch(component, [name]) for name in knowns], RealBatch(component, unknowns)
     found = [np.zeros((len(unknowns), len(knowns))) for _ in sizes]

@@ -14,9 +14,9 @@ _TOLERANCE = 1e-6
 
 
 def embedded_model(component: Component) -> EmbeddedModel | None:
-    """The model to use for a component; None where it is better perturbed, or has none."""
+    """The model inside a component's FMU; None if the component can be perturbed, or its FMU has no model inside."""
     description = component.description
-    if description.states_are_settable or isinstance(description, BoundDescription):  # it speaks of other variables
+    if description.states_are_settable or isinstance(description, BoundDescription):  # it has the FMU's own names
         return None
     return read_embedded_model(description.path)
 
@@ -48,7 +48,7 @@ def check_operating_point(component: Component, model: EmbeddedModel) -> None:
 
 
 def _parameters(component: Component, model: EmbeddedModel) -> dict[str, float | bool]:
-    """What every parameter of the FMU must be: the model's value, else its start."""
+    """Required value of every parameter of the FMU: the model's value, or the parameter's start value."""
     variables = component.description.variables
     starts = {
         name: start

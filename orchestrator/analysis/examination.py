@@ -1,12 +1,13 @@
-"""Whether the verdict of a linear model may be believed: held against the FMUs, their perturbation and the step.
+"""Examination of a linear model's verdict: comparison with the FMUs, their perturbation and the communication step.
 
-Every command that linearises asks here, so that none of them knows less than another.
+Every command that linearises uses this examination, and so all of them give the same warnings.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from orchestrator.analysis.coupled_response import confirmed
+from orchestrator.analysis.delays import doubtful_delays, warnings_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearity import Doubt, doubts
 from orchestrator.analysis.linearization import Blocks
@@ -18,7 +19,7 @@ from orchestrator.coupling.master import Master
 
 @dataclass(frozen=True)
 class Examination:
-    """The verdict on a linearised system, and what is to be said beside it."""
+    """The verdict on a linearised system, with its warnings."""
 
     stability: Stability
     warnings: tuple[str, ...]
@@ -35,7 +36,7 @@ def examine(
     shown: Sequence[Mode] | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
 ) -> Examination:
-    """Judge a step map, and look for what would make the verdict wrong.
+    """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
     Parameters
     ----------
@@ -48,8 +49,8 @@ def examine(
     spectrum
         All eigenvalues of the step map, where they are known already.
     modes
-        Oscillations that must not depend on the perturbation; by default those of the range. Where a component is
-        doubtful, all from 0.1 to 2 Hz are added.
+        Oscillations that must not depend on the perturbation; by default those of the range. If a component is
+        doubtful, all oscillations from 0.1 to 2 Hz are added.
     shown
         Modes that must not depend on the communication step; by default the same.
     frequency_range
@@ -70,13 +71,15 @@ def examine(
     rightmost = [spectrum.rightmost] if spectrum is not None and spectrum.rightmost is not None else []
     stability = confirmed(master, blocks, model, judge(model, spectrum, system))
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
+    shown = modes if shown is None else shown
+    eigenvalues = [mode.eigenvalue for mode in [*shown, *rightmost]]
+    wires = (*warnings_of(master), *doubtful_delays(blocks.links.values(), eigenvalues, model.step_size))
     if turning := _turning(blocks, master, model, stability, found, rightmost):
         stability = replace(stability, stable=None, reason="; ".join(map(str, turning)))
         found = [doubt for doubt in found if doubt not in turning]
-        return Examination(stability, (*verdict_warnings(stability), *map(str, found)))
-    shown = modes if shown is None else shown
+        return Examination(stability, (*verdict_warnings(stability), *map(str, found), *wires))
     step = check_resolution(master, model, system, shown, frequency_range, stability)
-    return Examination(stability, (*step, *map(str, found)))
+    return Examination(stability, (*step, *map(str, found), *wires))
 
 
 def _turning(
@@ -87,7 +90,7 @@ def _turning(
     found: list[Doubt],
     rightmost: list[Mode],
 ) -> list[Doubt]:
-    """Doubts that leave the verdict open; what grows must be in doubt itself."""
+    """Doubts that leave the verdict open. If a mode grows, only doubts about this mode count."""
     turning = [doubt for doubt in found if doubt.turns]
     if not turning or stability.stable is None:
         return []

@@ -1,8 +1,9 @@
-"""Everything that grows in a system too large for its full spectrum: sparse search of the whole right half-plane.
+"""Search for every growing mode of a system that is too large for its full spectrum: sparse search of the whole right
+half-plane.
 
 The half-plane is cut into sectors of rings around 0. Arnoldi's method on (A − σI)⁻¹ around the middle σ of a sector
 gives the eigenvalues nearest to it; the sector is done when they reach beyond its edge, and is cut where they do not.
-What grows in a step map by a tenth or more in each step stands out: Arnoldi's method on A alone finds it.
+Modes of a step map that grow by a tenth or more in each step stand out: Arnoldi's method on A alone finds them.
 """
 
 from dataclasses import dataclass
@@ -18,27 +19,27 @@ from orchestrator.analysis.modes import Mode, make_mode
 from orchestrator.errors import AnalysisError
 
 SLOWEST = 2 * np.pi * 1e-3
-"""Eigenvalues [rad/s] nearer to 0 are not looked for: they grow by less than a hundredth in a second."""
+"""Smallest eigenvalue that is looked for [rad/s]: smaller ones grow by less than a hundredth in a second."""
 
 FASTEST = 2 * np.pi * 1e5
-"""Nor are those of a continuous model that are farther from 0 than this [rad/s]."""
+"""Largest eigenvalue of a continuous model that is looked for [rad/s]."""
 
 _RING = 1.6
 """Ratio of the radii of a ring."""
 
 _AT_A_TIME = (20, 80)
-"""Eigenvalues looked for around one point: first, and at most."""
+"""Numbers of eigenvalues to find around one point: the first number and the largest one."""
 
 _STANDS_OUT = 1.1
 """Multipliers of a step map beyond this size are found as the largest ones."""
 
 _THINNEST = 1e-3
-"""A sector is not cut below this size, relative to its radius."""
+"""Smallest size of a sector, relative to its radius."""
 
 
 @dataclass(frozen=True)
 class GrowthSearch:
-    """Modes [rad/s] that grow, fastest first, and in words what was not looked at."""
+    """The growing modes [rad/s], fastest first, and a sentence on the region that was not searched."""
 
     modes: tuple[Mode, ...]
     not_searched: str
@@ -66,12 +67,14 @@ class _Sector:
         return np.concatenate([*arcs, *rays])
 
     def holds(self, value: complex) -> bool:
-        """A sector owns its lower edges, and not the upper ones; the last one in the ring owns the imaginary axis."""
+        """Whether a point lies in the sector, which includes its lower edges but not the upper ones. The last sector of
+        a ring includes the imaginary axis.
+        """
         angle = float(np.angle(value))
         return self.inner <= abs(value) < self.outer and self.low <= angle < self.high
 
     def parts(self) -> tuple["_Sector", ...]:
-        """Cut in both directions."""
+        """The four parts of a sector that is cut in both directions."""
         radius, angle = float(np.sqrt(self.inner * self.outer)), (self.low + self.high) / 2
         return tuple(
             _Sector(inner, outer, low, high)
@@ -111,17 +114,17 @@ def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
     """The sectors of a ring with real parts up to a limit [1/s]; those of a wide ring are two."""
     low = float(np.arccos(min(1.0, limit / inner)))
     middle = (np.pi / 4,) if low < np.pi / 8 else ()
-    # A little below 0, so that what lies on the real axis belongs to a sector.
+    # A little below 0, which puts eigenvalues on the real axis inside a sector.
     return [_Sector(inner, outer, *angles) for angles in pairwise((low - 1e-9, *middle, np.pi / 2))]
 
 
 def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
-    """What grows so fast in a step map that its multipliers are far larger than all others.
+    """Modes of a step map that grow so fast that their multipliers are far larger than all others.
 
     Raises
     ------
     AnalysisError
-        If there are more of them than are looked for.
+        If there are more such modes than the search looks for.
     """
     n = len(model.names)
     step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
@@ -130,7 +133,7 @@ def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
     try:
         mu = spla.eigs(step, k=count, ncv=3 * count, maxiter=30, tol=1e-6, v0=start, return_eigenvectors=False)
     except spla.ArpackNoConvergence as error:
-        mu = error.eigenvalues  # what stands out converges first
+        mu = error.eigenvalues  # the largest multipliers converge first
     mu = mu[(np.abs(mu) > _STANDS_OUT) & (mu.imag >= 0)]
     if len(mu) == count:
         raise AnalysisError(f"more than {count} modes grow by a tenth in each communication step; take a shorter one")

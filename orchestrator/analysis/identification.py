@@ -14,7 +14,8 @@ from orchestrator.errors import AnalysisError
 
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
 _LARGEST_EXPONENT = 300.0
-"""Of e, within the window: more is no signal, and its square no number."""
+"""Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
+numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,14 +91,16 @@ def identify_modes(
 
 
 def _thinned(times: NDArray[np.float64], highest_hz: float) -> tuple[int, float]:
-    """Every how many samples are used, and how far apart they are [s]."""
+    """The number of samples from one used sample to the next, and the time between these two [s]."""
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
     return thin, step * thin
 
 
 def interval_used(times: NDArray[np.float64], highest_hz: float = 10.0) -> float:
-    """Time between the samples that `identify_modes` uses [s]; what swings faster than half its inverse is aliased."""
+    """Time between the samples that `identify_modes` uses [s]; oscillations faster than half of its inverse are
+    aliased.
+    """
     return _thinned(times, highest_hz)[1]
 
 

@@ -17,10 +17,12 @@ import scipy.sparse.linalg as spla
 from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
+DELAYED = " (delayed"
+"""In the name of a state that stands for what is on its way over a connection."""
 
 PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
-"""How the linear model of a component was found: by perturbing its running FMU, from the FMU's own directional
-derivatives, taken from the file of the FMU, or fitted to what was measured at its inputs and outputs."""
+"""Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model
+in the FMU's file, or a model fitted to measurements at its inputs and outputs."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class LinearModel:
     F, G, H, K
         Sparse matrices, shapes (n, n), (n, m), (m, n), (m, m); I − K is regular.
     names
-        ``component.state`` for states, ``component.output (held)`` for what the exchange remembers; length n.
+        ``component.state`` for states, ``component.output (held)`` for what the exchange remembers and
+        ``a.out -> b.in (delayed k)`` for what is on its way over a connection; length n.
     step_size
         Communication step [s]; None for a continuous model, whose A is in 1/s.
     disagreement
@@ -60,7 +63,7 @@ class LinearModel:
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
-        """The model of one matrix, with no outputs under way.
+        """The model of one matrix, without outputs that travel between components.
 
         Parameters
         ----------
@@ -71,7 +74,7 @@ class LinearModel:
         step_size
             Communication step [s]; None for a continuous model.
         disagreement
-            As the class has it.
+            As in `LinearModel`.
         """
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
@@ -84,7 +87,7 @@ class LinearModel:
         return A
 
     def apply(self, z: Vector) -> Vector:
-        """A·z, without A."""
+        """A·z, computed without forming A."""
         result: Vector = self.F @ z + self.G @ self.settle(self.H @ z)
         return result
 
@@ -94,10 +97,14 @@ class LinearModel:
         m = self.K.shape[0]
         return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factorisation, which cannot be pickled or copied, and is made anew where it is needed."""
+        return {name: value for name, value in vars(self).items() if name != "settle"}
+
     @property
     def number_of_states(self) -> int:
         """States of the components, without what the exchange remembers."""
-        return sum(not name.endswith(HELD) for name in self.names)
+        return sum(not (name.endswith(HELD) or DELAYED in name) for name in self.names)
 
     def shifted(self, sigma: complex) -> ShiftedSolver:
         """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""

@@ -1,7 +1,7 @@
-"""Whether the modes depend on how the FMUs were perturbed, which the modes of a linear model must not.
+"""Doubts about modes that depend on the perturbation of the FMUs; the modes of a linear model must not.
 
 Every component was perturbed with two sizes, and up as well as down. At the edge of a limit, inside a dead band that is
-smaller than the perturbation, or in noise these answers differ, and what was found describes none of them. How far the
+smaller than the perturbation, or in noise the results differ, and the linear model describes neither side. How far the
 difference moves each mode follows from its eigenvectors, to first order.
 """
 
@@ -18,10 +18,11 @@ from orchestrator.arrays import Vector
 from orchestrator.coupling.schedule import Schedule
 
 LARGEST_SHIFT = 1e-3
-"""Of |λ|: a tenth of a point of damping. In smooth systems, up to the IEEE 118-bus one, it is at most 1.5e-4."""
+"""Shift of a mode from which a doubt is reported, as a part of |λ|: a tenth of a point of damping. In smooth systems,
+up to the IEEE 118-bus system, the shift is at most 1.5e-4."""
 
 _SLOWEST = 0.5
-"""Shifts of modes slower than this [rad/s] are taken relative to it."""
+"""The shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|."""
 
 _WHY = (
     "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
@@ -29,14 +30,15 @@ _WHY = (
     "it answers differently up and down: it stands at the edge of a limit or of a dead band",
     "it is linear for small changes only ({narrow}), beyond which a limit or a dead band acts",
 )
-"""What it means that a variant of `ComponentLinearization.variants` differs, in their order."""
+"""The meaning of a difference in each of `ComponentLinearization.variants`, in their order."""
 
 _EDGE, _SMALL_ONLY = 1, 2
-"""Their places: at an edge there is no linear model at all; the last is right for what is small enough."""
+"""Indices of two variants. At an edge there is no linear model at all; in the last variant the model is right for small
+changes."""
 
 _EDGE_SHIFT = 1e-2
-"""Of |λ|: from here on an edge leaves open whether the system is stable, as the shift is that of a perturbation of 1e-5
-and beyond the limit it is larger."""
+"""Shift from which an edge leaves open whether the system is stable, as a part of |λ|. The shift belongs to a
+perturbation of 1e-5; beyond the limit it is larger."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,12 @@ class Doubt:
     Attributes
     ----------
     mode
-        The one that it moves most.
+        The mode that the component's perturbation moves most.
     shift
-        By how much, relative to |λ|.
+        The shift of this mode, relative to |λ|.
     turns
-        Whether this leaves open on which side of the stability limit a mode is. Where the model is right for changes
-        that are small enough, it does not.
+        Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
+        for small changes.
     """
 
     component: str
@@ -70,7 +72,7 @@ class Doubt:
 
 
 def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]) -> list[Doubt]:
-    """Components whose perturbation leaves the modes in doubt; none, where all is smooth.
+    """Components whose perturbation leaves the modes in doubt; empty for a smooth system.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
     model
         The step map composed of the blocks.
     modes
-        Those that are to be trusted.
+        Modes that must not depend on the perturbation.
     """
     found = []
     for kind, why in enumerate(_WHY):
@@ -95,7 +97,7 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
         turns = turns or (kind == _EDGE and bool(together.max() > _EDGE_SHIFT))
         each = {name: _shifts(blocks, schedule, model, modes, [name], kind) for name in perturbed}
         most = max(each, key=lambda name: float(each[name].max()))
-        # One alone may do less than all together.
+        # A single component may shift a mode less than all components together.
         guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
         for name in guilty:
             narrow = blocks.components[name].narrow
@@ -108,14 +110,14 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
 def _shifts(
     blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode], names: Sequence[str], kind: int
 ) -> Vector:
-    """Relative shift of every mode when some components are as their variant has them."""
+    """Relative shift of every mode if some components are replaced by one of their variants."""
     other = copy.copy(blocks)
     other.components = dict(blocks.components)
     for name in names:
         component = blocks.components[name]
         other.components[name] = replace(component, **component.variants[kind]._asdict())
     varied = compose(other, schedule)
-    if varied.names != model.names:  # even what depends on what directly is another
+    if varied.names != model.names:  # even the pattern of direct feed-through differs
         return np.full(len(modes), np.inf)
     return np.array([_shift(model, varied, mode) for mode in modes])
 

@@ -2,7 +2,8 @@
 
 The coupled state z holds the states of all components and, where the schedule makes an output
 travel one step late, that output as well: an output with direct feed-through from an input that is
-older than itself is memory that the exchange adds. Everything else follows from the states.
+older than itself is memory that the exchange adds. So is what is on its way over a connection with a delay. Everything
+else follows from the states.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,11 +17,13 @@ from orchestrator.analysis.component_linearization import (
     linearize_by_derivatives,
     linearize_component,
 )
-from orchestrator.analysis.linear_model import HELD, LinearModel
+from orchestrator.analysis.delays import DelayLine, WireLink, continuous_line, delay_line, links_of
+from orchestrator.analysis.linear_model import DELAYED, HELD, LinearModel
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.step_awareness import knows_step, other_step
+from orchestrator.coupling.system import Endpoint
 from orchestrator.errors import AnalysisError, InputError
 
 Indices = NDArray[np.int64]
@@ -37,11 +40,11 @@ class Blocks:
         Communication step to linearise over [s]; by default the master's own. Components that know the step are
         given this one meanwhile.
     inputs, outputs
-        Names ``component.variable`` that the system is driven by and observed at, for `state_space`: tunable
-        parameters or open inputs, and any outputs.
+        Names ``component.variable`` of the inputs and outputs of `state_space`: tunable parameters or open inputs, and
+        any outputs.
     derivatives
-        Difference the FMUs' own derivatives as well, so that the same blocks serve `continuous_model`. Where a
-        component knows the step it is not done, as blocks for a step map cannot serve there.
+        Difference the FMUs' own derivatives as well, which `continuous_model` needs. This is not done if a component
+        knows the step, because blocks for a step map cannot serve a continuous model then.
     without_step
         For `continuous`: components that know the step are given 0 meanwhile.
     directional
@@ -52,7 +55,7 @@ class Blocks:
     Raises
     ------
     InputError
-        If there is no such variable, or an input is none that can be perturbed.
+        If there is no such variable, or an input cannot be perturbed.
     """
 
     def __init__(
@@ -76,7 +79,7 @@ class Blocks:
         self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
         _check_driven(master, self._driven)
         self.components = {name: known.get(name) or self._linearize(master, name) for name in master.exchanges}
-        # External inputs stand behind the coupled outputs, as if a further component gave them.
+        # External inputs follow the coupled outputs, as if a further component gave them.
         first_external = len(master.output_names)
         self.sources = {
             name: np.concatenate(
@@ -86,6 +89,7 @@ class Blocks:
         }
         self.schedule = master.schedule
         self.output_names = master.output_names
+        self.links: dict[Endpoint, WireLink] = links_of(master)
         first = 0
         self.window: dict[str, slice] = {}
         for name, exchange in master.exchanges.items():
@@ -103,7 +107,7 @@ class Blocks:
         )  # fmt: skip
 
     def check_made_for(self, *, step_map: bool) -> None:
-        """Refuse blocks of components that believed in another communication step."""
+        """Refuse blocks whose components were given another communication step."""
         if self._step_aware and step_map == self._without_step:
             raise ValueError(
                 f"components {', '.join(self._step_aware)} know the communication step; linearise them with "
@@ -112,7 +116,7 @@ class Blocks:
 
     @property
     def serves_continuous(self) -> bool:
-        """Whether no component believed in a communication step."""
+        """Whether the components were linearised without a communication step."""
         return self._without_step or not self._step_aware
 
     @property
@@ -125,12 +129,34 @@ class Blocks:
         """The largest of all components' disagreements."""
         return max(c.disagreement for c in self.components.values())
 
+    def linked(self, name: str) -> dict[int, int]:
+        """Inputs of a component that a connection of `links` feeds: their place among its inputs, and the link's."""
+        inputs, targets = self.components[name].inputs, list(self.links)
+        return {inputs.index(t.variable): targets.index(t) for t in targets if t.component == name}
+
+    def entries(self, name: str, newest: Indices, arriving: Indices) -> Indices:
+        """Where the values that reach a component's inputs stand in w.
+
+        Parameters
+        ----------
+        name
+            Of the component.
+        newest
+            Where the values of all outputs and external inputs stand.
+        arriving
+            Where what arrives over the links stands.
+        """
+        found: Indices = newest[self.sources[name]].copy()
+        for place, link in self.linked(name).items():
+            found[place] = arriving[link]
+        return found
+
     def state_names(self) -> list[str]:
         """Names ``component.state`` of all states, in their order."""
         return [f"{name}.{state}" for name, c in self.components.items() for state in c.states]
 
     def state_windows(self) -> dict[str, slice]:
-        """Where the states of each component stand in the vector of all states."""
+        """The range of each component's states in the vector of all states."""
         windows, first = {}, 0
         for name, c in self.components.items():
             windows[name] = slice(first, first + len(c.states))
@@ -172,14 +198,14 @@ def linearize_within(
 
 
 def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
-    """Linearise the coupled step map around where the master is.
+    """Linearise the coupled step map around the master's present state.
 
     Parameters
     ----------
     master
         At an operating point; it is left as it was.
     step_size, schedule
-        By default the master's own; others show what the coupling would do with them.
+        By default the master's own; other values show the coupling's effect with another step or schedule.
 
     Raises
     ------
@@ -190,7 +216,7 @@ def linearize(master: Master, step_size: float | None = None, schedule: Schedule
 
 
 def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
-    """Walk once through the schedule, giving every output a place in w each time that it is renewed.
+    """Walk once through the schedule. Every output gets an index in w each time that it is computed.
 
     Raises
     ------
@@ -202,17 +228,30 @@ def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
     held = _held_outputs(blocks, schedule)
     memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
     n, p = len(names), len(blocks.output_names)
-    external = 2 * p + np.arange(len(blocks.inputs))
-    equations = _Equations(n + len(memory), 2 * p + len(external))
+    links = len(blocks.links)
+    arrived, arriving = 2 * p + np.arange(links), 2 * p + links + np.arange(links)  # in the step before, and in this
+    external = 2 * p + 2 * links + np.arange(len(blocks.inputs))
+    lines = _delay_lines(blocks, n + len(memory), blocks.step_size)
+    total = n + len(memory) + sum(len(line.A) for line, _ in lines.values())
+    equations = _Equations(total, 2 * p + 2 * links + len(external))
     newest = np.concatenate([np.arange(p), external])  # where in w the newest value of every output stands
     _check_feedthrough(blocks, [name for name in blocks.components if name not in held])
+    for k, (line, where) in lines.items():
+        equations.output(arrived[k : k + 1], where, line.C_before, newest[:0], np.zeros((1, 0)))
     for name, c in blocks.components.items():
         if name not in held:
-            equations.output(newest[blocks.window[name]], windows[name], c.C, newest[blocks.sources[name]], c.D)
+            entries = blocks.entries(name, newest, arrived)
+            equations.output(newest[blocks.window[name]], windows[name], c.C, entries, c.D)
     for k, i in enumerate(memory):
         equations.output(newest[i : i + 1], slice(n + k, n + k + 1), np.eye(1), newest[:0], np.zeros((1, 0)))
     for group in schedule.groups:
-        inputs = {name: newest[blocks.sources[name]].copy() for name in group}
+        inputs = {name: blocks.entries(name, newest, arriving) for name in group}
+        for name in group:
+            for place, k in blocks.linked(name).items():
+                if k in lines:
+                    (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
+                    equations.output(arriving[k : k + 1], where, line.C, sent, np.full((1, 1), line.d))
+                    equations.next_state(where, where, line.A, sent, line.B)
         for name in group:
             c, x, u = blocks.components[name], windows[name], inputs[name]
             equations.next_state(x, x, c.A, u, c.B)
@@ -220,8 +259,24 @@ def compose(blocks: Blocks, schedule: Schedule) -> LinearModel:
             equations.output(newest[blocks.window[name]], x, c.C @ c.A, u, c.C @ c.B + c.D)
     for k, i in enumerate(memory):
         equations.next_state(slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1))
-    all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in memory))
+    all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in memory), *_line_names(blocks, lines))
     return equations.model(blocks, all_names, blocks.step_size)
+
+
+def _delay_lines(blocks: Blocks, first: int, step_size: float | None) -> dict[int, tuple[DelayLine, slice]]:
+    """By the number of their link: delays, and where their states stand, from ``first`` on."""
+    lines = {}
+    for k, link in enumerate(blocks.links.values()):
+        if not link.is_cut:
+            line = continuous_line(link.delay) if step_size is None else delay_line(link.delay, step_size)
+            lines[k] = line, slice(first, first + len(line.A))
+            first += len(line.A)
+    return lines
+
+
+def _line_names(blocks: Blocks, lines: Mapping[int, tuple[DelayLine, slice]]) -> list[str]:
+    links = list(blocks.links.values())
+    return [f"{links[k].name}{DELAYED} {i + 1})" for k, (line, _) in lines.items() for i in range(len(line.A))]
 
 
 def continuous(blocks: Blocks) -> LinearModel:
@@ -240,22 +295,32 @@ def continuous(blocks: Blocks) -> LinearModel:
         )
     windows, names = blocks.state_windows(), blocks.state_names()
     _check_feedthrough(blocks, list(blocks.components))
-    equations = _Equations(len(names), len(blocks.output_names) + len(blocks.inputs))
+    p, links = len(blocks.output_names), len(blocks.links)
+    lines = _delay_lines(blocks, len(names), None)
+    newest = np.concatenate([np.arange(p), p + links + np.arange(len(blocks.inputs))])
+    arriving = p + np.arange(links)
+    total = len(names) + sum(len(line.A) for line, _ in lines.values())
+    equations = _Equations(total, p + links + len(blocks.inputs))
     for name, c in blocks.components.items():
+        entries = blocks.entries(name, newest, arriving)
         if c.A_c is not None and c.B_c is not None:
-            equations.next_state(windows[name], windows[name], c.A_c, blocks.sources[name], c.B_c)
-        own = np.arange(len(blocks.output_names))[blocks.window[name]]
-        equations.output(own, windows[name], c.C, blocks.sources[name], c.D)
-    return equations.model(blocks, names, None)
+            equations.next_state(windows[name], windows[name], c.A_c, entries, c.B_c)
+        equations.output(np.arange(p)[blocks.window[name]], windows[name], c.C, entries, c.D)
+        for place, k in blocks.linked(name).items():
+            if k in lines:
+                (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
+                equations.output(arriving[k : k + 1], where, line.C, sent, np.zeros((1, 1)))
+                equations.next_state(where, where, line.A, sent, line.B)
+    return equations.model(blocks, [*names, *_line_names(blocks, lines)], None)
 
 
 def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
-    """The system without any communication step; None where a component gives no derivatives.
+    """The system without a communication step; None if a component gives no derivatives.
 
     Parameters
     ----------
     blocks
-        With derivatives, where there are such already; they are taken where no component knows the step.
+        Blocks with derivatives, if they exist already. They are used if no component knows the step.
     """
     if blocks is None or not blocks.serves_continuous:
         return where_given(lambda: continuous(Blocks(master, without_step=True)))
@@ -282,7 +347,7 @@ def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _check_driven(master: Master, driven: Mapping[str, Sequence[str]]) -> None:
-    """Only what can be changed during a run can drive a linear model, and nothing that is fed already."""
+    """Refuse an input that cannot be changed during a run, or that a connection feeds."""
     fed = {str(c.target): str(c.source) for c in master.system.connections}
     for name, variables in driven.items():
         for variable in variables:
@@ -342,13 +407,14 @@ def _check_feedthrough(blocks: Blocks, names: list[str]) -> None:
 
 
 def _feedthrough_sources(blocks: Blocks, name: str) -> set[int]:
-    """Indices in y that a component's outputs depend on directly."""
+    """Indices in y that a component's outputs depend on directly: not over a delay, nor over a cut connection."""
     used = np.abs(blocks.components[name].D).max(axis=0, initial=0.0) > 0
+    used[list(blocks.linked(name))] = False
     return {i for i in blocks.sources[name][used].tolist() if i < len(blocks.output_names)}
 
 
 def _held_outputs(blocks: Blocks, schedule: Schedule) -> list[str]:
-    """Components whose outputs, at the end of a step, still rest on inputs from its beginning."""
+    """Components whose outputs at the end of a step still depend on inputs from its beginning."""
     renewed: set[str] = set()
     owner = {i: name for name in blocks.components for i in range(len(blocks.output_names))[blocks.window[name]]}
     for group in schedule.groups:

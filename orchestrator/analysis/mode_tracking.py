@@ -1,8 +1,8 @@
 """Following all modes from one operating point to the next by their eigenvectors.
 
-Sorted lists of eigenvalues lose a mode where two cross; its eigenvectors stay the same. Over all modes b of a point
-the products whose magnitude `orchestrator.analysis.similarity` is sum to 1, so that one above a half means: most of
-mode a is in mode b.
+Sorted lists of eigenvalues lose a mode where two eigenvalues cross; eigenvectors stay the same. The similarity of
+`orchestrator.analysis.similarity` is the magnitude of a product, and these products sum to 1 over all modes b of a
+point. A similarity above a half therefore means that most of mode a is in mode b.
 """
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -18,16 +18,16 @@ from orchestrator.analysis.similarity import similarity
 from orchestrator.arrays import Complex
 
 THRESHOLD = 0.5
-"""Least similarity at which two modes are taken for the same."""
+"""Least similarity with which two modes count as the same mode."""
 
 _MARGIN = 0.3
-"""A mode with another candidate as good as this difference is taken for neither."""
+"""A mode is left unmatched if the similarities of its two best candidates differ by less than this."""
 
 _DISTANCE_WEIGHT = 0.1
-"""Of the relative distance between eigenvalues beside the similarity, which lies between 0 and 1."""
+"""Weight of the relative distance between eigenvalues; the similarity, from 0 to 1, has the weight 1."""
 
 _EDGE = 1.1
-"""A mode nearer than this factor to an end of the range of frequencies may leave or enter there."""
+"""A mode whose frequency is within this factor of an end of the range may leave or enter the range there."""
 
 At = TypeVar("At", bound=Hashable)
 
@@ -64,7 +64,7 @@ class ModeSet:
         return cls(values, rows(m.left for m in modes), rows(m.shape for m in modes), names)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All but the names."""
+        """The arrays of the set, without the names."""
         return {"eigenvalues": self.eigenvalues, "left": self.left, "right": self.right}
 
     @property
@@ -88,9 +88,9 @@ class Link:
 
 
 def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
-    """How much every mode of one point is every mode of another, shape (m_a, m_b), from 0 to 1.
+    """Similarity of every mode of one point with every mode of another, shape (m_a, m_b), from 0 to 1.
 
-    States that only one of the points has count as at rest.
+    A state that only one of the points has counts as 0 in the other's eigenvectors.
     """
     common = [name for name in a.names if name in set(b.names)]
     of_a, of_b = ([s.names.index(name) for name in common] for s in (a, b))
@@ -98,15 +98,15 @@ def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
     product = similarity(a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]) / np.abs(
         np.outer(norm_a, norm_b)
     )
-    # Above 1 only near a double eigenvalue, where eigenvectors say little: as far from certain as its inverse.
+    # The product exceeds 1 only near a double eigenvalue, where eigenvectors say little; its inverse is used then.
     return np.asarray(np.where(product > 1, 1 / np.maximum(product, 1.0), product), dtype=float)
 
 
 def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
     """Pair the modes of two points so that the sum of their similarities is largest.
 
-    Pairs below the threshold, and those with another candidate nearly as good, are left out: the mode is
-    ambiguous there, or has come or gone.
+    Pairs below the threshold, and pairs with another candidate that is nearly as good, are left out: the mode is
+    ambiguous, new or gone.
     """
     if not (len(a.eigenvalues) and len(b.eigenvalues)):
         return []
@@ -150,16 +150,16 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
 @dataclass
 class Followed(Generic[At]):
-    """Which trajectory every mode belongs to.
+    """The trajectory of every mode.
 
     Attributes
     ----------
     trajectory
         Numbers of the trajectories of a point's modes.
     similarity
-        To the point that each mode was recognised from; NaN where a trajectory begins.
+        Similarity of each mode to its predecessor; NaN where a trajectory begins.
     origin
-        That point; None where a trajectory begins.
+        The predecessor's point; None where a trajectory begins.
     """
 
     trajectory: dict[At, list[int]] = field(default_factory=dict)
@@ -179,8 +179,8 @@ def number_trajectories(
     points
         Modes by place.
     route
-        Places in the order of walking, each with the earlier places that its modes are recognised from; a
-        mode that the first of these does not have is looked for in the next.
+        Places in the order of following, each with earlier places. Predecessors of its modes are looked for in the
+        first of these, and then in the next.
     threshold
         Least similarity.
     """

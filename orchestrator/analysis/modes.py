@@ -12,14 +12,16 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.arrays import Vector
 
 ZERO = 1e-3
-"""An eigenvalue of at most this size [rad/s] is a zero: the free angle of a system without an infinite bus, in the
-accuracy of a perturbation. A double one, where nothing restores the frequency either, is split by up to as much."""
+"""An eigenvalue of at most this size [rad/s] counts as zero: it is the free angle of a system without an infinite bus,
+within the accuracy of a perturbation. Without control of the frequency the zero is double, and its two values differ by
+up to this size."""
 
 ELECTROMECHANICAL_HZ = (0.1, 2.0)
-"""Frequencies [Hz] of electromechanical modes: where modes are looked for, named and guarded unless asked otherwise."""
+"""Range of frequencies of electromechanical modes [Hz], which is the default wherever modes are searched, named or
+guarded."""
 
 _DEAD = 1e-9
-"""A multiplier of the step map smaller than this belongs to what decays within one step, not to a mode."""
+"""A multiplier of the step map smaller than this decays within one step and is not a mode."""
 
 _REAL = 1e-2
 """A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
@@ -32,7 +34,7 @@ def damping_ratio(eigenvalue: complex) -> float:
 
 
 def damping_percent(eigenvalue: complex) -> float:
-    """The same in percent, rounded once; 100·ζ may differ from it in the last digit."""
+    """The damping ratio in percent, rounded once; 100·ζ may differ from it in the last digit."""
     return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
@@ -72,7 +74,7 @@ class Mode:
 
     @property
     def is_oscillation(self) -> bool:
-        """Neither a real pole nor a zero; see `oscillations`."""
+        """Whether the eigenvalue is neither a real pole nor a zero; see `oscillations`."""
         return bool(oscillations(np.array([self.eigenvalue]))[0])
 
     @cached_property
@@ -90,12 +92,12 @@ class Mode:
         return dict(sorted(sums.items(), key=lambda entry: -entry[1]))
 
     def swing(self, states: Iterable[str], least: float = 0.1) -> tuple[list[str], list[str]]:
-        """Which of some states, such as all speeds, swing together and which against them.
+        """Two groups of some states, such as all speeds, that swing against each other.
 
         Returns
         -------
-        Those less than 90° from the largest, and the others; each largest first. What moves less than
-        ``least`` of the largest is left out.
+        The states less than 90° from the largest one, and the others, each group sorted by size. States that move less
+        than ``least`` of the largest are left out.
         """
         moving = sorted((s for s in states if s in self.shape), key=lambda s: -abs(self.shape[s]))
         if not moving or abs(self.shape[moving[0]]) == 0:
@@ -118,7 +120,7 @@ class Spectrum:
     Attributes
     ----------
     rightmost
-        The mode of the largest real part at any frequency, zeros left out; None where there is no other.
+        The mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros.
     """
 
     eigenvalues: NDArray[np.complex128]
@@ -144,7 +146,9 @@ def eigenvectors(model: LinearModel) -> tuple[NDArray[np.complex128], Vector, Ve
 
 
 def in_range(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> list[int]:
-    """Which eigenvalues [rad/s] have a frequency in a range [Hz], both ends included, one of each conjugate pair."""
+    """Mask of the eigenvalues [rad/s] with a frequency in a range [Hz], both ends included, one of each conjugate
+    pair.
+    """
     hertz = values.imag / (2 * np.pi)
     mask = (values.imag >= 0) & (lowest_hz <= hertz) & (hertz <= highest_hz)
     return [int(k) for k in np.flatnonzero(mask)]
@@ -184,7 +188,7 @@ def index_of_rightmost(values: NDArray[np.complex128]) -> int | None:
 
 
 def oscillations(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
-    """Which eigenvalues [rad/s] are oscillations, one of each pair: neither real poles nor zeros."""
+    """Mask of the eigenvalues [rad/s] that are oscillations, one of each pair: neither real poles nor zeros."""
     values = np.asarray(values)
     mask: NDArray[np.bool_] = (values.imag > _REAL * np.abs(values.real)) & (np.abs(values) > ZERO)
     return mask
@@ -221,7 +225,7 @@ def most_opposed(modes: Iterable[Mode], side: Iterable[str], other: Iterable[str
 def to_continuous(
     values: NDArray[np.complex128], step_size: float | None
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Eigenvalues λ [rad/s] from those of a model's matrix, and which of these are modes at all."""
+    """Eigenvalues λ [rad/s] from those of a model's matrix, and a mask of those that are modes."""
     if step_size is None:
         return values.astype(complex), np.ones(len(values), dtype=bool)
     alive = np.abs(values) > _DEAD

@@ -1,8 +1,9 @@
-"""Whether a communication step resolves the modes: the step map's against the continuous system's.
+"""Comparison of the step map's modes with those of the continuous system, to see whether the communication step
+resolves them.
 
-Inputs are held over a communication step. That delays every coupling by half a step and more, which moves a mode by
-about as much as the step grows; a step far too long leaves modes that have nothing to do with the system. The
-continuous system, from the components' own derivatives, has the modes as they are.
+Inputs are held over a communication step. This delays every coupling by half a step or more and moves the modes, in
+proportion to the step. With a step that is far too long, the step map's modes have no relation to the system. The
+continuous system, from the components' own derivatives, has the true modes.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,41 +22,45 @@ from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError, InputError
 
 MOVED, LOST = 0.01, 0.1
-"""A step that moves a mode by the first part of its size is warned of; one by the second leaves nothing of it."""
+"""A step that moves a mode by the first part of its size gives a warning. A mode that moves by the second part is
+lost."""
 
 SWINGING = 0.5
-"""Damping ratio up to which a mode is compared; a mode with more damping is no swing."""
+"""Largest damping ratio of a compared mode; a mode with more damping does not swing."""
 
 SLOW_HZ = 5.0
-"""A lost mode below this is refused; faster ones, which only a wide range shows, are warned of."""
+"""Frequency below which a lost mode is an error [Hz]. A faster lost mode, which only a wide range shows, gives a
+warning."""
 
 _SLOWEST_HZ = 0.01
 _GROWTH = 1.0
-"""A step map that grows faster than the continuous system by more than this [1/s] is of an unstable coupling."""
+"""The coupling is unstable if the step map grows faster than the continuous system by more than this [1/s]."""
 
 _COMPARED = 6
-"""Modes of a large system that are compared, least damped first: each costs a sparse factorisation."""
+"""Number of modes of a large system that are compared, least damped first: each costs a sparse factorisation."""
 
 _ADVISED = (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
-"""Steps [s] that are tried for an advice, longest first, and how many of them."""
+"""Steps [s] that are tried to advise a shorter one, longest first, and the largest number of tried steps."""
 _TRIALS = 9
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A mode as a step map has it, and as the continuous system does [rad/s]."""
+    """One mode in the step map and in the continuous system [rad/s]."""
 
     seen: complex
     exact: complex
 
     @property
     def error(self) -> float:
-        """How far the step moves the mode, in parts of its size."""
+        """Distance by which the step moves the mode, as a part of its size."""
         return abs(self.seen - self.exact) / abs(self.exact)
 
     @property
     def is_lost(self) -> bool:
-        """Whether what is seen says nothing of the mode: far from it, or on the other side of stability."""
+        """Whether the step map's mode has no relation to the true one: it is far away, or on the other side of
+        stability.
+        """
         return self.error > LOST or (self.error > MOVED and self.seen.real * self.exact.real < 0)
 
 
@@ -74,23 +79,24 @@ def check_resolution(
     master
         At the operating point; it is left as it was.
     model, system
-        The step map, and the continuous model; None where a component gives no derivatives: nothing is said then.
+        The step map, and the continuous model. If this is None, because a component gives no derivatives, nothing is
+        compared.
     modes
         Of the step map.
     frequency_range
-        In which modes were looked for [Hz].
+        Range of the modes [Hz].
     stability
         The verdict. Where the coupling is unstable, a step at which it is stable is looked for even if the modes
         are resolved.
 
     Returns
     -------
-    Warnings, with a step that is short enough: as computed, not as guessed.
+    Warnings, with a step that is short enough; it is computed, not estimated.
 
     Raises
     ------
     InputError
-        If a slow mode is lost: what the step map shows in its place would be a wrong verdict.
+        If a slow mode is lost, because the mode in its place would give a wrong verdict.
     """
     said = verdict_warnings(stability)
     if model.step_size is None or system is None:
@@ -100,7 +106,7 @@ def check_resolution(
 
 
 def verdict_warnings(stability: Stability) -> tuple[str, ...]:
-    """Say before a run that the coupling itself is unstable, or that the FMUs do not confirm the verdict."""
+    """Warnings before a run: the coupling itself is unstable, or the FMUs do not confirm the verdict."""
     if stability.stable is None and stability.reason:
         return (f"whether the system is stable is not known: {stability.reason}",)
     rate, growth = stability.largest_growth_rate, stability.continuous_growth_rate
@@ -115,7 +121,7 @@ def verdict_warnings(stability: Stability) -> tuple[str, ...]:
 def _step_warnings(
     master: Master, step: float, system: LinearModel, pairs: Sequence[Pair], stability: Stability
 ) -> tuple[str, ...]:
-    """For the mode that a step [s] moves most, and for a coupling that is unstable at this step."""
+    """Warnings on the mode that a step [s] moves most, and on a coupling that is unstable at this step."""
     worst = max(pairs, key=lambda pair: (_is_slow(pair) and pair.is_lost, pair.error), default=None)
     moved = worst is not None and worst.error > MOVED
     if worst is None or not moved:
@@ -137,7 +143,7 @@ def _step_warnings(
 
 
 def _advice(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> str:
-    """For modes that are as they should be while the coupling is unstable."""
+    """The advice for an unstable coupling with resolved modes."""
     short = _short_step(master, system, pairs)
     if short is None:
         return "no shorter step that was tried has a stable coupling; see that the schedule has devices before the grid"
@@ -165,9 +171,10 @@ def _is_slow(pair: Pair) -> bool:
 def _pairs(
     model: LinearModel, system: LinearModel, modes: Sequence[Mode], frequency_range: tuple[float, float]
 ) -> list[Pair]:
-    """The swings of the step map, each with the continuous system's nearest, and in a small system the reverse.
+    """The oscillations of the step map, each paired with the nearest one of the continuous system; in a small system
+    also the reverse pairs.
 
-    The reverse finds what the step map has lost altogether.
+    The reverse pairs show modes that the step map has lost altogether.
     """
     low, high = max(frequency_range[0], _SLOWEST_HZ), frequency_range[1]
     seen = [mode.eigenvalue for mode in modes if _swings(mode.eigenvalue, low, high)]
@@ -184,7 +191,7 @@ def _swings(value: complex, low: float, high: float) -> bool:
 
 
 def _nearest(model: LinearModel) -> Callable[[complex], complex]:
-    """Of all eigenvalues [rad/s] of a model, the one nearest to a given one."""
+    """The eigenvalue [rad/s] of a model that is nearest to a given one."""
     if len(model.names) > DENSE:
         return lambda wanted: nearest_eigenvalue(model, wanted)
     values: NDArray[np.complex128] = eigenvalues(model)
@@ -211,7 +218,7 @@ def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> f
 
 
 def _growth(model: LinearModel) -> float:
-    """Growth of what grows fastest in a step map [1/s]; 0 where nothing stands out from the crowd of slow modes."""
+    """Largest growth rate in a step map [1/s]; 0 if no mode stands out from the slow ones."""
     if model.step_size is None or len(model.names) <= DENSE:
         return float(eigenvalues(model).real.max())
     n = len(model.names)

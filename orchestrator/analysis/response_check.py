@@ -1,10 +1,10 @@
-"""Whether a linear model is the FMU's: what it says of small changes of the inputs, beside what the FMU does.
+"""Comparison of a linear model with its FMU: the responses of both to small changes of the inputs.
 
 The inputs are stepped up and down between communication points, all at once and each in an order of its own, and the
-FMU is put back. A model over states passes where three things hold at every time that is looked at: the derivatives
-that the FMU gives are A·x + B·u of its own states, its outputs are C·x + D·u of them, and states and outputs go where
-the model alone would have gone. The first two see a single element of a slow state that has hardly moved; the third
-sees what the FMU does not show.
+FMU is put back. A model with states passes if three conditions hold at every compared time: the FMU's derivatives are
+A·x + B·u of its own states, its outputs are C·x + D·u of these states, and states and outputs follow the response of
+the model alone. The first two conditions show an error in a single element of a slow state, which hardly moves. The
+third shows states that the FMU hides.
 """
 
 import hashlib
@@ -21,32 +21,34 @@ from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component, RealBatch
 
 SIZES = (2e-4, 2e-3, 2e-5)
-"""Sizes of the steps that are tried in turn, relative to max(1, |value|), until half of one has half the effect. The
-second is for an FMU whose integration is coarse, the third for one that is strongly nonlinear."""
+"""Sizes of the steps, relative to max(1, |value|). They are tried in turn until half of a step has half its effect. The
+second size is for an FMU with a coarse integrator, the third for a strongly nonlinear one."""
 
 EQUATIONS = 3e-6
-"""Largest part of a derivative or an output that the equations may miss. The operating point is compared to 1e-6, which
-moves derivatives by so much and their matrices by a few times that; what is let through moves a mode of 0.1 to 2 Hz by
-about as small a part."""
+"""Largest error of the equations, as a part of a derivative or an output. The operating point is compared to 1e-6,
+which moves derivatives by as much and their matrices by a few times that. A model with a smaller error moves a mode of
+0.1 to 2 Hz by a similarly small part."""
 
 COURSE = 1e-2
-"""Largest part of a state or an output by which its course may differ from the model's own. The model is taken over the
-steps exactly; an FMU's integrator is not exact in what decays within a few of its steps."""
+"""Largest difference between the response of a state or an output and that of the model alone, relative to its size.
+The model is integrated exactly; an FMU's integrator is inexact for modes that decay within a few of its steps."""
 
 PROPORTIONAL = 1e-3
-"""Half a step may have so much more or less than half the effect, relative to the largest; more is not linear."""
+"""Largest difference between the effect of half a step and half the effect of the step, relative to the largest effect.
+A larger difference is not linear."""
 
 ONE_SIDED = 0.1
-"""Steps up and down may have effects that differ by this part; more is a limit or a dead band at its edge."""
+"""Largest relative difference between the effects of steps up and down. A larger difference shows a limit, or the edge
+of a dead band."""
 
 DURATION = 0.1
-"""How long the FMU is watched [s]."""
+"""Time for which the FMU's response is compared [s]."""
 
 MOST_STEPS = 1000
-"""Communication steps at most in one course."""
+"""Largest number of communication steps in one response."""
 
 _HOLDS = (1, 1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144)
-"""For how many communication steps an input is held, in turn: fast parts and slow ones are both excited."""
+"""Numbers of communication steps for which an input is held, in turn. They excite fast parts and slow ones."""
 
 _ROUNDING = 1e-11
 """Relative error of what an FMU computes, before it is divided by the size of a step."""
@@ -73,13 +75,13 @@ class ContinuousModel:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """All that is looked at."""
+        """Names of all compared signals."""
         return (*self.states, *self.rates, *self.outputs)
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """Steps of the inputs: each row of ``levels``, shape (k, m), is held for so many communication steps."""
+    """Steps of the inputs. Each row of ``levels``, shape (k, m), is held for a number of communication steps."""
 
     holds: tuple[int, ...]
     levels: Matrix
@@ -90,7 +92,7 @@ class _Plan:
         holds: list[int] = []
         while sum(holds) < count:
             holds.append(_HOLDS[len(holds) % len(_HOLDS)])
-        # The same signs in every check, so that an answer can be repeated.
+        # The same signs in every check, which makes results repeatable.
         signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(len(holds), len(scales)))
         return cls(tuple(holds), signs * scales)
 
@@ -102,16 +104,17 @@ class _Plan:
 
 @dataclass(frozen=True)
 class _Response:
-    """What the FMU did, per unit of the steps' size.
+    """The response of the FMU, divided by the steps' size.
 
     Attributes
     ----------
     course
         Half the difference between steps up and down, shape (k, signals).
     peaks, curved, one_sided
-        Of every signal: its largest value, by how much half a step differs, and by how much up differs from down.
+        Figures of every signal: its largest value, the difference with half a step, and the difference between up and
+        down.
     floors
-        What rounding alone may do.
+        Difference that rounding alone may cause.
     """
 
     course: Matrix
@@ -126,11 +129,11 @@ class _Response:
 
 
 _AGREED: WeakKeyDictionary[Component, set[bytes]] = WeakKeyDictionary()
-"""What was found to agree already: a study linearises the same instance at the same place many times."""
+"""Checks that have passed already: a study linearises the same instance at the same operating point many times."""
 
 
 def check_response(component: Component, model: ContinuousModel, what: str, time: float, step_size: float) -> None:
-    """Compare a linear model with the FMU that it is said to be of, and put that back.
+    """Compare a linear model with its FMU, and restore the FMU's state.
 
     Parameters
     ----------
@@ -148,7 +151,8 @@ def check_response(component: Component, model: ContinuousModel, what: str, time
     Raises
     ------
     AnalysisError
-        Naming the signal that differs most, when, and by how much; or that the FMU is not linear there.
+        If the responses differ, with the signal, time and size of the largest difference; or if the FMU is not linear
+        there.
     """
     values = RealBatch(component, (*model.states, *model.inputs, *model.outputs)).read().copy()
     key = _digest(model, values, step_size)
@@ -175,7 +179,7 @@ def _digest(model: ContinuousModel, values: Matrix, step_size: float) -> bytes:
 def _measure(
     component: Component, model: ContinuousModel, plan: _Plan, at_rest: Matrix, time: float, step_size: float
 ) -> _Response:
-    """With the first of `SIZES` to whose half the FMU answers with half."""
+    """The response to the first of `SIZES` whose half gives half the response."""
     bench = _Courses(component, model, plan, at_rest, time, step_size)
     undisturbed = bench.course(0.0)
     for size in SIZES:
@@ -235,7 +239,7 @@ class _Courses:
 
 
 def _refuse_edges(component: Component, model: ContinuousModel, response: _Response) -> None:
-    """Where steps up and down do different things, half their difference describes neither."""
+    """Refuse a signal whose responses to steps up and down differ: half their difference describes neither."""
     part = response.one_sided / (response.peaks + response.floors)
     part[response.one_sided <= ONE_SIDED * response.peaks + 10 * response.floors] = 0.0
     worst = int(np.argmax(part))
@@ -260,13 +264,13 @@ class _Comparison:
     step_size: float
 
     def judge(self) -> None:
-        """Raise where the FMU and the model part."""
+        """Raise an error if the responses of the FMU and the model differ."""
         n = len(self.model.states)
         course = self.response.course
         follow = range(n, course.shape[1])
         self._refuse(follow, self._by_equations(), EQUATIONS, "computed from the FMU's own states")
         shown = [*range(n), *range(2 * n, course.shape[1])]
-        with np.errstate(over="ignore", invalid="ignore"):  # a wrong model may grow beyond all numbers
+        with np.errstate(over="ignore", invalid="ignore"):  # a wrong model may grow beyond the range of numbers
             by_itself = self._by_itself()[:, shown]
         self._refuse(shown, by_itself, COURSE, "computed from the inputs alone")
 

@@ -1,4 +1,4 @@
-"""How much two modes are the same mode: by their eigenvectors, not by their place in a list.
+"""Similarity of two modes by their eigenvectors, which does not depend on the order of eigenvalues.
 
 With lᴴ·r = 1 for both, |l_aᴴ·r_b|·|l_bᴴ·r_a| is 1 for a mode and itself, 0 for two modes of the same matrix, and does
 not depend on the units of the states, as a comparison of mode shapes alone would.

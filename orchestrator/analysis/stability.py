@@ -1,7 +1,7 @@
-"""Whether a coupled system is stable: the verdict over its whole spectrum, with what grows and why.
+"""The verdict on the stability of a coupled system over its whole spectrum, with the growing modes and the cause.
 
 The step map is what a simulation runs, the continuous model is the system itself. Both are judged: a coupling may
-make a stable system grow, and a long communication step may damp what grows in the system.
+destabilise a stable system, and a long communication step may damp a mode that grows in the system.
 """
 
 from dataclasses import dataclass, replace
@@ -28,27 +28,28 @@ from orchestrator.analysis.modes import (
 )
 
 WHOLE = 4000
-"""Up to so many states all eigenvalues are computed; beyond, what grows is searched for."""
+"""Up to this number of states, all eigenvalues are computed; in larger systems only growing ones are searched for."""
 
 _GROWING = 1e-6
 """A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding."""
 
 SLOW = 0.05
-"""Eigenvalues of a step map up to this size [rad/s] are judged by the continuous model, where there is one: no step in
-use moves them, but an error of the perturbation is divided by the step, and a double zero splits by its root."""
+"""Eigenvalues of a step map up to this size [rad/s] are judged by the continuous model if there is one. No usual step
+moves them. The step map has larger errors here: an error of the perturbation is divided by the step, and a double zero
+splits by the root of the error."""
 
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
-"""A step map that grows faster than this many times the continuous system's rate and this much [1/s] owes that to the
-coupling."""
+"""The coupling is the cause of growth if the step map's growth rate exceeds the continuous system's rate times the
+first figure plus the second [1/s]."""
 
 _DENSE_VECTORS = 200
-"""Up to so many states all eigenvectors cost less than a search for one."""
+"""Up to this number of states, all eigenvectors cost less than a search for one."""
 
 _STATES_NAMED = 3
 
 
 class Cause(StrEnum):
-    """What makes a system grow."""
+    """The cause of growth in a system."""
 
     SYSTEM = "system"
     COUPLING = "coupling"
@@ -64,7 +65,7 @@ class Hidden:
     least_damped: complex | None
 
     def sentence(self) -> str:
-        """The same in words."""
+        """The sentence on the hidden modes."""
         low, high = self.frequency_range
         words = "oscillatory mode lies" if self.count == 1 else "oscillatory modes lie"
         text = f"{self.count} {words} outside {low:g} to {high:g} Hz"
@@ -73,7 +74,7 @@ class Hidden:
         return f"{text}; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
 
     def as_json(self) -> dict[str, Any]:
-        """The same for a machine."""
+        """The number and the least damped of the hidden modes as JSON's types."""
         known = self.least_damped is not None
         least = {"frequency_hz": self._hertz, "damping_percent": self._percent} if known else None
         return {"range_hz": list(self.frequency_range), "oscillatory_modes": self.count, "least_damped": least}
@@ -94,21 +95,21 @@ class Stability:
     Attributes
     ----------
     stable
-        Whether nothing grows; None where that is not known.
+        Whether no mode grows; None if this is not known.
     mode
-        The mode of the largest real part, of the step map; of the continuous system where only that grows.
+        The mode of the largest real part: of the step map, or of the continuous system if only this one grows.
     growing
-        How many modes of that model grow, a pair counted once.
+        Number of growing modes of the same model; a conjugate pair counts once.
     zeros
         Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`): the free angle.
     cause
-        Where something grows.
+        The cause of growth; None if no mode grows.
     continuous_growth_rate
         Largest real part [1/s] of the continuous system; None where a component gives no derivatives.
     step_size
         Communication step [s]; None for a continuous model.
     reason
-        Why nothing is known, or what was not searched.
+        Why the verdict is not known, or the region that was not searched.
     """
 
     stable: bool | None
@@ -173,7 +174,7 @@ class Stability:
 
 
 def place(value: complex, step_size: float | None = None) -> str:
-    """Where an eigenvalue [rad/s] is, in words: ``37.4 Hz``, ``no oscillation``."""
+    """The frequency of an eigenvalue [rad/s] in words: ``37.4 Hz``, ``no oscillation``."""
     if not oscillations(np.array([value]))[0]:
         return "no oscillation"
     hertz = value.imag / (2 * np.pi)
@@ -202,14 +203,16 @@ def whole_spectrum(model: LinearModel) -> Spectrum | None:
 
 
 def grows(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
-    """Which eigenvalues [rad/s] grow, one of each pair, zeros left out."""
+    """Mask of the eigenvalues [rad/s] that grow, one of each pair, zeros left out."""
     size = np.abs(values)
     mask: NDArray[np.bool_] = (values.real > np.maximum(_GROWING, 1e-8 * size)) & (size > ZERO) & (values.imag >= 0)
     return mask
 
 
 def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex | None:
-    """The eigenvalue [rad/s] that grows most, None where none grows; slow ones of a step map are left out (`SLOW`)."""
+    """The fastest growing eigenvalue [rad/s]; None if no eigenvalue grows. Slow eigenvalues of a step map are left out
+    (`SLOW`).
+    """
     growing = values[grows(values)]
     if step_map:
         growing = growing[np.abs(growing) > SLOW]
@@ -217,7 +220,7 @@ def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex
 
 
 def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> Hidden:
-    """What a frequency range [Hz] does not show of a spectrum."""
+    """The modes of a spectrum that a frequency range [Hz] does not show."""
     swinging = values[oscillations(values)]
     hertz = swinging.imag / (2 * np.pi)
     outside = swinging[(hertz < lowest_hz) | (hertz > highest_hz)]
@@ -255,14 +258,14 @@ def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearMo
 
 
 def _only_slow(spectrum: Spectrum | None, own: Stability) -> bool:
-    """Whether nothing grows but eigenvalues that the perturbation cannot tell from zero."""
+    """Whether the only growing eigenvalues are those that the perturbation cannot distinguish from zero."""
     if spectrum is None:
         return own.mode is not None and own.growing == 1 and abs(own.mode.eigenvalue) <= SLOW
     return bool(np.all(np.abs(spectrum.eigenvalues[grows(spectrum.eigenvalues)]) <= SLOW))
 
 
 def _cause(own: Stability, rate: float | None) -> Cause:
-    """Why a step map grows, beside the largest real part [1/s] of the continuous system."""
+    """The cause of a step map's growth, by comparison with the largest real part [1/s] of the continuous system."""
     coupled, alone = own.largest_growth_rate or 0.0, rate or 0.0
     if alone <= _GROWING or coupled > _COUPLING_FACTOR * alone + _COUPLING_RATE:
         return Cause.COUPLING

@@ -1,4 +1,4 @@
-"""Reading and setting the continuous states of a running FMU, and whether that can be done at all."""
+"""Reading and setting the continuous states of a running FMU, where the FMU allows it."""
 
 from orchestrator.analysis.embedded_model import embedded_model
 from orchestrator.arrays import Matrix
@@ -17,9 +17,11 @@ def obstacle(component: Component) -> str | None:
     if not description.can_save_state:
         return (
             f"component {component.name!r}: its FMU cannot save and restore its state (canGetAndSetFMUstate), "
-            f"so it cannot be perturbed and put back; {_MEASURE.format(component.name)}, or ask for an export that can"
+            f"so it cannot be perturbed and put back; {_MEASURE.format(component.name)}. (An export for linearisation "
+            "needs both: canGetAndSetFMUstate, and continuous states that a master may set, declared under "
+            "VendorAnnotations as fmus/toolchain/README.md has it)"
         )
-    # An FMU may also hide its states: taken for one without any, it would give wrong modes.
+    # An FMU may hide its states. Treated as an FMU without states, it would give wrong modes.
     if not description.states_are_settable and embedded_model(component) is None:
         return (
             f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
@@ -36,7 +38,7 @@ class StateAccess:
     Raises
     ------
     AnalysisError
-        If the component can neither be perturbed and put back, nor has a linear model inside.
+        If the component can neither be perturbed and restored, nor has a linear model inside.
     """
 
     def __init__(self, component: Component) -> None:
@@ -51,7 +53,7 @@ class StateAccess:
         return self.batch.read().copy()
 
     def write(self, values: Matrix) -> None:
-        """Set the states, where a master can set them."""
+        """Set the states that a master can set."""
         if self._settable:
             self._buffer.values[:] = values
             self._buffer.write()

@@ -1,4 +1,4 @@
-"""The linear model with inputs and outputs: what a disturbance does, and what other tools can import."""
+"""The linear model with inputs and outputs. It gives the response to a disturbance, and other tools can import it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,8 @@ class StateSpace:
         Shapes (n, n), (n, m), (p, n), (p, m). Units are those of the variables; for a continuous model
         A and B give derivatives per second.
     states, inputs, outputs
-        Names ``component.variable``; among the states may be ``component.output (held)``.
+        Names ``component.variable``; among the states may be ``component.output (held)`` and
+        ``a.out -> b.in (delayed k)``.
     step_size
         Communication step [s]; None for a continuous model, ẋ for x⁺.
     sources
@@ -71,7 +72,7 @@ class StateSpace:
         steps = round(duration / self.step_size)
         A, B = self.A, self.B
         A_all, B_all = np.eye(len(A)), np.zeros_like(B)
-        while steps:  # by squaring, so that many steps cost little more than one
+        while steps:  # by squaring: many steps cost little more than one
             if steps & 1:
                 A_all, B_all = A @ A_all, A @ B_all + B
             A, B = A @ A, A @ B + B
@@ -85,7 +86,7 @@ def read_linear_model(path: Path) -> StateSpace:
     Raises
     ------
     InputError
-        If the file is no FMU, or has no linear model inside.
+        If the file is not an FMU, or has no linear model inside.
     """
     model = read_embedded_model(path)
     if model is None:
@@ -95,7 +96,8 @@ def read_linear_model(path: Path) -> StateSpace:
 
 
 def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
-    """Inputs and outputs that were named to the blocks, around the step map of a schedule or, for None, continuous.
+    """The state space between the inputs and outputs that ``blocks`` was made with: the step map of a schedule, or the
+    continuous model for None.
 
     Raises
     ------
@@ -108,12 +110,14 @@ def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
     drive = np.zeros((m, len(blocks.inputs)))
     drive[external, np.arange(len(blocks.inputs))] = 1.0
     by_state, by_input = model.settle(model.H.toarray()), model.settle(drive)
-    newest = np.concatenate([np.arange(len(blocks.output_names)), external])
+    p = len(blocks.output_names)
+    newest = np.concatenate([np.arange(p), external])
+    arriving = (2 * p if schedule else p) + np.arange(len(blocks.links))  # of a step map, what arrived before
     C, D = np.zeros((len(blocks.outputs), n)), np.zeros((len(blocks.outputs), len(blocks.inputs)))
     windows = blocks.state_windows()
     for name, c in blocks.components.items():
         rows = [blocks.outputs.index(f"{name}.{variable}") for variable in c.observed]
-        w = newest[blocks.sources[name]]
+        w = blocks.entries(name, newest, arriving)
         C[rows] = c.D_o @ by_state[w]
         C[rows, windows[name]] += c.C_o
         D[rows] = c.D_o @ by_input[w]

@@ -1,7 +1,7 @@
-"""The operating point: the fixed point of the coupled step map, verified and where needed solved for.
+"""The operating point: the fixed point of the coupled step map. It is verified, and solved for if the system moves.
 
-An unstable equilibrium can be solved for but never waited for, so nothing is simulated here beyond
-single communication steps.
+A simulation never settles at an unstable equilibrium, but an equation can be solved for it. Only single communication
+steps are simulated here.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _SHIFT = 1e-7
 """Far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode."""
 
 _SHORT = 1e-4
-"""Over steps shorter than this [s] what may change is judged per second."""
+"""For steps shorter than this [s], the accepted change is a rate per second."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class OperatingPoint:
     residual
         Largest change of any state over one communication step [the state's unit, mostly pu].
     drift
-        The same per second.
+        Largest rate of change of any state [the state's unit per second].
     initial_residual
-        What the power flow alone gave.
+        Residual at the power flow's operating point, before any correction.
     iterations
-        Newton iterations that were needed; 0 where the power flow's point already holds.
+        Number of Newton iterations; 0 if the power flow's point is a steady state already.
     states
-        By name ``component.state``.
+        Values of the states by ``component.state``.
     """
 
     residual: float
@@ -50,19 +50,20 @@ class OperatingPoint:
 def find_operating_point(
     master: Master, tolerance: float = 1e-9, accept: float = 1e-12, max_iterations: int = 20
 ) -> OperatingPoint:
-    """Verify that the initialised system stands still, or move it to where it does.
+    """Verify that the initialised system stands still, or move it to a steady state.
 
     Parameters
     ----------
     master
         Initialised; it is left at the operating point.
     tolerance
-        Largest accepted change of a state over one communication step of 100 µs or more; over a shorter one,
-        accordingly less.
+        Largest accepted change of a state over one communication step of 100 µs or more; proportionally less over a
+        shorter step.
     accept
-        Below this nothing is solved for; between the two a better point is looked for and kept if it is one.
+        Below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a better point
+        is searched for, and kept if it is better.
     max_iterations
-        Of Newton's method on the step map.
+        Largest number of iterations of Newton's method on the step map.
 
     Raises
     ------
@@ -84,15 +85,36 @@ def find_operating_point(
         x, change, residual = candidate, new_change, _largest(new_change)
         iterations += 1
     names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
-    tolerance *= min(1.0, master.clock.step_size / _SHORT)  # however short the step is, the same drift counts
+    tolerance *= min(1.0, master.clock.step_size / _SHORT)  # the same drift is accepted however short the step is
     if not residual <= tolerance:
         worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
         raise AnalysisError(
-            f"no steady state found: after {iterations} Newton iterations a communication step still changes "
-            f"{worst}, more than {tolerance:g}; check that generation and load balance at rated frequency"
+            f"no steady state found: {_newton_in_words(iterations)} a communication step changes {worst}, more than "
+            f"{tolerance:g}; {what_to_check(master)}"
         )
     values = dict(zip(names, x.tolist(), strict=True))
     return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
+
+
+def what_to_check(master: Master) -> str:
+    """Where to look for the reason why an initialised system does not stand still."""
+    if master.late_starts:
+        late = "; ".join(master.late_starts.values())
+        return (
+            f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
+            "mode (`gfor check --only initial_outputs` shows it alone)"
+        )
+    return (
+        "check the start values of the component of these states, which for a model of yours are the arguments of its "
+        "blocks at the operating point; then whether generation and load balance at rated frequency"
+    )
+
+
+def _newton_in_words(iterations: int) -> str:
+    """How far Newton's method came; it ends where a further iteration makes nothing better."""
+    if not iterations:
+        return "Newton's method finds nothing better than the start that the power flow gives, and from there"
+    return f"after {iterations} Newton iteration{'s' * (iterations > 1)}"
 
 
 def _largest(change: Matrix) -> float:
@@ -100,7 +122,7 @@ def _largest(change: Matrix) -> float:
 
 
 def _newton_correction(master: Master, n: int, change: Matrix) -> Matrix:
-    """Solve (I − A)·dx = change; what the exchange remembers follows from the states."""
+    """Solve (I − A)·dx = change. Outputs that the exchange holds follow from the states."""
     model = compose(Blocks(master), gauss_seidel(master.schedule.groups))
     right = np.zeros(len(model.names))
     right[:n] = change

@@ -1,4 +1,4 @@
-"""One thread for linear algebra on small or sparse matrices: many would only wait for each other."""
+"""One thread for linear algebra on small or sparse matrices: several threads would only wait for each other."""
 
 import threading
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from threadpoolctl import ThreadpoolController
 
 
 def one_thread() -> AbstractContextManager[Any]:
-    """Inside, BLAS and its like take one thread."""
+    """Inside ``with``, BLAS and similar libraries use one thread."""
     limited: AbstractContextManager[Any] = _controller().limit(limits=1)
     return limited
 
@@ -20,7 +20,8 @@ _one_at_a_time = threading.Lock()
 
 @contextmanager
 def alone() -> Iterator[None]:
-    """Inside, no other thread of this process is inside, and BLAS takes one thread; for points of a study.
+    """Inside ``with``, BLAS uses one thread, and other threads of this process wait until the block ends. Points of a
+    study run in it.
 
     FMUs and the limit on BLAS belong to the whole process, whose workers may be threads of a Dask cluster. With one
     BLAS thread each, several workers do not fight, and rounding is the same everywhere.

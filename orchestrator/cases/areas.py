@@ -1,4 +1,4 @@
-"""Which area of the grid a component belongs to."""
+"""The areas of the grid, and the components of each."""
 
 import fnmatch
 from collections.abc import Mapping, Sequence
@@ -17,13 +17,24 @@ def areas_of(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, st
     system
         Components and connections.
     """
+    return {name: found[0] for name, found in _fitting(areas, system).items()}
+
+
+def in_two_areas(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, list[str]]:
+    """Areas of every component that the patterns of more than one fit; the first counts."""
+    return {name: found for name, found in _fitting(areas, system).items() if len(found) > 1}
+
+
+def _fitting(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, list[str]]:
     homes: dict[str, set[str]] = {name: {name} for name in system.components}
     for wire in system.connections:
         homes[wire.target.component].add(wire.source.variable.rpartition(".")[0])
-    found: dict[str, str] = {}
-    for name, known_as in homes.items():
-        for area, patterns in areas.items():
-            if any(fnmatch.fnmatchcase(alias, pattern) for alias in known_as for pattern in patterns):
-                found[name] = area
-                break
-    return found
+    found = {
+        name: [
+            area
+            for area, patterns in areas.items()
+            if any(fnmatch.fnmatchcase(alias, pattern) for alias in known_as for pattern in patterns)
+        ]
+        for name, known_as in homes.items()
+    }
+    return {name: fitting for name, fitting in found.items() if fitting}

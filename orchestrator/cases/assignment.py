@@ -1,14 +1,13 @@
-"""Values of the file, the scenario and the command line, given to the components they are for."""
+"""Assignment of values from the file, the scenario and the command line to the components."""
 
 import fnmatch
 from typing import Any
 
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.imperfection_tables import sets_imperfection
 from orchestrator.cases.names import close_names
-from orchestrator.cases.native import sets_native
 from orchestrator.cases.schema import Value
-from orchestrator.cases.unit_tables import sets_alpha
-from orchestrator.cases.values import check_system_base, convert, flatten
+from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
 from orchestrator.fmi.description import VariableInfo
 
 
@@ -17,15 +16,20 @@ def assign_values(draft: Draft) -> None:
     _assign_frequency(draft)
     for name, table in draft.tables.items():
         for group in ("parameters", "inputs"):
-            for path, value in flatten(getattr(table, group)):
+            flat = flatten(getattr(table, group))
+            for key in given_twice(flat) if name not in draft.origins else ():  # a unit's row overrides what is common
+                draft.note(draft.place_of_value(name, group, key.split(".")), f"{key}: {TWICE}")
+            for path, value in flat:
                 _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
     for layer in draft.layers:
+        for choice in layer.natives:  # made when the components were added
+            _check_component(draft, choice.pattern, choice.place)
         for key, value in layer.values.items():
             _assign_key(draft, key, value, layer.place(key))
 
 
 def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:
-    """The value in the variable's unit and type; None where it does not fit, which is noted.
+    """The value in the variable's unit and type; None, with a note of the problem, if it does not fit.
 
     Parameters
     ----------
@@ -46,7 +50,7 @@ def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) ->
 
 
 def _assign_frequency(draft: Draft) -> None:
-    """The network's frequency goes to everything that has a rated one."""
+    """Give the network's frequency to every component with a rated frequency."""
     if draft.data is None or draft.data.frequency is None:
         return
     for name, plan in draft.system.components.items():
@@ -57,13 +61,15 @@ def _assign_frequency(draft: Draft) -> None:
 
 def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""
-    if draft.case.units is not None and sets_alpha(key):
-        return  # done before the units were made
-    if sets_native(key):
-        key = f"{key.partition('.')[0]}."  # done when the components were added; the name is still checked
+    if sets_imperfection(key):
+        return  # done when the connections are made
     pattern, _, variable = key.partition(".")
     for name in fnmatch.filter(draft.tables, pattern) if variable else ():
         _assign(draft, name, variable, value, where)
+    _check_component(draft, pattern, where)
+
+
+def _check_component(draft: Draft, pattern: str, where: str) -> None:
     if not fnmatch.filter(draft.known, pattern):
         some = ", ".join([*draft.case.components][:12])
         draft.note(where, f"there is no component {pattern!r}; the case has: {some}")
@@ -72,7 +78,7 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
 def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) -> None:
     plan = draft.system.components.get(name)
     if plan is None:
-        return  # the component itself is a problem already
+        return  # the component's own problem is noted already
     info = plan.description.variables.get(variable)
     if info is None:
         settable = [*plan.description.parameters, *plan.description.inputs]

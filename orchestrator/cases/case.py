@@ -1,6 +1,7 @@
 """A case file, read and checked against its form."""
 
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -10,14 +11,16 @@ import tomli_w
 from pydantic import ValidationError
 
 from fmus.toolchain.cache import cache_directory
+from orchestrator.cases.contradictions import contradictions
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
-from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, Value
+from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
 from orchestrator.ssp.reading import read_ssp
 from orchestrator.toml_files import fault_of, read_toml
 
@@ -52,7 +55,8 @@ class Case(CaseDefinition):
         step_size, stop_time
             [s]; the file's where None.
         parameters
-            Parameter files; they go before the scenario's values, ``overrides`` before them.
+            Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority over
+            theirs.
 
         Raises
         ------
@@ -65,7 +69,11 @@ class Case(CaseDefinition):
             Problem("--scenario", f"there is no scenario {name!r}; the case has: {', '.join(self.scenarios)}")
             for name in unknown
         ]
-        if unknown:
+        doubles = [name for name, count in Counter(scenarios).items() if count > 1]
+        problems += [
+            Problem("--scenario", f"the scenario {name!r} is chosen more than once; name it once") for name in doubles
+        ]
+        if unknown or doubles:
             raise CaseError(str(self.path), problems)
         prepared, questions, named = [], [], Named()
         for name in scenarios or self.scenarios:
@@ -76,16 +84,17 @@ class Case(CaseDefinition):
             questions += [q for q in preparer.draft.questions if q not in questions]
         if not problems and self.numbered and unmatched(self.table, named, self.place):
             problems += self._mentions
-        if problems:  # what is most unusual may well be why
+        if problems:  # unusual data may be the reason of the failure
             asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         return [p for p in prepared if p is not None]
 
     @cached_property
     def _mentions(self) -> list[Problem]:
-        """Names in ``[analysis]`` and ``[[plots]]`` that nothing has in any scenario.
+        """Names in ``[analysis]`` and ``[[plots]]`` that match nothing in any scenario.
 
-        Scenarios are assembled one after the other until all is found; one that cannot be leaves it open.
+        Scenarios are assembled one after the other until every name is found. A scenario that cannot be assembled
+        leaves the rest undecided.
         """
         named, problems = Named(), list[Problem]()
         for name in self.scenarios:
@@ -121,57 +130,123 @@ class Case(CaseDefinition):
         return Preparer(self, name, dict(overrides or {}), parameters)
 
 
-def load_case(name_or_path: str | Path) -> Case:
+def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     """Read a built-in case by name, or a case file or an SSP by path.
+
+    Parameters
+    ----------
+    trust_fmus
+        Whether foreign FMUs may run in this process, where the file says ``isolated = false``; else that is a problem.
 
     Raises
     ------
     InputError
         If there is neither, or the file is not TOML, or not an SSP.
     CaseError
-        If the file lacks what nothing can be checked without, or an SSP holds what is not supported.
+        If the file lacks entries without which nothing can be checked, or an SSP has unsupported parts.
     """
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():
         path = BUILT_IN / str(name_or_path) / "case.toml"
+    if path.is_dir():
+        inside = sorted(p.name for p in path.glob("*.toml"))
+        hint = f"such as {path / inside[0]}" if inside else "of a case file (.toml) or an SSP"
+        raise InputError(f"{name_or_path}: it is a folder; give the path of a file, {hint}")
     if not path.is_file():
         raise InputError(
             f"{name_or_path}: there is no such file, nor a built-in case of that name; "
             f"built-in: {', '.join(built_in_cases())}"
         )
     if path.suffix.lower() == ".ssp":
-        return _from_ssp(path)
+        return _from_ssp(path, trust_fmus)
     text, raw = read_toml(path, "the case file", "make it readable for you")
     table, problems = _validate(raw, text, path)
-    return Case(table, text, path, tuple(problems), path.parent)
+    return _case(table, text, path, problems, path.parent, trust_fmus=trust_fmus)
 
 
-def _from_ssp(path: Path) -> Case:
-    """The case that an SSP comes to; its FMUs are unpacked where built ones are kept."""
+def _from_ssp(path: Path, trust_fmus: bool) -> Case:
+    """The case from an SSP. Its FMUs are unpacked into the cache of built FMUs."""
     ssp = read_ssp(path, cache_directory("ssp"))
     text = f"# What {path.name} comes to (SHA-256 {ssp.digest})\n\n{tomli_w.dumps(ssp.tables)}"
     table, problems = _validate(tomllib.loads(text), "", path)
-    return Case(table, text, path, tuple(problems), ssp.folder, numbered=False)
+    return _case(table, text, path, problems, ssp.folder, numbered=False, trust_fmus=trust_fmus)
+
+
+def _case(
+    table: CaseTable,
+    text: str,
+    path: Path,
+    problems: Sequence[Problem],
+    directory: Path,
+    *,
+    numbered: bool = True,
+    trust_fmus: bool,
+) -> Case:
+    """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder.
+
+    Parameters
+    ----------
+    table, text, path, problems, numbered, trust_fmus
+        As in `CaseDefinition`.
+    directory
+        Folder to which paths in the tables are relative.
+    """
+    files: dict[str, ParameterFile | str] = {}
+    for name in (name for scenario in table.scenarios.values() for name in scenario.parameters):
+        try:
+            files[name] = read_parameter_file(directory / name)
+        except InputError as error:
+            files[name] = str(error)
+    home = path.absolute().parent
+    return Case(table, text, path, tuple(problems), directory.absolute(), numbered, trust_fmus, home, files)
 
 
 def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, list[Problem]]:
-    """Validate; note each wrong entry, take it out, and go on with the rest."""
-    problems: list[Problem] = []
+    """Validate the tables: note each wrong entry, remove it, and continue with the rest."""
+    problems = [Problem(place_in(text, where), f"{where[-1]}: {TWICE}") for where in _join_names(raw)]
     for _ in range(_SCHEMA_PASSES):
         try:
-            return CaseTable.model_validate(raw), problems
+            table = CaseTable.model_validate(raw)
+            if not text:  # an SSP is one scenario of a case, and keeps what the case says of the others
+                return table, problems
+            return table, problems or contradictions(table, lambda *where: place_in(text, where))
         except ValidationError as error:
-            removed = False
-            for detail in error.errors():
+            removed, details = False, error.errors()
+            if len(details) > MOST_PROBLEMS:
+                shown = [_problem(raw, text, detail) for detail in details[:MOST_PROBLEMS]]
+                raise CaseError(str(path), [*shown, TOO_MANY]) from None
+            for detail in details:
                 location = _location(raw, detail["loc"])
                 known = any(p.place == place_in(text, location) for p in problems)
-                if not (known and detail["type"] == "missing"):  # missing because it was wrong and taken out
-                    problem = Problem(place_in(text, location), _schema_message(detail))
+                if not (known and detail["type"] == "missing"):  # missing because it was wrong and removed
+                    problem = _problem(raw, text, detail)
                     problems += [] if problem in problems else [problem]
                 removed |= _take_out(raw, location, detail["type"])
             if not removed:
                 break
     raise CaseError(str(path), problems)
+
+
+def _problem(raw: dict[str, Any], text: str, detail: Any) -> Problem:
+    """One of pydantic's errors as a problem of the case."""
+    return Problem(place_in(text, _location(raw, detail["loc"])), _schema_message(detail))
+
+
+def _join_names(raw: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Join the parts of unquoted names: TOML makes of `grid.X_L = 0.5` a table `grid` with a key `X_L`. The places of
+    names that are given both ways.
+    """
+    scenarios, twice = raw.get("scenarios"), list[tuple[str, ...]]()
+    named = scenarios.items() if isinstance(scenarios, dict) else ()
+    tables: list[tuple[tuple[str, ...], Any]] = [(("scenarios", name, "set"), table) for name, table in named]
+    tables.append((("reference", "when"), raw.get("reference")))
+    for place, table in tables:
+        key = place[-1]
+        if isinstance(table, dict) and isinstance(table.get(key), dict):
+            flat = flatten(table[key])
+            twice += [(*place, name) for name in given_twice(flat)]
+            table[key] = {".".join(parts): value for parts, value in flat}
+    return twice
 
 
 def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
@@ -184,13 +259,13 @@ def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
         if inside:
             path.append(part)
             raw = raw[part]
-        elif part == location[-1] and isinstance(raw, dict) and part not in ("float", "str", "bool"):
+        elif part == location[-1] and isinstance(raw, dict) and part not in ("float", "str", "bool", "[key]"):
             path.append(part)
     return tuple(path)
 
 
 def _take_out(raw: Any, location: Sequence[str | int], fault: str) -> bool:
-    """Remove a wrong entry; where something is missing in a list's element, the whole element."""
+    """Remove a wrong entry. If a key is missing in an element of a list, remove the whole element."""
     path = list(location)
     if fault == "missing" or fault.startswith("union_tag"):
         while path and not isinstance(path[-1], int):

@@ -1,4 +1,4 @@
-"""What the data of one component must obey together, because physics or the equations leave no other choice."""
+"""Rules that the data of one component must obey together, by physics or by the model's equations."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,8 @@ RULES = (
     Rule("machine.T_d10", "machine.T_d20", _SLOWER),
     Rule("machine.T_q10", "machine.T_q20", _SLOWER),
 )
-"""The machines' FMUs refuse the same in any tool; here it is said with the line, before anything is started."""
+"""Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
+is started."""
 
 RESISTANCES = (("transformer.R_t", "transformer.X_t"), ("filter.R_c", "filter.X_c"))
-"""Each with the reactance that it should not exceed."""
+"""Reactances, each with the larger one that it should not exceed."""

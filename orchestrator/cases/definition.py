@@ -1,30 +1,38 @@
-"""What a case file says, checked against its form."""
+"""The contents of a case file, checked against its form."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.cases.locate import place_in
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ScenarioTable
 from orchestrator.errors import Problem
 
 
 @dataclass(frozen=True)
 class CaseDefinition:
-    """A case file, or what an SSP comes to as one.
+    """A case file, or the equivalent of an SSP.
 
     Attributes
     ----------
     table
-        Its contents. Where the form was wrong, the wrong entries are left out and stand in
-        ``problems``, so that what the rest means can be checked as well.
+        Contents of the file. Entries of a wrong form are left out here and listed in ``problems``; the meaning of the
+        rest can still be checked.
     text
-        Of the case file.
+        Text of the case file.
     path
-        The file itself.
+        Path of the file, as it was given.
     directory
-        Where relative paths in the tables start.
+        Folder to which paths in the tables are relative; it holds wherever the program works later.
     numbered
-        Whether the text is the file's own, so that its lines mean something to the user.
+        Whether ``text`` is the user's own file, whose line numbers help in errors.
+    trust_fmus
+        Whether the user said that its FMUs may run in gfor's own process, where the file wants that.
+    home
+        Folder of the file itself; that of an SSP is another one than ``directory``.
+    parameter_files
+        The parameter files that its scenarios name, as they were read with the case; text says why one cannot be read.
     """
 
     table: CaseTable
@@ -33,6 +41,9 @@ class CaseDefinition:
     problems: tuple[Problem, ...]
     directory: Path
     numbered: bool = True
+    trust_fmus: bool = False
+    home: Path = field(default_factory=Path.cwd)
+    parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -41,7 +52,7 @@ class CaseDefinition:
 
     @property
     def scenarios(self) -> dict[str, ScenarioTable]:
-        """By name; a case without scenarios has one, named as the case."""
+        """Scenarios by name. A case without scenarios has one, with the name of the case."""
         return self.table.scenarios or {self.table.name: ScenarioTable()}
 
     def place(self, *path: str | int) -> str:

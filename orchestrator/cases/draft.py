@@ -5,35 +5,29 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fmus.grid.network import Network
+from orchestrator.cases.build_choices import Layer
 from orchestrator.cases.network_data import NetworkData
-from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable, Value
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
 from orchestrator.coupling.system import System
-from orchestrator.errors import Problem
+from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, Problem
 
 Locate = Callable[..., str]
 COMMAND_LINE = "--set"
 
 
 @dataclass(frozen=True)
-class Layer:
-    """Values by ``component.variable``, and where each is written."""
-
-    values: Mapping[str, Value]
-    place: Callable[[str], str]
-
-
-@dataclass(frozen=True)
 class UnitOrigin:
-    """Where a component of the units table stands.
+    """Origin of a component of the units table.
 
     Attributes
     ----------
     row
-        The row of the units' file, or what else it comes from.
+        Place of the row in the units' file, or the name of another source.
     own
-        Parameters that this row has.
+        Parameters that the row itself gives.
     common
-        Key of ``[units]`` with the parameters of all of its kind.
+        Key of ``[units]`` with the common parameters of this kind of unit.
     """
 
     row: str
@@ -43,32 +37,40 @@ class UnitOrigin:
 
 @dataclass
 class Draft:
-    """What the steps of the preparation share.
+    """Data that the steps of the preparation share.
 
     Attributes
     ----------
+    source
+        The case file, as errors name it.
     place
         Key path → its text with the line of the file.
     layers
-        Values from parameter files, the scenario and the command line; a later layer overrides an earlier one.
+        Values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
+        one.
     problems
-        All that is wrong so far.
+        All problems found so far.
     data
-        Elements of the network and what its source says of units; None where the case has no network of its own.
+        Elements of the network, and the source's data of units; None if the case has no network of its own.
     network
         The network behind the grid component.
     known, tables
-        Names of all components there can be, and the tables of those that this scenario has.
+        Names of all possible components, and the tables of the components in this scenario.
     system
         Components and connections.
     places
-        Where each ``component.variable`` that is set was set last.
+        Place of the last assignment of each ``component.variable``.
     origins
-        Where each component of the units table stands, by its name.
+        Origin of each component of the units table, by its name.
     questions
-        What is most unusual about the data.
+        Questions about unusual data.
+    parameter_files
+        The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
+    whole
+        Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     """
 
+    source: str
     case: CaseTable
     name: str
     scenario: ScenarioTable
@@ -85,20 +87,30 @@ class Draft:
     places: dict[str, str] = field(default_factory=dict)
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
+    parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    whole: bool = True
 
     def note(self, place: str, text: str) -> None:
-        """Add a problem, once."""
+        """Add a problem, once.
+
+        Raises
+        ------
+        CaseError
+            If there are more than `MOST_PROBLEMS`.
+        """
         problem = Problem(place, text)
         if problem not in self.problems:
             self.problems.append(problem)
+            if len(self.problems) > MOST_PROBLEMS:
+                raise CaseError(self.source, [*self.problems[:MOST_PROBLEMS], TOO_MANY])
 
     def note_network(self, place: str, text: str) -> None:
-        """Add a problem that leaves no network, so that what follows from its lack is not noted as well."""
+        """Add a problem that leaves no network. Problems that follow from the missing network are then not noted."""
         self.network_failed = True
         self.note(place, text)
 
     def place_of_value(self, name: str, group: str, path: Sequence[str]) -> str:
-        """Where a value of a component's table is written: the table, or the row and the table of its unit."""
+        """Place of a value of a component's table: the table, or the row and the table of its unit."""
         origin = self.origins.get(name)
         if origin is None or group != "parameters":
             return self.place("components", name, group, *path)

@@ -1,15 +1,17 @@
 """Events of a case file as the coupling's typed events, checked against the components they change."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from fmus.grid.names import lines_among
 from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import (
     BranchChangeTable,
+    ComponentFaultTable,
     EventTable,
     LineReclosingTable,
     LineTripTable,
@@ -18,13 +20,16 @@ from orchestrator.cases.schema import (
     LoadTripTable,
     ParameterChangeTable,
     ReferenceChangeTable,
+    SettingEventTable,
     UnitReconnectionTable,
     UnitTripTable,
+    WireEventTable,
 )
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     BranchChange,
     Event,
+    Fault,
     LineSwitching,
     LoadChange,
     LoadSwitching,
@@ -33,35 +38,62 @@ from orchestrator.coupling.events import (
     UnitSwitching,
 )
 from orchestrator.coupling.system import ComponentPlan, Endpoint
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
 
 
 def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
-    """The scenario's events, else the case's, up to the stop [s]; what is wrong with them is noted."""
+    """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
+    noted.
+    """
     own = draft.scenario.events is not None
     tables = draft.scenario.events if draft.scenario.events is not None else draft.case.events
-    events = []
+    if clock is None:
+        return ()
+    fed = {c.target: c.source for c in draft.system.connections}
+    events: list[tuple[Event, str]] = []
     for index, table in enumerate(tables):
         where = draft.place("scenarios", draft.name, "events", index) if own else draft.place("events", index)
-        for event in _events_of(draft, table, where):
-            checked = _checked(draft, event, where)
-            if checked is not None and clock is not None:
-                _check_time(draft, clock, event.time, "the event", where)
-                events.append(checked)
-    if clock is not None:
-        where = "--stop" if stop != draft.case.solver.stop_time else draft.place("solver", "stop_time")
-        _check_time(draft, clock, stop, "the stop", where)
-    return tuple(event for event in events if event.time < stop)
+        if not _is_point(draft, clock, table.time, "the event", where):
+            continue
+        if table.time >= stop:
+            _note_late(draft, table.time, stop, where)
+        for event in _all_events_of(draft, table, clock, where):
+            checked = event if isinstance(event, Fault) else _checked(draft, event, fed, where)
+            if checked is not None and _is_point(draft, clock, event.time, "the event", where):
+                events.append((checked, where))
+    where = "--stop" if stop != draft.case.solver.stop_time else draft.place("solver", "stop_time")
+    _is_point(draft, clock, stop, "the stop", where)
+    return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
 
 
-def _check_time(draft: Draft, clock: Clock, time: float, what: str, where: str) -> None:
+def _is_point(draft: Draft, clock: Clock, time: float, what: str, where: str) -> bool:
+    """Whether a time is a communication point; if not, that is noted."""
     try:
         clock.index(time, what)
     except InputError as error:
         draft.note(where, str(error))
+        return False
+    return True
 
 
-def _events_of(draft: Draft, table: EventTable, where: str) -> list[Event]:
+def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
+    """An event that no run reaches: the file's mistake, or worth a word where the stop was chosen for one run."""
+    text = f"the event at {time:g} s never happens, as the run stops at {stop:g} s"
+    if stop == draft.case.solver.stop_time:
+        draft.note(where, f"{text}; give it an earlier time, or the run a later solver.stop_time")
+    else:
+        draft.questions.append(Problem(where, f"{text} (--stop)"))
+
+
+def _all_events_of(draft: Draft, table: EventTable, clock: Clock, where: str) -> list[Event]:
+    if isinstance(table, WireEventTable):
+        return wire_events(draft, table, clock, where)
+    if isinstance(table, ComponentFaultTable):
+        return component_events(draft, table, where)
+    return _events_of(draft, table, where)
+
+
+def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event]:
     """What a table stands for; its values are still as the file has them. Nothing for a component that is removed."""
     if isinstance(table, ReferenceChangeTable | ParameterChangeTable):
         component = table.component
@@ -81,7 +113,7 @@ def _events_of(draft: Draft, table: EventTable, where: str) -> list[Event]:
 def _unit_switching(draft: Draft, table: UnitTripTable | UnitReconnectionTable, grid: str) -> list[Event]:
     plan = draft.system.components.get(table.unit)
     if plan is None and table.unit in draft.known:
-        return []  # a share of 0, or a problem already
+        return []  # its share is 0, or its problem is noted already
     has_breaker = plan is not None and "connected" in plan.description.variables
     return [UnitSwitching(table.time, grid, table.unit, isinstance(table, UnitReconnectionTable), has_breaker)]
 
@@ -106,15 +138,26 @@ def _grid_or_reference_events(table: EventTable, component: str) -> list[Event]:
         case ReferenceChangeTable():
             return [ReferenceChange(table.time, component, table.reference, table.delta)]
         case ParameterChangeTable():
-            value: Any = table.value  # brought to the variable's type and unit by the check
+            value: Any = table.value  # the check converts it to the variable's type and unit
             return [ParameterChange(table.time, component, table.parameter, value)]
         case _:
             raise TypeError(f"{type(table).__name__} is no event of the grid or of a component")
 
 
-def _checked(draft: Draft, event: Event, where: str) -> Event | None:
-    """The event with its values in the variables' units; None if something is wrong with it."""
-    fed = {c.target: c.source for c in draft.system.connections}
+def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str) -> Event | None:
+    """The event with its values in the variables' units; None if something is wrong with it.
+
+    Parameters
+    ----------
+    draft
+        Takes the notes.
+    event
+        With values as the file has them.
+    fed
+        What feeds each connected input.
+    where
+        Place of the event in the file.
+    """
     before = len(draft.problems)
     for component, settings in event.changes().items():
         plan = draft.system.components.get(component)
@@ -149,7 +192,7 @@ def _checked(draft: Draft, event: Event, where: str) -> Event | None:
 
 
 def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -> str:
-    """Which of the grid's elements is meant by a name that it does not have."""
+    """A hint at the grid's elements that an unknown name may mean."""
     names = plan.description.variables
     wanted, kind, known = "", "", list[str]()
     match event:

@@ -1,4 +1,6 @@
-"""What a power flow is made of, and our own nodal equations: they check a solution and say why there is none."""
+"""The elements of a power flow, and our own nodal equations. They check a solution, and explain why a power flow has no
+solution.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -34,7 +36,7 @@ class FlowLine:
 
     @property
     def charging(self) -> tuple[float, float]:
-        """Susceptance to earth at both ends; of an open line the part that the grid model leaves."""
+        """Susceptance to earth at both ends; for an open line the part that the grid model keeps."""
         b = self.B / 2 * (1.0 if self.closed else OPEN_CHARGING)
         return b / self.tap**2, b
 
@@ -63,14 +65,14 @@ def nodal_powers(
     loads: Sequence[FlowLoad],
     shunts: Sequence[FlowShunt],
 ) -> dict[str, complex]:
-    """P + jQ [pu, 100 MVA] that must be fed into every bus for the voltages to hold.
+    """P + jQ [pu, 100 MVA] that units must feed into every bus to give these voltages.
 
     Parameters
     ----------
     voltages
         Complex voltage of every bus [pu].
     lines, loads, shunts
-        What draws power; an open line only its charging.
+        Elements that draw power; an open line draws only the power of its charging.
     """
     needed = dict.fromkeys(voltages, 0j)
     for line in lines:
@@ -96,7 +98,7 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
     Raises
     ------
     InputError
-        Naming the buses that have none.
+        With the buses that have no way to the slack bus.
     """
     neighbours: dict[str, set[str]] = {bus: set() for bus in buses}
     for line in lines:
@@ -130,15 +132,15 @@ def widest_angle(
     Parameters
     ----------
     buses
-        Names.
+        Names of the buses.
     lines
-        Those that are open are left out.
+        Lines of the network; open ones are left out.
     loads
-        Of them the active power counts.
+        Loads, of which only the active power counts.
     injected
         Active power that units feed, by bus [pu, 100 MVA]; 0 where a bus is missing.
     slack_bus
-        The bus with angle 0, which feeds what is left.
+        The bus with angle 0, which feeds the remaining power.
     """
     closed = [line for line in lines if line.closed]
     position = {bus: k for k, bus in enumerate(buses)}

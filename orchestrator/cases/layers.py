@@ -1,26 +1,47 @@
-"""Where values come from beside the components' own tables: parameter files, the scenario, the command line."""
+"""Sources of values besides the components' own tables: parameter files, the scenario, the command line."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
-from orchestrator.cases.draft import COMMAND_LINE, Draft, Layer
-from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
+from orchestrator.cases.build_choices import Layer, Place, layer_of
+from orchestrator.cases.draft import COMMAND_LINE, Draft
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
-from orchestrator.errors import InputError
+
+
+@dataclass(frozen=True)
+class OptionValues(ParameterFile):
+    """Values of ``--set`` as a layer of their own, which the values that a sweep varies override."""
+
+    @classmethod
+    def of(cls, values: Mapping[str, Value]) -> "OptionValues":
+        """The layer of values by ``component.variable``."""
+        return cls(Path(COMMAND_LINE), "", dict(values))
+
+    def place(self, key: str) -> str:
+        """A key as the command line has it."""
+        return f"{COMMAND_LINE} {key}"
 
 
 def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]) -> list[Layer]:
-    """All layers, weakest first: the scenario's files, the scenario, files and then values of the command line."""
+    """All layers, weakest first: files of the scenario, the scenario, files of the command line, values of the command
+    line.
+    """
+    has_units = draft.case.units is not None
     layers: list[Layer] = []
+
+    def add(given: Mapping[str, Value], place: Place) -> None:
+        layers.append(layer_of(given, place, has_units=has_units))
+
     for index, name in enumerate(draft.scenario.parameters):
-        try:
-            layers.append(_of_file(read_parameter_file(draft.directory / name)))
-        except InputError as error:
-            draft.note(draft.place("scenarios", draft.name, "parameters", index), str(error))
-    layers.append(Layer(draft.scenario.set, lambda key: draft.place("scenarios", draft.name, "set", key)))
-    layers += map(_of_file, parameters)
-    layers.append(Layer(overrides, lambda key: f"{COMMAND_LINE} {key}"))
+        file = draft.parameter_files[name]
+        if isinstance(file, str):
+            draft.note(draft.place("scenarios", draft.name, "parameters", index), file)
+        else:
+            add(file.values, file.place)
+    add(draft.scenario.set, lambda key: draft.place("scenarios", draft.name, "set", key))
+    for file in parameters:
+        add(file.values, file.place)
+    add(overrides, lambda key: f"{COMMAND_LINE} {key}")
     return layers
-
-
-def _of_file(file: ParameterFile) -> Layer:
-    return Layer(file.values, file.place)

@@ -1,27 +1,25 @@
-"""Where in a TOML file a key stands, so that an error can name the line."""
+"""The line of a key in a TOML file, for errors."""
 
 import re
+import tomllib
 from collections.abc import Sequence
 from functools import lru_cache
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*=")
-_PART = re.compile(r"\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_-]+)")
+_PART = re.compile(r"(\"(?:[^\"\\]|\\.)*\")|'([^']*)'|([A-Za-z0-9_-]+)")
 
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
     """Line number of the longest part of a key path that has a line of its own; None if none has."""
-    wanted = tuple(str(p) for p in path)
-    best, best_length = None, 0
-    for number, key in _keys(text):
-        if len(key) > best_length and wanted[: len(key)] == key:
-            best, best_length = number, len(key)
-    return best
+    wanted, lines = tuple(str(p) for p in path), _lines(text)
+    return next((lines[wanted[:n]] for n in range(len(wanted), 0, -1) if wanted[:n] in lines), None)
 
 
 @lru_cache(maxsize=8)
-def _keys(text: str) -> tuple[tuple[int, tuple[str, ...]], ...]:
-    found: list[tuple[int, tuple[str, ...]]] = []
+def _lines(text: str) -> dict[tuple[str, ...], int]:
+    """Key path → line on which it first stands."""
+    lines: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
     for number, line in enumerate(text.splitlines(), start=1):
@@ -31,18 +29,33 @@ def _keys(text: str) -> tuple[tuple[int, tuple[str, ...]], ...]:
                 index = counts.get(table, 0)
                 counts[table] = index + 1
                 table = (*table, str(index))
-            found.append((number, table))
+            lines.setdefault(table, number)
         elif key := _KEY.match(line):
-            found.append((number, (*table, *_parts(key.group(1)))))
-    return tuple(found)
+            lines.setdefault((*table, *_parts(key.group(1))), number)
+    return lines
 
 
 def _parts(key: str) -> tuple[str, ...]:
-    return tuple(next(part for part in match if part) for match in _PART.findall(key) if any(match))
+    return tuple(_unquoted(quoted) or literal or bare for quoted, literal, bare in _PART.findall(key))
+
+
+def _unquoted(text: str) -> str:
+    """A key in double quotes without them, its escapes resolved; the text itself where that cannot be done."""
+    try:
+        return str(tomllib.loads(f"key = {text}")["key"]) if text else ""
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 def place_in(text: str, path: Sequence[str | int]) -> str:
     """A key path as text, with its line in the file."""
-    label = ".".join(f'"{p}"' if "." in str(p) else str(p) for p in path)
+    label = ".".join(_quoted(str(part)) for part in path)
     line = line_of(text, path)
     return f"line {line}, {label}" if line and label else label
+
+
+def _quoted(part: str) -> str:
+    """A part of a key path that can be printed and told from the others."""
+    if not part.isprintable():
+        return repr(part)
+    return f'"{part}"' if "." in part else part

@@ -1,6 +1,6 @@
-"""Names in ``[analysis]`` and ``[[plots]]`` that nothing has in any scenario of a case.
+"""Names in ``[analysis]``, ``[[plots]]`` and ``solver.record`` that match nothing in any scenario of a case.
 
-Components may be absent from some scenarios, so that a name is wrong only where no scenario has what it names.
+Components may be absent from some scenarios. A name is therefore wrong only if no scenario has a match for it.
 """
 
 import fnmatch
@@ -15,17 +15,17 @@ from orchestrator.errors import InputError, Problem
 
 @dataclass
 class Named:
-    """What there is to be named, in the scenarios that were looked at.
+    """Names that exist in the examined scenarios.
 
     Attributes
     ----------
     components
         Names of all components.
     foreign
-        Components that are FMU files. One that stands for a model of the catalogue need not have all its outputs and
-        states, so that their names are not checked.
+        Components that are FMU files. Such an FMU may lack outputs and states of the catalogue's model that it
+        replaces, and their names are not checked.
     homes
-        What an area may name: components and buses.
+        Names that an area may contain: components and buses.
     """
 
     components: set[str] = field(default_factory=set)
@@ -35,7 +35,7 @@ class Named:
     homes: set[str] = field(default_factory=set)
 
     def add(self, draft: Draft) -> None:
-        """All of one scenario, whose components were assembled."""
+        """Add the names of one assembled scenario."""
         for name, plan in draft.system.components.items():
             fmu = plan.description
             self.components.add(name)
@@ -49,8 +49,13 @@ class Named:
 
 
 def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
-    """Every entry that names nothing, with its place."""
-    return [*_states(case, named, place), *_areas(case, named, place), *_signals(case, named, place)]
+    """Every entry without a match, with its place."""
+    return [
+        *_states(case, named, place),
+        *_areas(case, named, place),
+        *_signals(case, named, place),
+        *_records(case, named, place),
+    ]
 
 
 def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
@@ -80,6 +85,13 @@ def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
                 yield Problem(
                     place("analysis", "areas", area), f"{pattern!r}: no scenario has such a component or bus; {hint}"
                 )
+
+
+def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+    for pattern in case.solver.record:
+        if pattern != "*" and not fnmatch.filter(named.outputs, pattern) and not _of_foreign(named, pattern):
+            hint = close_names(pattern, sorted(named.outputs), "`gfor info` lists the outputs of an FMU")
+            yield Problem(place("solver", "record"), f"{pattern!r}: no scenario has such an output to record; {hint}")
 
 
 def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:

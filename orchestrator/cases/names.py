@@ -1,4 +1,4 @@
-"""Names in a case file: those of a signal, and those that somebody may have meant."""
+"""Names in a case file: variables in the expression of a signal, and hints at the intended name."""
 
 import difflib
 import re
@@ -6,9 +6,41 @@ from collections.abc import Iterable
 
 from orchestrator.errors import InputError
 
+LONGEST = 200
+"""Bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to it."""
+
+_RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
+_FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
+
+
+def file_name(name: str) -> str:
+    """A name that can be that of a file or a folder on every system, and lead to no other place.
+
+    Raises
+    ------
+    ValueError
+        If it cannot.
+    """
+    rule = "it becomes the name of a file or folder: use letters, digits, _ and -, at most 200 bytes"
+    if not name.strip():
+        raise ValueError(f"this name is empty; {rule}")
+    if len(name.encode("utf-8", "surrogatepass")) > LONGEST:
+        raise ValueError(f"this name is longer than {LONGEST} bytes ({name[:40]}…); {rule}")
+    if found := _FORBIDDEN.search(name):
+        raise ValueError(f"the name {name!r} holds the character {found.group()!r}; {rule}")
+    if name[0] in ".-=+@ " or name[-1] in ". ":
+        raise ValueError(f"the name {name!r} begins or ends with a character that misleads programs; {rule}")
+    if any("\ud800" <= letter <= "\udfff" for letter in name):
+        raise ValueError(f"the name {name!r} holds half a character; {rule}")
+    if _RESERVED.fullmatch(name):
+        raise ValueError(f"the name {name!r} is that of a device on Windows; choose another")
+    if ".part-" in name or ".old-" in name:
+        raise ValueError(f"the name {name!r} is like those of unfinished results; choose another")
+    return name
+
 
 def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
-    """A hint at names of the same parts (``line_5_4`` for ``line_4_5``), else at ones that look alike."""
+    """A hint at names with the same parts (``line_5_4`` for ``line_4_5``), or otherwise at similar names."""
     names = list(known)
     close = [name for name in names if _parts(name) == _parts(wanted)]
     close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)

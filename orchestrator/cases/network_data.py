@@ -12,12 +12,12 @@ from orchestrator.cases.schema import NetworkTable
 
 @dataclass(frozen=True)
 class NetworkData:
-    """Elements of a network, and what its source says beyond them.
+    """Elements of a network, and further data of its source.
 
     Attributes
     ----------
     generation
-        By bus: what the units there feed and hold.
+        Power and voltage of the units at each bus.
     slack
         Reference bus of the source.
     frequency
@@ -57,7 +57,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
             bus = bus_name(row["bus"])
             loads.append(Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar")))
     buses = dict.fromkeys((*source.buses, *table.buses))
-    if not buses:  # nothing to check the lines' ends against: they are the list
+    if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
         buses = dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
     return NetworkData(
         tuple(buses),

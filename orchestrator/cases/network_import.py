@@ -1,4 +1,4 @@
-"""MATPOWER's tables as elements of our network: the one place where the two conventions meet."""
+"""Conversion of MATPOWER's tables to elements of our network."""
 
 import math
 from collections import Counter
@@ -18,7 +18,7 @@ _NO_LIMIT = 1e4
 
 @dataclass(frozen=True, slots=True)
 class Generation:
-    """What the generators at a bus feed [MW] and hold [pu] together, and a rating that suits them [MVA]."""
+    """Total power [MW] and common voltage [pu] of the generators at a bus, and a suitable rating [MVA]."""
 
     label: str
     p_mw: float
@@ -28,7 +28,7 @@ class Generation:
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """One generator: what it feeds [MW], holds [pu] and is rated [MVA]."""
+    """One generator: its power [MW], voltage [pu] and rating [MVA]."""
 
     p_mw: float
     v_pu: float
@@ -37,7 +37,7 @@ class _Member:
 
 @dataclass(frozen=True)
 class ImportedNetwork:
-    """Elements of a network, and by bus what its generators do."""
+    """Elements of a network, and the generation at each bus."""
 
     buses: tuple[str, ...] = ()
     lines: tuple[Line, ...] = ()
@@ -49,12 +49,12 @@ class ImportedNetwork:
 
 
 def import_network(source: SourceTables) -> ImportedNetwork:
-    """Map a source's tables to elements; whatever is out of service is left out.
+    """Convert a source's tables to elements. Everything out of service is left out.
 
     Raises
     ------
     InputError
-        Naming everything in the source that the grid model does not have.
+        With every part of the source that the grid model does not have.
     """
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
@@ -91,7 +91,8 @@ def bus_of(label: str) -> str:
 
 
 def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], dict[int, complex]]:
-    """Branches, and per bus what they leave to earth that a π section of ours does not have [pu of the source].
+    """Branches, and for each bus the part of their admittance to earth that our π section cannot hold [pu of the
+    source].
 
     A π section has one capacitance for both ends; a conductance, a difference between the ends and an inductive
     part (magnetisation) go to the buses.
@@ -140,7 +141,7 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
 def _loads(
     source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]
 ) -> tuple[list[Load], list[str]]:
-    """Loads, and what is wrong with them. What feeds at a generator's bus joins the generators there."""
+    """Loads, and their problems. A negative load at a generator's bus is added to the generators there."""
     loads, problems = [], []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])

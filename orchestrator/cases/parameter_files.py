@@ -1,4 +1,4 @@
-"""Parameter files: values for a case's components, kept apart from the case, with a note where they come from."""
+"""Parameter files: values for a case's components in a file of their own, with a note of their origin."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestrator.cases.locate import line_of
 from orchestrator.cases.schema import Value
-from orchestrator.cases.values import flatten
+from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.toml_files import read_toml
 
@@ -41,7 +41,7 @@ def read_parameter_file(path: Path) -> ParameterFile:
     InputError
         If there is no such file, it is not TOML, or it has no table ``[set]``.
     CaseError
-        With all keys and values that are none.
+        With every key and value that is not valid.
     """
     text, raw = read_toml(path, "the parameter file", "`gfor design` writes one")
     table = raw.get(_TABLE)
@@ -58,6 +58,7 @@ def read_parameter_file(path: Path) -> ParameterFile:
         for key in raw
         if key != _TABLE
     ]
+    problems += [Problem(_place(path, text, key), TWICE) for key in given_twice(flatten(table))]
     values: dict[str, Value] = {}
     for parts, value in flatten(table):
         key = ".".join(parts)
@@ -89,7 +90,7 @@ def _toml(value: Value) -> str:
 
 
 def _place(path: Path, text: str, key: str) -> str:
-    """A quoted key is one part of a path, an unquoted one several; the table's own line comes before both."""
+    """The place of a key. A quoted key is one part of a path, and an unquoted key with dots has several parts."""
     lines = [line_of(text, (_TABLE, *parts)) for parts in ((key,), key.split("."))]
     return _named(path, max(filter(None, lines), default=None), key)
 

@@ -1,4 +1,4 @@
-"""Data that cannot be are refused, data that are most unusual are questioned; both with their place in the file.
+"""Impossible data are refused, and most unusual data are questioned; both with their place in the file.
 
 A question is a warning: the case runs. It is answered by the key ``meant`` of the case, a list of names
 ``component.variable`` (patterns such as ``sg*.machine.H`` fit several).
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fmus.grid.names import line_variable
 from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.names import close_names
 from orchestrator.cases.plausible_ranges import (
     LINE_B,
     LINE_RATIO,
@@ -27,17 +28,17 @@ from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
 _FAR = 3
-"""A value that is beyond its range by less than this factor may be a slip, but not one of a thousand."""
+"""A value that is outside of its range by less than this factor may be a mistake, but not one of a factor of 1000."""
 
 _FULL = 1.05
 """Apparent power [pu of the rating] above which a converter's operating point is questioned."""
 
 _SHOWN = 3
-"""Components that a question names; the others are counted."""
+"""Largest number of components that a question names; the others are counted."""
 
 
 def check_plausibility(draft: Draft) -> None:
-    """Note what cannot be, and collect the draft's questions."""
+    """Note impossible data, and collect the draft's questions."""
     for name, plan in draft.system.components.items():
         for rule in RULES:
             _check_rule(draft, name, plan, rule)
@@ -47,9 +48,12 @@ def check_plausibility(draft: Draft) -> None:
 
 
 def _check_meant(draft: Draft) -> None:
-    """What is said to be meant names something that some scenario has; here only the variable can be judged."""
+    """Check the entries of ``meant``. A component may exist in another scenario, where its variable is checked."""
     for pattern in draft.case.meant:
         component, _, variable = pattern.partition(".")
+        if draft.whole and not fnmatch.filter(draft.known, component):
+            hint = close_names(component, sorted(draft.known), "name it as [components] does")
+            draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
         if plans and not any(fnmatch.fnmatchcase(v, variable) for p in plans for v in p.description.variables):
             draft.note(
@@ -59,7 +63,7 @@ def _check_meant(draft: Draft) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Doubt:
-    """A value that is most unusual: ``component.variable``, its place, and what is said about it."""
+    """A most unusual value: its ``component.variable``, its place, and the question's text."""
 
     name: str
     place: str
@@ -82,8 +86,10 @@ def _doubts(draft: Draft) -> Iterator[_Doubt]:
 
 
 def question_loading(draft: Draft) -> None:
-    """Ask about converters whose operating point, of the power flow where there is one, exceeds their rating."""
-    asked = {question.place for question in draft.questions}  # of a rating that is questioned already, that is enough
+    """Ask about converters whose operating point exceeds their rating. The operating point is the power flow's if there
+    is one.
+    """
+    asked = {question.place for question in draft.questions}  # one question about a rating is enough
     draft.questions += _merged([d for d in _overloaded(draft) if not _is_meant(draft, d.name) and d.place not in asked])
 
 
@@ -137,7 +143,7 @@ def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> Non
 
 
 def _check_frequencies(draft: Draft) -> None:
-    """What is coupled has one rated frequency: frames of two frequencies turn against each other."""
+    """Check that coupled components have one rated frequency: frames of two frequencies turn against each other."""
     rated = {name: f for name, plan in draft.system.components.items() if (f := _frequency(plan)) is not None}
     for group in _coupled(draft):
         known = {name: rated[name] for name in group if name in rated}
@@ -157,7 +163,7 @@ def _check_frequencies(draft: Draft) -> None:
 
 
 def _frequency(plan: ComponentPlan) -> float | None:
-    """A binding says what an FMU's per-unit frequency and angles mean, whatever parameters the FMU has itself."""
+    """Rated frequency of a component. For a bound FMU the binding defines it, whatever parameters the FMU has."""
     return plan.description.port.f_n if isinstance(plan.description, BoundDescription) else _value(plan, "f_n")
 
 
@@ -178,7 +184,7 @@ def _coupled(draft: Draft) -> list[set[str]]:
 
 
 def _small_units(draft: Draft) -> Iterator[_Doubt]:
-    """Ratings of units in the power flow that nothing of the network would notice."""
+    """Ask about units in the power flow with a rating too small to affect the network."""
     ports = {p.name: p.bus for p in draft.network.ports} if draft.network else {}
     plans = {name: plan for name, plan in draft.system.components.items() if name in ports}
     ratings = {name: S_n for name, plan in plans.items() if (S_n := _value(plan, "S_n")) is not None}
@@ -187,25 +193,30 @@ def _small_units(draft: Draft) -> Iterator[_Doubt]:
     largest = max(ratings, key=lambda name: ratings[name])
     for name, S_n in ratings.items():
         shared = [n for n in draft.origins if n in ratings and ports[n] == ports[name]] if name in draft.origins else []
-        whole = sum(ratings[n] for n in shared) if shared else S_n  # a unit's share may be as small as it likes
+        whole = sum(ratings[n] for n in shared) if shared else S_n  # the share of a unit may be arbitrarily small
         if whole < SMALLEST_SHARE * ratings[largest]:
             text = f"S_n = {S_n:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
             yield _Doubt(f"{name}.S_n", _place(draft, name, "S_n"), text)
 
 
 def _lines(draft: Draft) -> Iterator[_Doubt]:
-    """Reactance, charging, ratio and R/X of the lines of the network, with the values that are set."""
+    """Ask about reactance, charging, ratio, shift and R/X of the network's lines, with the values that are set."""
     grid = draft.system.components.get(draft.grid or "")
     if grid is None or draft.network is None or draft.grid is None:
         return
     wanted = {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}
     for line in draft.network.lines:
-        found = {q: _value(grid, line.variable(q)) for q in ("X", "R", "B", "tap")}
+        found = {q: _value(grid, line.variable(q)) for q in ("X", "R", "B", "tap", "shift")}
         for quantity, usual in wanted.items():
             value = found[quantity]
             if value is not None:
                 where = _line_place(draft, line.name, quantity)
                 yield from _outside(draft, draft.grid, line.variable(quantity), value, usual, where)
+        shift = found["shift"]
+        if shift is not None and abs(shift) > math.pi:
+            name = line.variable("shift")
+            text = f"{name} = {shift:g} rad is more than half a turn; if it is in degrees, write '{shift:g} deg'"
+            yield _Doubt(f"{draft.grid}.{name}", _line_place(draft, line.name, "shift"), text)
         R, X = found["R"], found["X"]
         if R is not None and X is not None and R > MOST_R_OVER_X * X:
             names = line.variable("R"), line.variable("X")
@@ -216,7 +227,7 @@ def _lines(draft: Draft) -> Iterator[_Doubt]:
 
 
 def _line_place(draft: Draft, line: str, quantity: str) -> str:
-    """Where a line's value was set, else where the line is."""
+    """Place where a line's value was set, or otherwise the place of the line."""
     table = draft.case.network
     if set_at := draft.places.get(f"{draft.grid}.{line_variable(line, quantity)}"):
         return set_at
@@ -231,13 +242,13 @@ def _line_place(draft: Draft, line: str, quantity: str) -> str:
 
 
 def _place(draft: Draft, name: str, *variables: str) -> str:
-    """Where the first of some variables of a component was set that was set at all, else the component."""
+    """Place of the first of some variables of a component that was set, or otherwise the place of the component."""
     found = (draft.places.get(f"{name}.{variable}") for variable in variables)
     return next((place for place in found if place), f"{draft.place('components', name)}, {variables[0]} (its default)")
 
 
 def _value(plan: ComponentPlan, variable: str) -> float | None:
-    """The number in effect: what is set, else the FMU's default; None where there is neither."""
+    """The effective number: the set value, or otherwise the FMU's default; None without both."""
     value = plan.value(variable) if variable in plan.description.variables else None
     return None if value is None or isinstance(value, bool | str) else float(value)
 
@@ -251,7 +262,7 @@ def _is_meant(draft: Draft, name: str) -> bool:
 
 
 def _merged(doubts: list[_Doubt]) -> list[Problem]:
-    """One question for equal ones about several components, each with how to answer it."""
+    """Merge equal questions about several components into one, and add how to answer it."""
     groups: dict[tuple[str, str], list[str]] = {}
     for doubt in doubts:
         groups.setdefault((doubt.place, doubt.text), []).append(doubt.name)

@@ -1,6 +1,6 @@
-"""What the data of a power system usually are: a value outside is questioned, not refused.
+"""Usual ranges of a power system's data. A value outside is questioned, not refused.
 
-The ranges are wide: they are there for slips of a unit (ms for s, kVA for MVA) or of a base, and not to judge data.
+The ranges are wide: they find a wrong unit (ms for s, kVA for MVA) or a wrong base, and do not judge data.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ class Plausible:
     Attributes
     ----------
     unit
-        The variable's; a variable of the same name in another unit is not meant.
+        Unit of the variable. The range does not apply to a variable of the same name in another unit.
     why
-        Where the range comes from.
+        Source of the range.
     or_zero
-        Whether 0 is usual as well, because it leaves something out.
+        Whether 0 is usual as well, because it switches a part off.
     """
 
     low: float
@@ -108,7 +108,7 @@ RANGES: dict[str, Plausible] = {
     **_CONVERTER,
     **{f"{pod}.{name}": wanted for pod in ("pod_p", "pod_q") for name, wanted in _POD.items()},
 }
-"""By the variable's name inside a component."""
+"""Ranges by the variable's name inside a component."""
 
 _LINE = "lines and transformers on 100 MVA, from 20 kV cables to tie lines"
 LINE_X = Plausible(1e-5, 10, "pu", _LINE)
@@ -117,7 +117,7 @@ LINE_RATIO = Plausible(0.6, 1.6, "1", "tap changers and off-nominal ratios")
 STRAY_B = Plausible(0, 1, "pu", "a stray capacitance is small")
 
 MOST_R_OVER_X = 5.0
-"""Of a line; low-voltage cables come near it."""
+"""Largest usual R/X of a line; low-voltage cables come near it."""
 
 SMALLEST_SHARE = 1e-3
-"""Of the largest unit's rating: a smaller unit of the same network is questioned."""
+"""Smallest usual rating of a unit, as a part of the largest unit's rating in the same network."""

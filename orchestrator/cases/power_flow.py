@@ -20,12 +20,14 @@ __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_
 _TOLERANCE = 1e-9
 """Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
 _KV = 230.0
-"""Voltage at which per-unit figures are handed to pandapower; it drops out."""
+"""Nominal voltage for conversion to pandapower's units [kV]; it cancels in the results."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlowUnit:
-    """A unit that feeds P_0 [pu, S_n] and, with the others at its bus, holds v_0 [pu]; nothing where not connected."""
+    """A unit that feeds P_0 [pu, S_n] and holds v_0 [pu] together with the others at its bus. An unconnected unit does
+    neither.
+    """
 
     name: str
     bus: str
@@ -64,8 +66,8 @@ def solve_power_flow(
 ) -> PowerFlow:
     """Solve the power flow.
 
-    Units at one bus hold its voltage together; they share its reactive power, and at the slack
-    bus what is left of the active power, in proportion to their ratings.
+    Units at one bus hold its voltage together. They share its reactive power in proportion to their ratings; at the
+    slack bus they share the remaining active power in the same way.
 
     Parameters
     ----------
@@ -74,9 +76,9 @@ def solve_power_flow(
     lines, loads, shunts
         Elements of the network [pu, 100 MVA; loads in MW and Mvar].
     units
-        What feeds the network: each with its bus, power and voltage.
+        Units that feed the network, each with its bus, power and voltage.
     slack_bus
-        The bus whose units feed what is left; its angle is zero.
+        The bus whose units feed the remaining power; its angle is zero.
 
     Raises
     ------
@@ -153,9 +155,10 @@ def _pandapower_voltages(
 
 @cache
 def empty_network() -> Any:
-    """Pandapower's network with nothing in it, to be copied.
+    """An empty network of pandapower, to be copied.
 
-    Its eighty empty tables take ten times as long to make as to copy, and longer than the power flow of a small system.
+    Making its eighty empty tables takes ten times as long as copying them, and longer than the power flow of a small
+    system.
     """
     import pandapower as pp  # noqa: PLC0415 - as above
 
@@ -163,7 +166,7 @@ def empty_network() -> Any:
 
 
 def _add_line(pp: Any, net: Any, line: FlowLine, index: Mapping[str, int]) -> None:
-    """A line, or a transformer where it has a ratio; shunts alone where it is open."""
+    """Add a line, or a transformer if the line has a ratio; only its shunts if it is open."""
     impedance = _KV**2 / SYSTEM_BASE_MVA
     ends = index[line.from_bus], index[line.to_bus]
     if line.closed and not line.has_ratio:
@@ -203,7 +206,7 @@ def _shares(
     at_bus: Mapping[str, Sequence[FlowUnit]],
     slack_bus: str,
 ) -> PowerFlow:
-    """Power that every unit must feed for the voltages to hold, and what is left over."""
+    """Power that every unit must feed to give these voltages, and the largest mismatch of a bus."""
     powers: dict[str, complex] = {}
     residual = 0.0
     for bus, power in needed.items():

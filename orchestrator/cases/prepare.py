@@ -1,25 +1,29 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
-import fnmatch
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
 from fmus.toolchain.extras import require
 from orchestrator.binding.binding import bound_fmu
+from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
+from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.event_tables import scenario_events
+from orchestrator.cases.imperfection_tables import disturb_connections
 from orchestrator.cases.layers import value_layers
-from orchestrator.cases.native import is_native
+from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
-from orchestrator.cases.schema import ComponentTable, Value
+from orchestrator.cases.recording import record_every, recorded
+from orchestrator.cases.references import references_of
+from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
@@ -30,6 +34,13 @@ from orchestrator.coupling.step_awareness import tell_step
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.fmi.instance import is_ours
+
+MOST_STEPS = 1e11
+"""Communication steps of a run: a month and more."""
+
+_STEPS_A_SECOND = 30_000
+"""Of the two-area system on one core, about."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +52,19 @@ class PreparedScenario:
     case
         The case that the scenario is of.
     record
-        Names ``component.variable`` of what is recorded, every ``record_every`` communication steps.
+        Names ``component.variable`` of the signals that are recorded every ``record_every`` communication steps.
+    about_rows
+        Questions about the interval of the recording, which only a run asks.
+    record_filtered
+        Whether the recorded signals go through a low-pass filter before.
     power_flow
-        What the components start from; None where the case has no network.
+        The power flow that gives the components' start values; None if the case has no network.
     values
         Every value that was set, by ``component.variable``.
     questions
         Data that are most unusual, each with its place: see `plausibility`.
+    references
+        Published modes of the scenario by name, where the conditions of ``[reference]`` hold.
     """
 
     case: CaseDefinition
@@ -63,6 +80,9 @@ class PreparedScenario:
     power_flow: PowerFlow | None
     values: dict[str, float | bool]
     questions: tuple[Problem, ...] = ()
+    record_filtered: bool = False
+    about_rows: tuple[Problem, ...] = ()
+    references: Mapping[str, ReferenceModeTable] = field(default_factory=dict)
 
 
 def _takes_network(table: ComponentTable) -> bool:
@@ -72,7 +92,7 @@ def _takes_network(table: ComponentTable) -> bool:
 
 @cache
 def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
-    """FMU of a model of the catalogue, built once a machine.
+    """FMU of a catalogue's model, built once on each machine.
 
     Raises
     ------
@@ -90,7 +110,7 @@ def catalogue_fmu(model: str, network: Network | None = None, native: bool = Fal
 
 
 class Preparer:
-    """Makes one scenario ready; ``problems`` collects what is wrong."""
+    """Prepares one scenario; ``problems`` collects the mistakes."""
 
     def __init__(
         self,
@@ -101,7 +121,8 @@ class Preparer:
     ) -> None:
         scenario = case.scenarios[name]
         self._case = case
-        self.draft = draft = Draft(case.table, name, scenario, case.directory, case.place)
+        self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
+        draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
         self._read_network()
         self._everything = dict(case.table.components) | unit_components(draft)
@@ -119,6 +140,7 @@ class Preparer:
         for name in draft.scenario.remove:
             if name not in draft.known:
                 draft.note(draft.place("scenarios", draft.name, "remove"), f"there is no component {name!r} to remove")
+        self._check_network_is_used()
         self._find_network()
         for name, table in draft.tables.items():
             self._add_component(name, table)
@@ -126,7 +148,7 @@ class Preparer:
         return draft.system
 
     def prepare(self, step_size: float | None, stop_time: float | None) -> PreparedScenario | None:
-        """Go through all of it; None if there were problems that leave nothing to run."""
+        """Prepare the whole scenario; None if its problems leave nothing to run."""
         draft = self.draft
         self.assemble()
         connect(draft)
@@ -138,10 +160,16 @@ class Preparer:
         if clock is not None:
             tell_step(draft.system, clock.step_size)
         stop = stop_time if stop_time is not None else draft.case.solver.stop_time
+        self._check_length(clock, stop)
+        imperfections = disturb_connections(draft, clock) if clock is not None else {}
         events = scenario_events(draft, clock, stop)
         schedule = self._schedule()
+        references = references_of(draft, imperfections)
         if draft.problems or clock is None:
             return None
+        every, about_rows = record_every(draft, clock, stop)
+        record, left_out = recorded(draft)
+        draft.questions += [*doubts(draft.case, draft.place), *self._area_questions()]
         return PreparedScenario(
             case=self._case,
             name=draft.name,
@@ -150,18 +178,22 @@ class Preparer:
             schedule=schedule,
             step_size=clock.step_size,
             stop_time=stop,
-            record=self._recorded(),
-            record_every=max(1, round(draft.case.solver.record_interval / clock.step_size)),
+            record=record,
+            record_every=every,
+            record_filtered=draft.case.solver.record_filter == "low-pass",
             events=events,
             power_flow=flow,
-            values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()},
+            values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()}
+            | imperfections,
             questions=tuple(draft.questions),
+            about_rows=(*about_rows, *left_out),
+            references=references,
         )
 
     # -- network and components ------------------------------------------------------------------
 
     def _read_network(self) -> None:
-        """The elements of the network table; the units may need what its source knows of them."""
+        """Read the elements of the network table. Its source may have data for the units."""
         table = self.draft.case.network
         if table is None:
             return
@@ -174,6 +206,19 @@ class Preparer:
         except InputError as error:
             where = self.draft.place("network", source) if source else self.draft.place("network")
             self.draft.note_network(where, str(error))
+
+    def _check_network_is_used(self) -> None:
+        """Refuse a network that nothing is built from; its frequency alone would still set that of every component."""
+        tables = self._everything.values()
+        unknown = [table.model for table in tables if table.model is not None and table.model not in model_names()]
+        if self.draft.case.network is None or self.draft.case.units is not None or unknown:
+            return
+        if not any(_takes_network(table) for table in tables):
+            self.draft.note(
+                self.draft.place("network"),
+                "no component is built from this network; give the grid the model 'grid' or 'phasor_grid', or remove "
+                "the table",
+            )
 
     def _find_network(self) -> None:
         """The network behind the grid component: the model's own, or the file's table."""
@@ -225,12 +270,35 @@ class Preparer:
             self.draft.note(where, "'binding' is for an FMU of others; give its path as 'fmu', or remove 'binding'")
             return
         try:
-            description = self._description(table, is_native(self.draft, name, table))
+            description = self._description(table, self._is_native(name, table))
+            self._check_trust(name, table)
             self.draft.system.add(name, description, isolated=table.isolated)
-        except (InputError, ValueError) as error:  # the latter from a model that does not fit the network
+        except (InputError, ValueError) as error:  # ValueError: the model does not fit the network
             self.draft.note(where, str(error))
         except KeyError as error:
             self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))
+
+    def _is_native(self, name: str, table: ComponentTable) -> bool:
+        """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
+        native = table.native
+        for choice in (choice for layer in self.draft.layers for choice in layer.natives if choice.fits(name)):
+            try:
+                native = choice.native
+            except ValueError as error:
+                self.draft.note(choice.place, str(error))
+        return native
+
+    def _check_trust(self, name: str, table: ComponentTable) -> None:
+        """A file may come from anybody; only the user lets foreign code into this process."""
+        if table.fmu is None or table.isolated is not False or self._case.trust_fmus:
+            return
+        if not is_ours(self.draft.directory / table.fmu):
+            self.draft.note(
+                self.draft.place("components", name, "isolated"),
+                f"this file wants {table.fmu} to run in gfor's own process, where it can do whatever you can; if you "
+                "trust the FMU, say so by --trust-fmus (in Python load(case, trust_fmus=True)), else remove "
+                "'isolated = false', and it runs in a process that is closed off",
+            )
 
     def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
         if table.fmu is not None:
@@ -271,12 +339,15 @@ class Preparer:
             draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}")
             return None
 
-    def _recorded(self) -> tuple[str, ...]:
-        """All Real outputs that fit one of the file's patterns."""
-        plans = {name: plan.description for name, plan in self.draft.system.components.items()}
-        outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
-        wanted = {name for pattern in self.draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
-        return tuple(name for name in outputs if name in wanted)
+    def _area_questions(self) -> list[Problem]:
+        areas = self.draft.case.analysis.areas
+        return [
+            Problem(
+                self.draft.place("analysis", "areas", found[1]),
+                f"{name} is in {' and '.join(found)}; it counts to {found[0]}, the first",
+            )
+            for name, found in in_two_areas(areas, self.draft.system).items()
+        ]
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -286,6 +357,17 @@ class Preparer:
         except InputError as error:
             self.draft.note("--step", str(error))
             return None
+
+    def _check_length(self, clock: Clock | None, stop: float) -> None:
+        """Refuse a run that nobody lives to see the end of: one of its two times was mistyped."""
+        steps = 0.0 if clock is None else stop / clock.step_size
+        if steps > MOST_STEPS:
+            years = steps / (_STEPS_A_SECOND * 365 * 86400)
+            self.draft.note(
+                "solver",
+                f"{stop:g} s in steps of {stop / steps:g} s are {steps:.3g} communication steps, which take about "
+                f"{years:.2g} years; at most {MOST_STEPS:.0g} are run: stop earlier, or take a longer step",
+            )
 
     def _schedule(self) -> Schedule:
         """The case's schedule, checked against its components."""
@@ -299,10 +381,13 @@ class Preparer:
         return schedule
 
     def _chosen_schedule(self) -> Schedule:
-        """The file's groups; else devices and then the grid, or every component in a group of its own."""
+        """The groups of the file. By default the devices step first and then the grid, or every component is a group of
+        its own.
+        """
         solver, grid = self.draft.case.solver, self.draft.grid
         names = tuple(self.draft.system.components)
         if solver.schedule == "jacobi":
+            self._check_unused_groups(solver.groups or [])
             return jacobi(names)
         if solver.groups is not None:
             groups = [tuple(n for n in group if n not in self.draft.scenario.remove) for group in solver.groups]
@@ -310,3 +395,9 @@ class Preparer:
         if grid is not None:
             return gauss_seidel((tuple(n for n in names if n != grid), (grid,)))
         return gauss_seidel(tuple((name,) for name in names))
+
+    def _check_unused_groups(self, groups: Sequence[Sequence[str]]) -> None:
+        """With Jacobi's schedule the groups are kept for later and do nothing; wrong names are wrong all the same."""
+        for name in (name for group in groups for name in group if name not in self.draft.known):
+            hint = close_names(name, sorted(self.draft.known), f"the case has: {', '.join(sorted(self.draft.known))}")
+            self.draft.note(self.draft.place("solver", "groups"), f"there is no component {name!r}; {hint}")

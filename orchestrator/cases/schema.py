@@ -1,28 +1,39 @@
-"""The form of a case file. What the file means is checked in `case`."""
+"""The form of a case file. `case` checks the meaning of the file."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
+from orchestrator.cases.names import file_name
 from orchestrator.toml_files import Table
 from orchestrator.units import to_unit
 
 Value = bool | float | str
 
 
+def _no_truth_value(value: Any) -> Any:
+    """Refuse true and false where a number is meant: read as 1 and 0, they would run as something else."""
+    if isinstance(value, bool):
+        raise ValueError("this is a truth value; give a number")
+    return value
+
+
 def _in(unit: str) -> Callable[[Any], Any]:
     def convert(value: Any) -> Any:
-        return to_unit(value, unit) if isinstance(value, str) else value
+        return to_unit(value, unit) if isinstance(value, str) else _no_truth_value(value)
 
     return convert
 
+
+Number = Annotated[float, BeforeValidator(_no_truth_value)]
 
 Seconds = Annotated[float, BeforeValidator(_in("s")), Field(allow_inf_nan=False)]
 PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
 Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
 Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
+FileName = Annotated[str, AfterValidator(file_name)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
 
@@ -35,6 +46,7 @@ class SolverTable(Table):
     schedule: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
     groups: list[list[str]] | None = None
     record: list[str] = ["*"]
+    record_filter: Literal["none", "low-pass"] = "none"
 
 
 class ComponentTable(Table):
@@ -65,7 +77,7 @@ class LineTable(Table):
     X: PerUnit
     R: PerUnit = 0.0
     B: PerUnit = 0.0
-    tap: float = 1.0
+    tap: Number = 1.0
     shift: Radian = 0.0
 
 
@@ -79,7 +91,7 @@ class LoadTable(Table):
 
 
 class ShuntTable(Table):
-    """An admittance to earth: what it draws and generates at 1 pu."""
+    """An admittance to earth, by the power that it draws and generates at 1 pu."""
 
     bus: str
     g: Megawatt = 0.0
@@ -109,7 +121,7 @@ class UnitsTable(Table):
     """
 
     file: str | None = None
-    alpha: float = Field(default=0.0, ge=0, le=1)
+    alpha: Number = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str
     generator_parameters: dict[str, Any] = {}
@@ -123,14 +135,119 @@ class ConnectionTable(Table):
     target: str = Field(alias="to")
 
 
+class WireTable(Table):
+    """An imperfection of connections: ``a.out -> b.in``, or a pattern with ``*`` at either end."""
+
+    connection: str
+
+
+class BiasTable(WireTable):
+    """A value is added to the signal."""
+
+    type: Literal["bias"]
+    value: Value
+
+
+class NoiseTable(WireTable):
+    """Noise is added to the signal."""
+
+    type: Literal["noise"]
+    deviation: Value
+    seed: Annotated[int, BeforeValidator(_no_truth_value)] = Field(ge=0)
+    bandwidth: Hertz | None = Field(default=None, gt=0)
+
+
+class FreezeTable(WireTable):
+    """The last value that arrived is held."""
+
+    type: Literal["freeze"]
+
+
+class DropOutTable(WireTable):
+    """The value is lost; the last one is held, or another takes its place."""
+
+    type: Literal["drop_out"]
+    substitute: Value = "hold"
+
+
+class DelayTable(WireTable):
+    """The value arrives later."""
+
+    type: Literal["delay"]
+    delay: Seconds = Field(ge=0)
+
+
+class QuantisationTable(WireTable):
+    """Only multiples of a step are carried."""
+
+    type: Literal["quantisation"]
+    step: Value
+
+
+ImperfectionTable = Annotated[
+    BiasTable | NoiseTable | FreezeTable | DropOutTable | DelayTable | QuantisationTable, Field(discriminator="type")
+]
+
+
 class EventBase(Table):
-    """What all events have: a time."""
+    """Common part of all events: a time."""
 
     time: Seconds = Field(ge=0)
 
 
+class PassingBase(EventBase):
+    """What may end again; it lasts to the end of the run where there is no ``end``."""
+
+    end: Seconds | None = None
+
+
+class BiasEventTable(PassingBase, BiasTable):
+    """A value is added to the signal for a while."""
+
+
+class NoiseEventTable(PassingBase, NoiseTable):
+    """Noise is added to the signal for a while."""
+
+
+class FreezeEventTable(PassingBase, FreezeTable):
+    """The last value that arrived is held for a while."""
+
+
+class DropOutEventTable(PassingBase, DropOutTable):
+    """The value is lost for a while."""
+
+
+class DelayEventTable(PassingBase, DelayTable):
+    """The value arrives later for a while."""
+
+
+class QuantisationEventTable(PassingBase, QuantisationTable):
+    """Only multiples of a step are carried for a while."""
+
+
+class ComponentTripTable(EventBase):
+    """A component is taken from the system: by its breaker, else by what it gives becoming 0."""
+
+    type: Literal["component_trip"]
+    component: str
+
+
+class NanOutputTable(EventBase):
+    """A component's outputs are no numbers any more."""
+
+    type: Literal["nan_output"]
+    component: str
+
+
+class TimeOutTable(EventBase):
+    """A component answers no more."""
+
+    type: Literal["time_out"]
+    component: str
+
+
 class GridEventBase(EventBase):
-    """Something in the network; ``component`` is the grid of ``[power_flow]`` where it is left out."""
+    """Common part of events in the network; by default ``component`` is the grid of ``[power_flow]``."""
 
     component: str | None = None
 
@@ -140,7 +257,7 @@ class LoadChangeTable(GridEventBase):
 
     type: Literal["load_change"]
     load: str
-    scale: float = Field(gt=0)
+    scale: Number = Field(gt=0)
 
 
 class LoadTripTable(GridEventBase):
@@ -155,7 +272,7 @@ class LoadReconnectionTable(GridEventBase):
 
     type: Literal["load_reconnection"]
     load: str
-    scale: float = Field(default=1.0, gt=0)
+    scale: Number = Field(default=1.0, gt=0)
 
 
 class LineTripTable(GridEventBase):
@@ -214,7 +331,7 @@ class ParameterChangeTable(EventBase):
     value: Value
 
 
-EventTable = Annotated[
+SettingEventTable = (
     LoadChangeTable
     | LoadTripTable
     | LoadReconnectionTable
@@ -224,18 +341,29 @@ EventTable = Annotated[
     | UnitReconnectionTable
     | BranchChangeTable
     | ReferenceChangeTable
-    | ParameterChangeTable,
-    Field(discriminator="type"),
-]
+    | ParameterChangeTable
+)
+"""Events that set variables."""
+
+WireEventTable = (
+    BiasEventTable | NoiseEventTable | FreezeEventTable | DropOutEventTable | DelayEventTable | QuantisationEventTable
+)
+"""Faults of connections."""
+
+ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable
+"""Faults of whole components."""
+
+EventTable = Annotated[SettingEventTable | WireEventTable | ComponentFaultTable, Field(discriminator="type")]
 
 
 class ScenarioTable(Table):
-    """What differs from the case."""
+    """A scenario: its differences from the case."""
 
     title: str = ""
     remove: list[str] = []
     parameters: list[str] = []
     set: dict[str, Value] = {}
+    imperfections: dict[str, ImperfectionTable] = {}
     events: list[EventTable] | None = None
 
 
@@ -247,7 +375,7 @@ class RingDownTable(Table):
 
 
 class NamedModeTable(Table):
-    """A mode told by its shape: where some states take part most, or where two groups swing against each other."""
+    """A mode that is recognised by its shape: some states take part most, or two groups swing against each other."""
 
     name: str
     states: list[str] = []
@@ -255,7 +383,7 @@ class NamedModeTable(Table):
 
 
 class AnalysisTable(Table):
-    """Which modes are looked for by name, who swings in them, and where the first one's ring-down is read."""
+    """The modes to find by name, the states that swing in them, and the signal with the first mode's ring-down."""
 
     modes: list[NamedModeTable] = []
     swing: list[str] = ["*.machine.omega"]
@@ -266,14 +394,14 @@ class AnalysisTable(Table):
 class ReferenceModeTable(Table):
     """A published mode to compare with."""
 
-    real: float | None = None
-    imag: float | None = None
-    frequency_hz: float
-    damping_percent: float
+    real: Number | None = None
+    imag: Number | None = None
+    frequency_hz: Number
+    damping_percent: Number
 
 
 class ReferenceTable(Table):
-    """Figures of somebody else, shown beside ours where their conditions hold."""
+    """Published figures, shown beside ours if their conditions hold."""
 
     title: str
     source: str
@@ -286,21 +414,21 @@ class PanelTable(Table):
 
     signal: str
     label: str
-    scale: float = 1.0
+    scale: Number = 1.0
 
 
 class PlotTable(Table):
     """A plot of recorded signals."""
 
-    name: str
+    name: FileName
     title: str
     panels: list[PanelTable]
 
 
 class CaseTable(Table):
-    """A whole case file; ``meant`` names values ``component.variable`` that are unusual and meant so."""
+    """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose."""
 
-    name: str
+    name: FileName
     title: str = ""
     source: str = ""
     meant: list[str] = []
@@ -310,8 +438,9 @@ class CaseTable(Table):
     units: UnitsTable | None = None
     power_flow: PowerFlowTable | None = None
     connections: list[ConnectionTable] = []
+    imperfections: dict[str, ImperfectionTable] = {}
     events: list[EventTable] = []
-    scenarios: dict[str, ScenarioTable] = {}
+    scenarios: dict[FileName, ScenarioTable] = {}
     analysis: AnalysisTable = AnalysisTable()
     reference: ReferenceTable | None = None
     plots: list[PlotTable] = []

@@ -1,4 +1,4 @@
-"""What every component starts from: the power flow of the values that are set, handed to the FMUs."""
+"""Start values of every component, from a power flow with the values that are set."""
 
 import cmath
 from collections.abc import Mapping
@@ -18,13 +18,13 @@ def start_from_power_flow(
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
-    Lines, loads and units are taken with the values that are set in the system, so that any
-    override moves the operating point as well.
+    Lines, loads and units have the values that are set in the system. Every override therefore moves the operating
+    point as well.
 
     Parameters
     ----------
     system
-        Its plans for the grid and the units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
+        The coupled system. The plans of its grid and units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
     network
         Buses, lines and loads.
     grid
@@ -32,13 +32,13 @@ def start_from_power_flow(
     units
         Bus of every unit.
     slack
-        The bus whose units feed what is left.
+        The bus whose units feed the remaining power.
 
     Raises
     ------
     InputError
-        If a value is set that the power flow computes, no solution is found, or a unit cannot
-        feed what the solution asks of it.
+        If a value is set that the power flow computes, no solution is found, or a unit cannot feed the power of the
+        solution.
     """
     for name in units:
         given = [v for v in _RESULTS if v in system.components[name].parameters]
@@ -109,7 +109,7 @@ def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> Flow
 
 
 def _is_connected(plan: ComponentPlan, switch: str) -> bool:
-    """Whether a breaker is closed; an FMU without one has it closed."""
+    """Whether a component's breaker is closed; an FMU without a breaker counts as connected."""
     state = plan.value(switch) if switch in plan.description.variables else None
     return state is None or bool(state)
 

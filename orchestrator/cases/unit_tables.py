@@ -1,4 +1,6 @@
-"""Generating units of a case: rows of a file or generators of the network's source, shared by two components each."""
+"""Generating units of a case, from rows of a file or generators of the network's source. A generator and a converter
+share each unit.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,12 +12,11 @@ from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
-from orchestrator.cases.schema import ComponentTable, UnitsTable, Value
+from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.errors import InputError
 
 UNIT_KINDS = ("sg", "gfor")
-"""Beginnings of the names of a unit's generator and converter."""
-_ALPHA = "units.alpha"
+"""First parts of the names of a unit's generator and converter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +26,13 @@ class UnitRow:
     Attributes
     ----------
     label, bus
-        What it is called, and where it is.
+        Name of the unit, and its bus.
     rating_mva, p_mw, v_pu
         Rating [MVA], active power [MW] and voltage [pu].
     alpha
-        The converter's share where the row has its own.
+        Share of the converter, if the row gives it; otherwise None.
     parameters
-        Of its generator and its converter, by kind.
+        Parameters of the generator and of the converter, by kind.
     place
         File and line of the row; empty where the unit comes from the network's source.
     """
@@ -46,15 +47,11 @@ class UnitRow:
     place: str = ""
 
 
-def sets_alpha(key: str) -> bool:
-    """Whether a key sets a converter's share: ``units.alpha`` all, ``units.alpha.<label>`` one."""
-    return key == _ALPHA or key.startswith(f"{_ALPHA}.")
-
-
 def unit_components(draft: Draft) -> dict[str, ComponentTable]:
-    """Generators ``sg<label>`` and converters ``gfor<label>``, 1 − α to α of each unit; a share of 0 has none.
+    """Generators ``sg<label>`` with the share 1 − α and converters ``gfor<label>`` with the share α of each unit. A
+    share of 0 gives no component.
 
-    All names that a share may give go to the draft's known ones.
+    All names that any share can give are added to the draft's known names.
     """
     table = draft.case.units
     if table is None or (draft.network_failed and table.file is None):
@@ -64,7 +61,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         rows = unit_rows(table, draft.directory, generation)
     except InputError as error:
         if draft.network_failed:
-            return {}  # what the source would have given is missing
+            return {}  # figures that the source would have given are missing
         draft.note(draft.place("units", "file") if table.file else draft.place("units"), str(error))
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
@@ -88,7 +85,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
 
 
 def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Generation]) -> list[UnitRow]:
-    """The units of a units table; what its file leaves out comes from the network's source.
+    """The units of a units table. Figures that its file leaves out come from the network's source.
 
     Raises
     ------
@@ -127,7 +124,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
 
 
 def _figure(entry: Row, column: str, given: Generation | None) -> float | None:
-    """The file's figure, else the source's."""
+    """The figure of the file, or otherwise of the source."""
     value = optional_number(entry, column)
     return getattr(given, column, None) if value is None else value
 
@@ -146,7 +143,7 @@ def _checked(row: UnitRow, place: str) -> UnitRow:
 
 
 def _parameters(entry: Row, kind: str) -> dict[str, Any]:
-    """Columns such as ``sg.machine.H`` that this row fills: a number, a truth value or text with a unit."""
+    """Values of this row in columns such as ``sg.machine.H``: numbers, truth values or texts with a unit."""
     values: dict[str, Any] = {}
     for column, text in entry.items():
         if column.startswith(f"{kind}.") and (text or "").strip():
@@ -156,26 +153,19 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:
-    """Every unit's share: the strongest layer's that has one, else the row's, else the table's.
+    """Share of every unit: from the strongest layer that gives one, otherwise from the row, otherwise from the table.
 
-    Within a layer, a key for this unit goes before the one for all.
+    Within a layer, a choice for this unit goes before the one for all.
     """
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
-    for layer in draft.layers:
-        for key in sorted((k for k in layer.values if sets_alpha(k)), key=lambda k: k != _ALPHA):
-            label = key.removeprefix(_ALPHA).removeprefix(".")
-            if label and label not in alphas:
-                hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
-                draft.note(layer.place(key), f"there is no unit {label!r}; {hint}")
-                continue
-            share = _share(draft, layer.values[key], layer.place(key))
-            if share is not None:
-                alphas |= {label: share} if label else dict.fromkeys(alphas, share)
+    for choice in (choice for layer in draft.layers for choice in layer.shares):
+        label = choice.label
+        if label and label not in alphas:
+            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            draft.note(choice.place, f"there is no unit {label!r}; {hint}")
+            continue
+        try:
+            alphas |= {label: choice.share} if label else dict.fromkeys(alphas, choice.share)
+        except ValueError as error:
+            draft.note(choice.place, str(error))
     return alphas
-
-
-def _share(draft: Draft, value: Value, where: str) -> float | None:
-    if isinstance(value, bool | str) or not 0 <= value <= 1:
-        draft.note(where, f"alpha = {value!r}; it must be a number from 0 to 1")
-        return None
-    return float(value)

@@ -1,14 +1,15 @@
-"""How a case uses one of its components: what an FMU is checked with."""
+"""The use of an FMU in a case: step, operating point and values for its acceptance tests."""
 
 from pathlib import Path
 
 from orchestrator.acceptance.checks.subject import OperatingAt, Use
 from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.names import close_names
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 
 _START = {"P_0": 0.0, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0}
-"""Names of the start values, and what stands for one that neither the case nor the FMU gives."""
+"""Names of the start values, and the defaults if neither the case nor the FMU gives a value."""
 
 
 def use_in_case(
@@ -21,20 +22,20 @@ def use_in_case(
     case
         Name of a case, or path of its file.
     component
-        Its name; the one component that is that file where None.
+        Name of the component; None for the component that has this file.
     fmu
-        The file.
+        Path of the FMU.
     step_size
         Communication step [s]; the case's where None.
     scenario
-        Its name; the first one that has the component where None.
+        Name of the scenario; None for the first one with the component.
 
     Raises
     ------
     InputError
         If no component is that FMU, no scenario has it, or the case cannot be prepared.
     """
-    loaded = load_case(case)
+    loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
     name = _component(loaded, component, fmu)
     table = loaded.table.components[name]
     chosen = _scenario(loaded, name, scenario)
@@ -51,7 +52,7 @@ def use_in_case(
 
 
 def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[OperatingAt | None, str]:
-    """The operating point with defaults for what the case does not give, in words as well."""
+    """The operating point, with defaults for missing values; and its description in words."""
     if not start:
         return None, "no operating point; the checks take their own"
     variables = plan.description.variables
@@ -91,7 +92,9 @@ def _component(case: Case, wanted: str | None, fmu: Path) -> str:
     known = ", ".join(files) or "none"
     if wanted is not None:
         if wanted not in case.table.components:
-            raise InputError(f"{case.path}: there is no component {wanted!r}; components that are FMUs: {known}")
+            every = list(case.table.components)
+            hint = close_names(wanted, every, f"there are: {', '.join(every)}")
+            raise InputError(f"{case.path}: there is no component {wanted!r}; {hint}")
         return wanted
     same = [n for n, path in files.items() if path.exists() and path.resolve() == fmu.resolve()]
     if len(same) != 1:

@@ -1,7 +1,8 @@
 """Values of a case file, brought to the type, unit and range that a variable declares."""
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fmus.toolchain.port_variables import I_RE, S_BASE, S_N, SYSTEM_BASE, SYSTEM_BASE_MVA
@@ -42,7 +43,7 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
 
 
 def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
-    """Refuse another system base for a device with our port; behind a binding the name means something else.
+    """Refuse another system base for a device with our port. A bound FMU's variable of this name has another meaning.
 
     Raises
     ------
@@ -66,3 +67,13 @@ def flatten(table: Mapping[str, Any]) -> list[tuple[tuple[str, ...], Any]]:
         else:
             flat.append(((key,), value))
     return flat
+
+
+def given_twice(flat: Iterable[tuple[tuple[str, ...], Any]]) -> list[str]:
+    """Names that two paths lead to: ``droop.R_f`` in a table ``droop`` and as one quoted key."""
+    counts = Counter(".".join(path) for path, _ in flat)
+    return [name for name, count in counts.items() if count > 1]
+
+
+TWICE = "it is given twice, once in quotes and once as a name in a table; keep one of them"
+"""What is wrong with such a name."""

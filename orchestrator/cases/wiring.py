@@ -1,4 +1,4 @@
-"""Connections of a case: those it writes out, and the ports of every component that names its bus."""
+"""Connections of a case: those written in the file, and those of every component that names its bus."""
 
 from orchestrator.cases.draft import Draft
 from orchestrator.errors import InputError
@@ -51,7 +51,7 @@ def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
     if draft.grid in draft.system.components:
         for part in ("re", "im"):
             _try_connect(draft, f"{draft.grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
-        # The grid says what it takes from a device: its current, or an emf with its admittance.
+        # The grid's inputs decide which outputs of a device are connected: its current, or an emf with its admittance.
         for taken in draft.system.components[draft.grid].description.inputs:
             port, _, variable = taken.rpartition(".")
             if port == name:
@@ -61,7 +61,7 @@ def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
 def _try_connect(draft: Draft, source: str, target: str, where: str) -> None:
     known = draft.known - set(draft.system.components)
     if {source.partition(".")[0], target.partition(".")[0]} & known:
-        return  # an end is a problem already
+        return  # the problem of this end is noted already
     try:
         draft.system.connect(source, target)
     except InputError as error:

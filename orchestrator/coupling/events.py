@@ -1,9 +1,14 @@
-"""Events at given times. Each says in the field's words what happens and comes down to variables that are set."""
+"""Events at given times. Each says in the field's words what happens.
 
-from collections.abc import Mapping
+Most come down to variables that are set; faults of connections and components set none (`Fault`).
+"""
+
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from fmus.grid.names import line_variable
+from orchestrator.coupling.imperfections import Imperfection
+from orchestrator.coupling.system import Connection
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,3 +130,77 @@ class ParameterChange(Event):
     def settings(self) -> Mapping[str, float | bool]:
         """The values that the event sets, by variable."""
         return {self.parameter: self.value}
+
+
+@dataclass(frozen=True, slots=True)
+class Fault(Event):
+    """An event that sets no variable: nothing that looks at `Event.changes` alone knows of it."""
+
+    def settings(self) -> Mapping[str, float | bool]:
+        """No variable is set."""
+        return {}
+
+    def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
+        """No variable is set."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class WireFault(Fault):
+    """A connection gets an imperfection, in place of another of its kind.
+
+    Parameters
+    ----------
+    time, component
+        As `Event`; the component is the one that the connection leads to.
+    connection
+        Which one.
+    imperfection
+        What it does from then on.
+    """
+
+    connection: Connection
+    imperfection: Imperfection
+
+    def __str__(self) -> str:
+        return f"t = {self.time:g} s: {self.connection}: {self.imperfection}"
+
+
+@dataclass(frozen=True, slots=True)
+class WireRecovery(Fault):
+    """An imperfection of a connection ends; what it has permanently holds again.
+
+    Parameters
+    ----------
+    time, component, connection
+        As `WireFault`.
+    imperfection
+        What ends.
+    """
+
+    connection: Connection
+    imperfection: Imperfection
+
+    def __str__(self) -> str:
+        return f"t = {self.time:g} s: {self.connection}: end of {self.imperfection}"
+
+
+@dataclass(frozen=True, slots=True)
+class NotANumber(Fault):
+    """All coupled outputs of a component are no numbers any more, as those of an FMU that divides by zero."""
+
+    def __str__(self) -> str:
+        return f"t = {self.time:g} s: {self.component} gives no numbers"
+
+
+@dataclass(frozen=True, slots=True)
+class Silence(Fault):
+    """A component in a process of its own answers no more: its process is stopped."""
+
+    def __str__(self) -> str:
+        return f"t = {self.time:g} s: {self.component} answers no more"
+
+
+def faults_among(events: Iterable[Event]) -> list[Fault]:
+    """Events that set no variable, for whoever cannot do them and has to say so."""
+    return [event for event in events if isinstance(event, Fault)]

@@ -36,17 +36,102 @@ class Exchange:
         Where in y that is.
     sources
         For each input the index in y of the output that feeds it.
+    delivered
+        The index of what arrives at each input: the same, or behind the outputs the place of what a connection makes
+        of it (`orchestrator.coupling.wires`).
     """
 
     def __init__(
         self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
     ) -> None:
         self.component, self.inputs, self.outputs = component, inputs, outputs
-        self.window, self.sources = window, sources
+        self.window, self.sources, self.delivered = window, sources, sources
+
+
+class Stepped(Protocol):
+    """What the loop calls of a component."""
+
+    @property
+    def name(self) -> str:
+        """For errors."""
+
+    @property
+    def pointer(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def set_real(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def get_real(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def do_step(self) -> Any:
+        """As `Component` has it."""
+
+    def check(self, status: int, call: str, time: float | None = None) -> None:
+        """As `Component` has it."""
+
+    def step(self, time: float, step_size: float) -> None:
+        """As `Component` has it."""
+
+
+class Batch(Protocol):
+    """What the loop needs of the values that a component takes or gives."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the variables."""
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The values, shape (n,)."""
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """Of the functions that set and get them."""
+
+    @property
+    def component(self) -> Stepped:
+        """Whose they are."""
+
+
+class Turn(Protocol):
+    """What takes its turn in the loop: a component with its connected values, or a bank of connections."""
+
+    @property
+    def component(self) -> Stepped:
+        """What is stepped."""
+
+    @property
+    def inputs(self) -> Batch:
+        """What it takes."""
+
+    @property
+    def outputs(self) -> Batch:
+        """What it gives."""
+
+    @property
+    def window(self) -> slice:
+        """Where its outputs stand."""
+
+    @property
+    def delivered(self) -> NDArray[np.int64]:
+        """Where what it takes stands."""
 
 
 class Loop(Protocol):
-    """Steps a system."""
+    """Steps a system.
+
+    Attributes
+    ----------
+    completed
+        Communication steps that the last call did.
+    before
+        The outputs one step earlier, where inputs are extrapolated; else None.
+    """
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
@@ -60,6 +145,7 @@ class Loop(Protocol):
         """
 
     completed: int
+    before: NDArray[np.float64] | None
 
     def seconds(self) -> list[float]:
         """Time spent inside each component's FMI calls [s], in the order of the schedule."""
@@ -99,19 +185,18 @@ def _library() -> Any | None:
 class CompiledLoop:
     """Steps a system in C."""
 
-    def __init__(
-        self, library: Any, groups: Sequence[Sequence[Exchange]], y: NDArray[np.float64], tracks: Tracks
-    ) -> None:
+    def __init__(self, library: Any, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks) -> None:
         self._library, self._y, self._tracks = library, y, tracks
         self._exchanges = [exchange for group in groups for exchange in group]
         self._calls = (_Call * len(self._exchanges))()
         self._failure = (ctypes.c_int64 * 3)()
         self.completed = 0
+        self.before: NDArray[np.float64] | None = None
         for number, group in enumerate(groups):
             for exchange in group:
                 self._fill(self._calls[self._exchanges.index(exchange)], exchange, number)
 
-    def _fill(self, call: _Call, exchange: Exchange, group: int) -> None:
+    def _fill(self, call: _Call, exchange: Turn, group: int) -> None:
         def address(function: Any) -> int | None:
             return ctypes.cast(function, ctypes.c_void_p).value
 
@@ -121,7 +206,7 @@ class CompiledLoop:
         call.step = address(component.do_step)
         _, call.input_references, call.n_inputs, call.inputs = exchange.inputs.arguments
         _, call.output_references, call.n_outputs, call.outputs = exchange.outputs.arguments
-        call.sources = exchange.sources.ctypes.data
+        call.sources = exchange.delivered.ctypes.data
         call.group = group
         call.tracks = self._tracks.address(exchange.window.start or 0)
 
@@ -163,7 +248,7 @@ class PythonLoop:
 
     def __init__(
         self,
-        groups: Sequence[Sequence[Exchange]],
+        groups: Sequence[Sequence[Turn]],
         y: NDArray[np.float64],
         tracks: Tracks,
         schedule: Schedule,
@@ -171,7 +256,7 @@ class PythonLoop:
     ) -> None:
         self._groups, self._y, self._tracks, self._hand_over = groups, y, tracks, hand_over
         self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
-        self._before: NDArray[np.float64] | None = None
+        self.before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
 
@@ -189,7 +274,7 @@ class PythonLoop:
             self._hand_over()
         for group, spent in zip(self._groups, self._spent, strict=True):
             for i, exchange in enumerate(group):
-                np.take(known, exchange.sources, out=exchange.inputs.values, mode="clip")
+                np.take(known, exchange.delivered, out=exchange.inputs.values, mode="clip")
                 start = perf_counter()
                 component = exchange.component
                 if exchange.inputs.names and self._hand_over is None:
@@ -217,8 +302,8 @@ class PythonLoop:
 
     def _extrapolated(self) -> NDArray[np.float64]:
         """All outputs as they would go on rising; what has stepped since then is overwritten group by group."""
-        known = self._y + self._extrapolation * (self._y - (self._y if self._before is None else self._before))
-        self._before = self._y.copy()
+        known = self._y + self._extrapolation * (self._y - (self._y if self.before is None else self.before))
+        self.before = self._y.copy()
         return known
 
     def seconds(self) -> list[float]:
@@ -226,12 +311,12 @@ class PythonLoop:
         return [seconds for group in self._spent for seconds in group]
 
 
-def _not_finite(outputs: RealBatch, index: int, time: float) -> NotFiniteError:
+def _not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)
 
 
 def make_loop(
-    groups: Sequence[Sequence[Exchange]],
+    groups: Sequence[Sequence[Turn]],
     y: NDArray[np.float64],
     tracks: Tracks,
     schedule: Schedule,

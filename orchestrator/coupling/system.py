@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from orchestrator.coupling.imperfections import Imperfection, WirePlan
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.values import Scalar
@@ -25,6 +26,9 @@ class Connection:
 
     source: Endpoint
     target: Endpoint
+
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.target}"
 
 
 @dataclass
@@ -54,11 +58,18 @@ class ComponentPlan:
 
 
 class System:
-    """Components by name, with checked connections."""
+    """Components by name, with checked connections.
+
+    Attributes
+    ----------
+    wires
+        Connections that do more than carry a value, or may in a run, by their target.
+    """
 
     def __init__(self) -> None:
         self.components: dict[str, ComponentPlan] = {}
         self.connections: list[Connection] = []
+        self.wires: dict[Endpoint, WirePlan] = {}
 
     def add(
         self,
@@ -118,6 +129,33 @@ class System:
         if feeding is not None:
             raise InputError(f"{label}: {target} is already fed by {feeding}; an input takes one connection")
         self.connections.append(Connection(start, end))
+
+    def disturb(self, connection: Connection, imperfection: Imperfection) -> None:
+        """Let a connection have an imperfection from t = 0 on.
+
+        Raises
+        ------
+        InputError
+            If there is no such connection, or it has one of this kind already.
+        """
+        self._wire(connection).disturb(imperfection)
+
+    def foresee(self, connection: Connection, imperfection: Imperfection) -> None:
+        """Let an event give a connection an imperfection later.
+
+        Raises
+        ------
+        InputError
+            If there is no such connection.
+        """
+        later = self._wire(connection).later
+        if imperfection not in later:
+            later.append(imperfection)
+
+    def _wire(self, connection: Connection) -> WirePlan:
+        if connection not in self.connections:
+            raise InputError(f"there is no connection {connection}; connect it before it is disturbed")
+        return self.wires.setdefault(connection.target, WirePlan(str(connection)))
 
     def _resolve(self, name: str, label: str) -> tuple[Endpoint, VariableInfo]:
         component, _, variable = name.partition(".")

@@ -1,1 +1,3 @@
-"""What a run does wrong in silence: each finding is said once, with its time and component."""
+"""Faults of a run that raise no error, such as growth or lost synchronism. Each finding is reported once, with its time
+and component.
+"""

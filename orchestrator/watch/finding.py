@@ -1,11 +1,11 @@
-"""One thing that a run did wrong, in words and for programs."""
+"""One finding about a run, in words and for programs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_away", "undisturbed_motion",
-               "active_limit", "loss_of_synchronism", "not_finite", "failure"]  # fmt: skip
+               "active_limit", "loss_of_synchronism", "not_judged", "not_finite", "failure"]  # fmt: skip
 
 UNSTABLE: frozenset[Kind] = frozenset(
     {
@@ -18,23 +18,23 @@ UNSTABLE: frozenset[Kind] = frozenset(
         "failure",
     }
 )
-"""Kinds of finding that no stable system gives."""
+"""Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may be."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was seen, where and when.
+    """One fault of a run, with its place and time.
 
     Attributes
     ----------
     time
         When it began [s].
     component, variable
-        Where it shows most, or whose limit acts.
+        The component and variable that show the fault most, or whose limit acts.
     message
         The whole finding in words.
     until
-        When it was over [s]; None where it lasts to the end, or has no duration.
+        Its end [s]; None if it lasts to the end of the run, or has no duration.
     figures
         By name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations.
     """

@@ -1,4 +1,4 @@
-"""Limits that stay active: which component's, from when, and for how long."""
+"""Limits that stay active: the component, the beginning and the duration."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,22 +13,25 @@ from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
 LEAST_DURATION = 0.1
-"""A limit that acts for less than this in all [s], as in a short dip, works as intended and is not reported."""
+"""Shortest total time of a limit's action that is reported [s]. A limit that acts for less, as in a short dip, works as
+intended."""
 
 AT_LIMIT = 1 - 1e-9
-"""From this part of its limit on a signal is at it: what is saturated equals its limit but for the last digits."""
+"""A signal is at its limit from this part of the limit on: a saturated signal equals its limit except for the last
+digits."""
 
 
 @dataclass(frozen=True)
 class Lead:
-    """What is limited is the signal + T/gain·(d state/dt), where a block's state or a control's integrator shows it.
+    """The limited quantity, reconstructed as signal + T/gain·(d state/dt) from the state of a block or of a control's
+    integrator.
 
     Attributes
     ----------
     state
-        Whose derivative is read.
+        The state whose derivative is read.
     time, gain
-        Parameters with T [s] and the gain; 1 where there is none.
+        Parameters with T [s] and the gain; None stands for 1.
     """
 
     state: str
@@ -38,22 +41,22 @@ class Lead:
 
 @dataclass(frozen=True)
 class Limit:
-    """How a limit that acts can be seen in an FMU's variables; it is watched where the FMU has them all.
+    """The variables of an FMU that show an active limit. The limit is watched if the FMU has all of them.
 
     Attributes
     ----------
     name
-        In messages.
+        Name of the limit in messages.
     signal
-        What is limited, or follows what is limited.
+        The limited signal, or a signal that follows it.
     limit
-        Parameter with the limit of its magnitude; None where the signal is in parts of the limit.
+        Parameter with the limit of the magnitude; None if the signal is given as a part of the limit.
     lead
-        How a derivative shows what is limited, where the signal only follows it.
+        Reconstruction of the limited quantity from a derivative, if the signal only follows this quantity.
     enabled
-        Switch without which the limited signal goes nowhere.
+        Switch that must be on for the limited signal to have an effect.
     represented
-        Whether the model has the limit; else it only tells when the limit would act.
+        Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
     """
 
     name: str
@@ -90,7 +93,7 @@ LIMITS = (
     Limit("output limit of the stabiliser", "pss.lead_lag_2", "pss.limit", Lead("pss.lead_lag_2", "pss.T_3"),
           "pss.enabled"),
 )  # fmt: skip
-"""Limits of the catalogue's models; an FMU of others with the same variables is watched as well."""
+"""Limits of the catalogue's models. A foreign FMU with the same variables is watched as well."""
 
 
 def limits_of(plan: ComponentPlan) -> Iterator[Limit]:
@@ -101,7 +104,7 @@ def limits_of(plan: ComponentPlan) -> Iterator[Limit]:
 
 
 def limit_signals(system: System) -> list[str]:
-    """Signals that have to be read for the limits of all components."""
+    """Signals that the limits of all components need."""
     return [f"{name}.{variable}" for name, plan in system.components.items()
             for limit in limits_of(plan) for variable in limit.variables()]  # fmt: skip
 

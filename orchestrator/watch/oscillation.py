@@ -13,17 +13,18 @@ LEAST_PERIODS = 2
 """Number of periods that an oscillation needs to be recognised."""
 
 _HIGHEST_HZ = 10.0
-"""A signal is thinned for frequencies up to this one, unless it turns more often."""
+"""A signal is thinned to show frequencies up to this one [Hz], unless it turns more often."""
 
 _PER_PERIOD = 5
-"""Samples that a period must have to be seen in samples."""
+"""Least number of samples in a period of an oscillation that can be recognised."""
 
 
 _MOST_SAMPLES = 600
-"""A long stretch of a fast oscillation is judged by so many samples at its end."""
+"""A long stretch of a fast oscillation is judged by this number of samples at its end."""
 
 _ENOUGH_SAMPLES, _BEYOND = 300, 3
-"""A slow one is thinned to so many samples, but for frequencies up to so many times its own."""
+"""A slow oscillation is thinned to the first number of samples, but must keep frequencies up to the second number times
+its own."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ class Oscillation:
 
 
 def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float = LEAST_PERIODS) -> Oscillation | None:
-    """By the matrix pencil; None where nothing oscillates for so many periods, or too fast for the samples."""
+    """Find the strongest oscillation by the matrix pencil; None if no oscillation lasts `LEAST_PERIODS`, or if it is
+    too fast for the samples.
+    """
     if too_fast(times, signal):
         return None
     crossing = crossings_hz(times, signal)
@@ -57,19 +60,19 @@ def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float 
 
 
 def crossings_hz(times: Numbers, signal: Numbers) -> float:
-    """Half of how often a signal passes its own trend [Hz]."""
+    """Half of the rate at which a signal crosses its own trend [Hz]."""
     around = without_trend(signal)
     passes = int((np.diff(np.sign(around)) != 0).sum())
     return passes / 2 / float(times[-1] - times[0])
 
 
 def too_fast(times: Numbers, signal: Numbers) -> bool:
-    """Whether a signal swings too fast for its samples to show how."""
+    """Whether a signal swings too fast for its samples to show the oscillation."""
     return crossings_hz(times, signal) * float(times[1] - times[0]) * _PER_PERIOD > 1
 
 
 def without_trend(signal: Numbers) -> Numbers:
-    """What a cubic leaves over, along the first axis."""
+    """The signal minus a fitted cubic, along the first axis."""
     basis = _cubics(len(signal))
     rest: Numbers = signal - basis @ (basis.T @ signal)
     return rest

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,49 +22,68 @@ from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
 
 FEWEST_LOOKS = 60
-"""In what is looked at: the last three quarters of the time from one event to the next, or to the end."""
+"""Least number of looks in the judged part: the last three quarters of the time from one event to the next, or to the
+end."""
 
 KEPT = 0.7
-"""What has lost more than this leaves of its swing, from the middle to the last third of the stretch, is decaying."""
+"""A swing is decaying if its last third is smaller than this part of its middle third."""
 
 SMALLEST = 1e-7
-"""Of 1 or of the signal's start: less is no oscillation that anybody could see."""
+"""Smallest oscillation that is reported, as a part of 1 or of the signal's start."""
 
 SMALLEST_FAST = 1e-5
-"""The same for one that is too fast for the looks, of which only the extent is known."""
+"""Smallest reported oscillation that is too fast for the looks; only its extent is known."""
 
 SMALLEST_PART = 0.01
-"""Of the signal's own deviation since the event."""
+"""Smallest reported oscillation, as a part of the signal's largest deviation since the event."""
 
 STEADY = 0.05
-"""An oscillation whose amplitude changes by less than this in the logarithm, over the stretch, is sustained."""
+"""An oscillation is sustained if the logarithm of its amplitude changes by less than this over the stretch."""
 
 SAME_FREQUENCY = 0.05
-"""An oscillation is one if both the stretch and its second half show the same frequency, to this part of it."""
+"""An oscillation is confirmed if the stretch and its second half show the same frequency, with at most this relative
+difference."""
 
 EXPLAINED = 0.5
-"""An oscillation is what swings if it makes at least this part of the swing."""
+"""A swing consists of one oscillation if the oscillation makes at least this part of it."""
 
 IRREGULAR = 1e-3
-"""A swing in which no single oscillation is found is told from this part of 1 or of the signal's start on."""
+"""Smallest reported swing without a single oscillation, as a part of 1 or of the signal's start."""
 
 _PASSES = 8
-"""An irregular swing passes its trend at least so often within the last third."""
+"""Least number of crossings of an irregular swing with its trend within the last third."""
 
 _FAST = 0.25
-"""Turns from one look to the next from which on an output is judged by its extremes between the looks."""
+"""Number of turns between two looks from which an output is judged by its extremes between the looks."""
+
+_RESOLVED = 4.0
+"""An output is judged by its looks, however often it turns, if it moves by this factor more over several turns than
+between two looks: a small ripple makes the turns, and a swing that the looks resolve makes the motion."""
 
 _TURNS, _FEWEST_GROUPS = 6, 12
-"""So many turns make one figure of how far an output goes to and fro, and so many of these figures are needed."""
+"""Number of turns that are combined to one figure for the extent of an output's swing, and least number of such
+figures."""
+
+CLEAN = 0.15
+"""In a stretch with noise, the largest part of a swing that a reported oscillation leaves unexplained. An oscillation
+that noise excites wanders in amplitude and phase, and leaves more."""
+
+FAR_ABOVE, _RISING = 10.0, 1.3
+"""In a stretch with noise, a swing of any other shape is reported if it rises by the first factor from the first to the
+last quarter of the judged part, and by the second one at least from each quarter to the next."""
+
+_SMOOTHEST = 3
+"""Number of signals in which a clean oscillation is searched in a stretch with noise: those that noise moves least."""
 
 _TRIED = 8
-"""Signals in which oscillations are looked for: those that swing most at the end."""
+"""Number of signals in which oscillations are searched: those that swing most at the end."""
 
 ONE = 0.3
-"""An oscillation goes on over events if it leaves less than this of the swing between any two of them unexplained."""
+"""An oscillation continues over events if it explains the swing between any two of them except for less than this
+part."""
 
 _PARTS, _SHORT = 40, 0.1
-"""At most so many pieces of at least this length [s], of which the first is looked for with an oscillation in full."""
+"""Largest number of pieces and their least length [s]. The oscillation is searched in the first piece."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +93,7 @@ class Swing:
     Attributes
     ----------
     size
-        Root mean square in the last third without the trend, beside the scale.
+        Root mean square in the last third without the trend, relative to ``scale``.
     scale
         1 or the start's magnitude [the signal's unit].
     response
@@ -82,7 +101,8 @@ class Swing:
     times, signal
         The same in the last three quarters.
     turns_hz
-        Half of how often the signal turns [Hz], step by step; only for what was followed between the looks.
+        Half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
+        followed between the looks.
     """
 
     name: str
@@ -94,11 +114,14 @@ class Swing:
     turns_hz: float | None = None
 
 
-def unsettled_response(seen: Seen, system: System, stretch: Stretch, units: Sequence[str]) -> list[Finding]:
-    """At most one growing and one sustained oscillation in a stretch, where they are strongest.
+def unsettled_response(
+    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], *, noisy: bool = False
+) -> list[Finding]:
+    """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 
-    Where one is faster than the looks, only such are told: in the looks it would pass for a slower one.
-    In a stretch with events that nobody notices only what goes on over all of them is told.
+    If an oscillation is faster than the looks, only such oscillations are reported, because the looks would show it as
+    a slower one. In a stretch with unnoticed events, only oscillations that continue over all of these events are
+    reported.
 
     Parameters
     ----------
@@ -107,9 +130,12 @@ def unsettled_response(seen: Seen, system: System, stretch: Stretch, units: Sequ
     system
         What ran.
     stretch
-        The part of the run that is looked at.
+        The judged part of the run.
     units
-        Components that feed the grid: they are named rather than the grid where both swing.
+        Components that feed the grid. A finding names one of them rather than the grid if both swing.
+    noisy
+        Whether to report only what noise or quantisation does not explain: one clean oscillation, or a swing that grows
+        to far above its beginning.
     """
     seen = seen.until(stretch.end)
     first = int(np.searchsorted(seen.times, stretch.begin))
@@ -121,19 +147,40 @@ def unsettled_response(seen: Seen, system: System, stretch: Stretch, units: Sequ
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
     swings = [swing for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
-    # What is faster than the looks shows in the signals as something slower, so it goes first.
+    # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
     others = [s for s in swings if s.turns_hz is None and not (quick and too_fast(s.times, s.signal))]
+    if noisy:
+        grown = [s for s in swings if _rises(s)]
+        told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
+        smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
+        return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
     told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
     return told or _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
 
 
-def _told(swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool) -> list[Finding]:
-    """The first finding of each kind; a swing without a frequency only where there is none with one."""
+def _told(
+    swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
+) -> list[Finding]:
+    """The first finding of each kind; a swing without a frequency only where there is none with one.
+
+    Parameters
+    ----------
+    swings
+        In the order in which they are tried.
+    system, stretch
+        What ran, and the judged part of the run.
+    irregular_as_well
+        Whether a swing without a single frequency is a finding.
+    clean
+        Whether only swings count that are one oscillation and nothing else.
+    """
     told: dict[Kind, Finding] = {}
     irregular = []
     for swing in swings:
         oscillation = _fast(swing) if swing.turns_hz is not None else _single(swing)
+        if clean and not (oscillation and _is_clean(swing, oscillation)):
+            continue
         if oscillation is not None:
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is not None and finding.kind not in told and _goes_on(swing, oscillation, stretch.breaks):
@@ -162,7 +209,7 @@ def _component(name: str) -> str:
 
 
 def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | None:
-    """What of a signal is worth a closer look; the signal and its times begin with the event."""
+    """The swing of a signal, if it is large enough to be examined. The signal and its times begin with the event."""
     deviation, scale = float(np.abs(signal - signal[0]).max()), max(1.0, abs(float(signal[0])))
     rows = times >= begin
     _, middle, last = (_rms(part) for part in np.array_split(signal[rows], 3))
@@ -195,13 +242,36 @@ def _goes_on(swing: Swing, oscillation: Oscillation, breaks: Sequence[float]) ->
 
 
 def _pieces(times: Numbers, breaks: Sequence[float], shortest: float) -> list[NDArray[np.int_]]:
-    """Rows between the breaks, in pieces of at least so long [s]."""
+    """Rows between the breaks, in pieces of a least length [s]."""
     kept = [float(times[0])]
     for time in breaks:
         if time - kept[-1] >= shortest and times[-1] - time >= shortest:
             kept.append(time)
     pieces = np.split(np.arange(len(times)), np.searchsorted(times, kept[1:], side="right"))
     return [rows for rows in pieces if len(rows)]
+
+
+def _roughness(swing: Swing) -> float:
+    """How far a signal moves from look to look, as a part of its swing: large if noise makes the swing."""
+    return float(np.std(np.diff(swing.signal))) / (swing.size * swing.scale)
+
+
+def _is_clean(swing: Swing, oscillation: Oscillation) -> bool:
+    """Whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
+    since = swing.times - swing.times[-1]
+    turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
+    shape, whole = without_trend(np.column_stack([turn.real, turn.imag])), without_trend(swing.signal)
+    rest = whole - shape @ np.linalg.lstsq(shape, whole, rcond=None)[0]
+    part = float(np.linalg.norm(rest) / np.linalg.norm(whole))
+    change = oscillation.rate * float(swing.times[-1] - swing.times[0])
+    return part < (CLEAN if change > STEADY + 2 * part else CLEAN / 3)
+
+
+def _rises(swing: Swing) -> bool:
+    """Whether a swing grows from quarter to quarter of the judged part, to far above its beginning."""
+    quarters = np.array_split(swing.signal, 4)
+    sizes = [float(y.mean()) if swing.turns_hz is not None else _rms(y) for y in quarters]
+    return sizes[3] > FAR_ABOVE * sizes[0] and all(late > _RISING * early for early, late in pairwise(sizes))
 
 
 def _since(swing: Swing, frequency: float | None) -> float:
@@ -219,7 +289,9 @@ def _since(swing: Swing, frequency: float | None) -> float:
 
 
 def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None:
-    """An output that goes to and fro between the looks; its signal is how far, beyond where it got in the meantime."""
+    """The swing of an output between the looks. Its signal is the extent of the swing, without the way of its
+    middle.
+    """
     turns, last = seen.turns[name][first + 1 :], seen.last[name][first:]
     often = float(np.array_split(turns, 4)[3].mean())
     if often < _FAST:
@@ -228,13 +300,16 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     rows = np.arange(0, len(turns) - group + 1, group)
     high = np.maximum.reduceat(seen.high[name][first + 1 :], rows)
     low = np.minimum.reduceat(seen.low[name][first + 1 :], rows)
-    # The extremes hold the oscillation and how far its middle went.
+    # The distance of the extremes contains the oscillation and the way of its middle.
     middles = (high + low) / 2
     drift = np.abs(np.gradient(middles)) if len(rows) > 1 else np.zeros(1)
     ripple, times = np.maximum(high - low - drift, 0.0), seen.times[first:][rows]
     deviation, scale = float(np.abs(last - last[0]).max()), max(1.0, abs(float(last[0])))
     stretch = times >= begin
     if stretch.sum() < _FEWEST_GROUPS:
+        return None
+    between = seen.high[name][first + 1 :] - seen.low[name][first + 1 :]
+    if ripple[stretch].mean() > _RESOLVED * between[len(between) // 4 :].mean():
         return None
     _, middle, end = (float(part.mean()) for part in np.array_split(ripple[stretch], 3))
     if end < KEPT * middle or end / 2 < max(SMALLEST_FAST * scale, SMALLEST_PART * deviation):
@@ -257,7 +332,9 @@ def _is_irregular(swing: Swing) -> bool:
 
 
 def _single(swing: Swing) -> Oscillation | None:
-    """The oscillation that makes the swing, if there is one and the second half of the stretch shows it as well."""
+    """The oscillation that makes the swing; None if there is no such oscillation, or if the second half of the stretch
+    does not show it.
+    """
     half = len(swing.times) // 2
     whole = strongest_oscillation(swing.times, swing.signal)
     late = strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)
@@ -270,7 +347,7 @@ def _single(swing: Swing) -> Oscillation | None:
 
 
 def _fast(swing: Swing) -> Oscillation | None:
-    """Frequency from the turns, growth rate from the extent; a rate that its scatter does not bear out is 0."""
+    """Frequency from the turns, growth rate from the extent. A rate within its own uncertainty is taken as 0."""
     if swing.turns_hz is None or not (swing.signal > 0).all():
         return None
     half = len(swing.times) // 2

@@ -1,4 +1,4 @@
-"""What runs away without swinging: a speed or a voltage that leaves its place and does not come to rest."""
+"""Speeds and voltages that run away: they leave their operating point without swinging and do not come to rest."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,36 +17,40 @@ SPEED = "omega"
 """Output with a unit's speed or frequency."""
 
 BAND = (0.9, 1.1)
-"""Of a speed's start. Machines are tripped by their protection well within (0.95 to 1.03 for minutes, IEEE C37.106)."""
+"""Band of a speed, as parts of its start. Protection trips machines well inside this band (0.95 to 1.03 for minutes,
+IEEE C37.106)."""
 
 OUTSIDE = 1.0
-"""For longer than this in all [s], or at the end, a speed must be outside of its band: a deep dip may push it there."""
+"""A speed is reported if it is outside of its band for longer than this in all [s], or at the end. A deep dip may push
+it there for a short time."""
 
 LONG = 10.0
-"""A drift is told in a stretch of this length [s]: until then a turbine's control may still be on its way."""
+"""Shortest stretch in which a drift is reported [s]: in a shorter one a turbine's control may still be acting."""
 
 STRAIGHT = 0.9
-"""What settles slows down. A drift keeps this part of its rate from the third to the last quarter of the stretch.
-
-Of a decay to rest that asks for a time constant of more than twice the stretch's length.
+"""A settling signal slows down. A drift keeps this part of its rate from the third to the last quarter of the stretch.
+A decay to rest would need a time constant of more than twice the stretch's length to do the same.
 """
 
 LEAST_SPEED = 5e-4
-"""Of a speed's start: a drift in half of the stretch, beyond the dead band of a primary control (20 mHz)."""
+"""Smallest drift of a speed in half of the stretch, as a part of its start: more than the dead band of a primary
+control (20 mHz)."""
 
 LEAST_VOLTAGE = 0.01
-"""Of 1 or of the start: the same for a voltage, a step of a tap changer."""
+"""Smallest drift of a voltage in half of the stretch, as a part of 1 or of the start: one step of a tap changer."""
 
 SMOOTH = 0.15
-"""What swings around a drift, as root mean square, is less than this part of the drift."""
+"""The swing around a drift, as root mean square, must be less than this part of the drift."""
 
 _RATE_TIME = 1.0
-"""The rate that is told is that of so much time at the end [s]."""
+"""The reported rate is the mean over this time at the end [s]."""
 
 
 @dataclass(frozen=True)
 class _Course:
-    """A signal that should rest after an event; ``on`` where it counts, ``least`` the smallest drift [its unit]."""
+    """A signal that should come to rest after an event. ``on`` marks the looks that count; ``least`` is the smallest
+    drift [unit of the signal].
+    """
 
     name: str
     what: str
@@ -56,14 +60,14 @@ class _Course:
 
 
 def speed_signals(system: System) -> list[str]:
-    """Signals that have to be read to know every unit's speed."""
+    """Signals that show every unit's speed."""
     return [f"{name}.{SPEED}" for name, plan in system.components.items() if SPEED in plan.description.outputs]
 
 
 def run_away(
     seen: Seen, system: System, settings: Settings, stretches: Sequence[Stretch], *, slipped: bool
 ) -> Iterator[Finding]:
-    """At most one speed outside of its band or adrift, and one voltage adrift: those that go farthest.
+    """At most one speed outside of its band or drifting, and one drifting voltage: those that go farthest.
 
     Parameters
     ----------
@@ -76,7 +80,7 @@ def run_away(
     stretches
         The parts of the run between its events.
     slipped
-        Whether units lost synchronism: then a speed counts as outside of its band only at the end.
+        Whether units lost synchronism. In this case a speed must be outside of its band at the end to be reported.
     """
     speeds = list(_speeds(seen, system, settings))
     yield from _farthest(seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE)
@@ -118,7 +122,7 @@ def _farthest(
 
 
 def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
-    """When a speed leaves its band [s], if it is there for longer than allowed or at the end."""
+    """Time at which a speed leaves its band [s]; None unless it stays outside for longer than allowed or at the end."""
     part = course.signal / course.signal[0]
     outside = course.on & ((part < BAND[0]) | (part > BAND[1]))
     if not outside[-1] and outside.sum() * float(times[1] - times[0]) <= allowed:

@@ -1,7 +1,10 @@
-"""What the watch sees of a run: signals at regular looks, and where the coupled outputs went between them."""
+"""The data of a run that the watch judges: signals at regular looks, and the extremes of the coupled outputs between
+two looks.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -9,12 +12,13 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
+from orchestrator.errors import InputError
 
 LOOK_INTERVAL = 5e-3
-"""The watch looks about so often [s]; what happens between two looks is seen in the extremes of coupled outputs."""
+"""Approximate time between two looks [s]. The extremes of coupled outputs show what happens between two looks."""
 
 MOST_LOOKS = 20_000
-"""Longer runs are looked at less often."""
+"""Largest number of looks; in longer runs the looks are farther apart."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +30,11 @@ class Seen:
     times
         Of the looks [s], shape (n,).
     values
-        By ``component.variable``, each of shape (n,); all that was recorded and what the watch read besides.
+        Signals by ``component.variable``, each of shape (n,): the recorded signals, and those that the watch reads in
+        addition.
     last, low, high, turns
-        By coupled output, each of shape (n,): its value, its extremes since the look before, over every communication
-        step, and how often it went the other way.
+        Arrays of shape (n,) by coupled output: its value, its extremes over all communication steps since the previous
+        look, and the number of its turns.
     """
 
     times: Numbers
@@ -40,7 +45,7 @@ class Seen:
     turns: Mapping[str, Numbers]
 
     def until(self, time: float) -> "Seen":
-        """The same up to a time [s]."""
+        """The part of the data up to a time [s]."""
         count = int(np.searchsorted(self.times, time * (1 + 1e-12), side="right"))
         if count == len(self.times):
             return self
@@ -54,24 +59,26 @@ class Seen:
 
 
 def is_derivative(name: str) -> bool:
-    """Whether a signal is what FMI calls ``der(state)``."""
+    """Whether a signal is a derivative, ``der(state)`` in FMI."""
     return name.partition(".")[2].startswith("der(")
 
 
 def unit(name: str, system: System) -> str:
-    """Of a signal, as its FMU has it."""
+    """Unit of a signal, as its FMU declares it."""
     component, _, variable = name.partition(".")
     return system.components[component].description.variables[variable].unit
 
 
 def look_every(step_size: float, record_every: int, stop_time: float) -> int:
-    """Communication steps between two looks: a multiple of those between two records, where these are close enough."""
+    """Number of communication steps between two looks. It is a multiple of the steps between two records if the records
+    are close enough.
+    """
     target = max(1, round(LOOK_INTERVAL / step_size), int(stop_time / step_size / MOST_LOOKS))
     return record_every * (target // record_every) if record_every <= target else target
 
 
 class Watcher:
-    """An observer that collects what the watch needs.
+    """An observer that collects the data for the watch.
 
     Parameters
     ----------
@@ -87,16 +94,29 @@ class Watcher:
         self._outputs: tuple[str, ...] = ()
         self._tracks = np.empty((4, 0, 0))
         self._count = 0
+        self._last_index = -1
+        self._run: ObservedRun | None = None
+        self._position: Mapping[str, Any] | None = None
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
         """See `Observer.begin`."""
         self._recorder.begin(run, stop_index)
-        self._outputs, self._count = run.output_names, 0
-        self._tracks = np.empty((4, (stop_index - run.index) // self.every + 2, len(run.output_names)))
+        self._outputs, self._count, self._last_index, self._run = run.output_names, 0, -1, run
+        further = (stop_index - run.index) // self.every + 2
+        before = np.empty((4, 0, 0)) if self._position is None else self._position["tracks"]
+        self._tracks = np.empty((4, before.shape[1] + further, len(run.output_names)))
         run.tracks.look(run.y)
+        if self._position is not None:
+            self._count, self._last_index = before.shape[1], int(self._position["index"])
+            self._tracks[:, : self._count] = before
+            run.tracks.restore(self._position["since"])
+            self._position = None
 
     def observe(self, run: ObservedRun) -> None:
         """See `Observer.observe`."""
+        if run.index == self._last_index:
+            return  # taken up again where this look was made already
+        self._last_index = run.index
         self._recorder.observe(run)
         tracks = run.tracks
         for kept, now in zip(self._tracks, (run.y, tracks.low, tracks.high, tracks.turns), strict=True):
@@ -105,13 +125,34 @@ class Watcher:
         self._count += 1
 
     def end(self, run: ObservedRun) -> None:
-        """Nothing to do: what was seen stays."""
+        """Do nothing: the collected data stay."""
 
-    def seen(self, recorded: Recorder) -> Seen:
-        """Everything, with what was recorded besides."""
+    def position(self) -> dict[str, Any]:
+        """All that was seen so far, for `resume`: numbers, and arrays by name.
+
+        Raises
+        ------
+        InputError
+            If no run has begun.
+        """
+        if self._run is None:
+            raise InputError("the watch has seen nothing yet; ask for its position after the run began")
+        rows = {f"rows_{name}": value for name, value in self._recorder.position().items()}
+        looks = self._tracks[:, : self._count].copy()
+        return {"index": self._last_index, "tracks": looks, "since": self._run.tracks.saved(), **rows}
+
+    def resume(self, position: Mapping[str, Any]) -> None:
+        """Go on from a position at the next `begin`."""
+        self._position = position
+        rows = {name.removeprefix("rows_"): value for name, value in position.items() if name.startswith("rows_")}
+        self._recorder.resume(rows)
+
+    def seen(self, recorded: Recorder | None) -> Seen:
+        """Everything, with what was recorded besides where it was at the looks."""
         values = dict(_columns(self._recorder.names, self._recorder.values))
-        if self.every % recorded.every == 0:
-            further = _columns(recorded.names, recorded.values[:: self.every // recorded.every])
+        distance = 0 if recorded is None else recorded.every * recorded.keep
+        if recorded is not None and self.every % distance == 0:
+            further = _columns(recorded.names, recorded.values[:: self.every // distance])
             values |= {name: column[: self._count] for name, column in further}
         last, low, high, turns = (dict(_columns(self._outputs, part[: self._count])) for part in self._tracks)
         return Seen(self._recorder.times, values, last, low, high, turns)

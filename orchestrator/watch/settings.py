@@ -1,11 +1,12 @@
-"""The values of parameters over a run: those that components start with, and those that events give them."""
+"""The values of parameters over a run: the start values, and the values that events set."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.coupling.events import Event
+from orchestrator.coupling.events import Event, Fault
+from orchestrator.coupling.imperfections import Noise, Quantisation
 from orchestrator.coupling.system import System
 
 
@@ -14,6 +15,9 @@ class Settings:
 
     def __init__(self, system: System, events: Sequence[Event], times: Numbers) -> None:
         self._system, self._times = system, times
+        self._faults = {event.time for event in events if isinstance(event, Fault)}
+        if any(isinstance(i, Noise | Quantisation) for plan in system.wires.values() for i in plan.permanent.values()):
+            self._faults.add(0.0)  # nothing stands still from the beginning
         self._changes = [
             (event.time, f"{name}.{variable}", float(value))
             for event in sorted(events, key=lambda e: e.time)
@@ -27,13 +31,13 @@ class Settings:
         held = np.full(len(self._times), plan.number(parameter))
         for time, name, value in self._changes:
             if name == f"{component}.{parameter}":
-                held[self._times > time] = value  # what is seen at an event's time is from before it
+                held[self._times > time] = value  # a look at an event's time shows the state before the event
         return held
 
     def effective_times(self) -> list[float]:
-        """When an event sets anything to another value than it has [s]."""
+        """When an event sets anything to another value than it has, or a fault begins or ends [s]."""
         now: dict[str, float | None] = {}
-        found = set()
+        found = set(self._faults)
         for time, name, value in self._changes:
             if name not in now:
                 component, _, variable = name.partition(".")
@@ -45,7 +49,7 @@ class Settings:
         return sorted(found)
 
     def connected(self, component: str) -> Numbers:
-        """Whether a component is on the grid: its own breaker, and the grid's port for it; 1 or 0, shape (n,)."""
+        """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""
         held = np.ones(len(self._times))
         for name, plan in self._system.components.items():
             switch = "connected" if name == component else f"{component}.connected"

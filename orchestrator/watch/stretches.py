@@ -1,4 +1,4 @@
-"""The stretches of a run between its events; those that an event does not part are one."""
+"""The stretches of a run between its events. An event without visible effect does not end a stretch."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,26 +10,27 @@ from orchestrator.arrays import Numbers
 from orchestrator.watch.seen import Seen
 
 NOTICED = 0.01
-"""An event is noticed if a signal kinks at it by this part of how far it went before, since the last noticed event."""
+"""An event is noticed if it bends a signal by this part of the signal's range since the last noticed event."""
 
 _KINK_LOOKS = 4
-"""Looks after an event in which its immediate effect is seen."""
+"""Number of looks after an event that show its immediate effect."""
 
 _USUAL_LOOKS, _USUAL = 20, 2.0
-"""A kink is more than so many times what the signal does by itself in so many looks before the event."""
+"""A bend counts if it exceeds the first number times the signal's own motion in the second number of looks before the
+event."""
 
 _ROUNDING = 1e-12
-"""Of 1 or of the signal."""
+"""Rounding, as a part of 1 or of the signal."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """From one event, or the start, to the next, or the end [s].
+    """The time from one noticed event, or the start, to the next one, or the end [s].
 
     Attributes
     ----------
     breaks
-        Events in between that nobody notices.
+        Times of unnoticed events inside the stretch [s].
     last
         Whether it ends with the run.
     """
@@ -40,19 +41,19 @@ class Stretch:
     last: bool = False
 
     def parts(self) -> Iterator["Stretch"]:
-        """From event to event, whether they are noticed or not."""
+        """The parts of the stretch between all events, noticed or not."""
         edges = (self.begin, *self.breaks, self.end)
         for begin, end in pairwise(edges):
             yield Stretch(begin, end, last=self.last and end == self.end)
 
 
 def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]) -> list[Stretch]:
-    """What lies after each noticed event.
+    """The stretch after each noticed event.
 
     Parameters
     ----------
     signals
-        In which an event is noticed; of the looks.
+        Signals in which events are noticed, at the looks.
     times
         Of the events [s].
     """
@@ -69,7 +70,7 @@ def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]
 
 
 def _row(times: Numbers, time: float) -> int:
-    """The last look before an event; one at its very time is from before it."""
+    """Index of the last look before an event. A look at the event's time shows the state before it."""
     return int(np.searchsorted(times, time * (1 + 1e-12), side="right")) - 1
 
 
@@ -79,7 +80,7 @@ def _noticed(times: Numbers, signals: Mapping[str, Numbers], begin: float, time:
     start = max(first, row - _USUAL_LOOKS)
     for signal in signals.values():
         bends = np.abs(np.diff(signal[start : row + _KINK_LOOKS + 1], 2))
-        before = row - start - 1  # of the bends are from before the event
+        before = row - start - 1  # bends before the event
         if len(bends) <= max(before, 0):
             continue
         kink = bends[max(before, 0) :].max()

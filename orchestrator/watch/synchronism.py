@@ -13,18 +13,18 @@ from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
 ANGLES = ("delta", "droop.theta", "source.theta")
-"""Variables [rad] with a unit's angle in the network frame: rotor, converter's frame, a stiff source."""
+"""Variables with a unit's angle in the network frame [rad]: of a rotor, of a converter's frame, of a stiff source."""
 
 _SPEED = "omega"
-"""Frequency [pu of f_n] that a unit of others has instead; the angle is its integral."""
+"""Output with a foreign unit's frequency [pu of f_n]; its integral is the angle."""
 
 _OUT_OF_STEP = np.pi
 _NAMED = 4
-"""How many units of a group are named."""
+"""Largest number of a group's units that a message names."""
 
 
 def angle_signals(system: System) -> list[str]:
-    """Signals that have to be read to know every unit's angle."""
+    """Signals that show every unit's angle."""
     found = ((name, _angle_variable(system, name)) for name in system.components)
     return [f"{name}.{variable}" for name, variable in found if variable is not None]
 
@@ -37,11 +37,12 @@ def _angle_variable(system: System, name: str) -> str | None:
 
 
 def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
-    """Groups of units that are left by the others' angles by more than half a turn; each pair of groups is told once.
+    """Groups of units whose angles differ from the others' by more than half a turn; each pair of groups is reported
+    once.
 
     The units on the grid are sorted by angle. Where two neighbours are more than half a turn apart, the system has
-    fallen apart there. Units that this never parts are a group. Of two groups the one with less rating is the one that
-    lost the other.
+    fallen apart there. Units that are never parted belong to one group. Of two groups, the one with the smaller rating
+    counts as the one that lost synchronism.
     """
     names = [name for name in system.components if _angle_variable(system, name) is not None]
     if len(names) < 2:
@@ -66,7 +67,7 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
 
 @dataclass(frozen=True)
 class _Pair:
-    """A group that another one lost: its units, the first row apart, and the angle between both [rad]."""
+    """Two groups that lost each other: their units, the first row apart, and the angle between them [rad]."""
 
     other: Sequence[int]
     row: int
@@ -75,17 +76,19 @@ class _Pair:
 
     @property
     def turns(self) -> float:
-        """From the start to the last look at which both were on the grid."""
+        """Number of turns between the groups from the start to the last look with both groups on the grid."""
         return abs(float(self.relative[-1] - self.relative[0])) / (2 * np.pi)
 
     @property
     def slips(self) -> bool:
-        """Whether they still slip when the run ends."""
+        """Whether the groups still slip when the run ends."""
         return self.lasts and slips_at_the_end(self.relative)
 
 
 def _sides(angles: Numbers, on: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """The part of the system in which a unit is, counted by angle, and -1 off the grid; shape (units, n)."""
+    """Number of the part of the system that holds each unit, counted by angle; −1 for a unit off the grid. Shape
+    (units, n).
+    """
     order = np.argsort(np.where(on, angles, np.inf), axis=0)
     in_order = np.take_along_axis(angles, order, axis=0)
     part = np.zeros(angles.shape, dtype=np.int_)
@@ -97,7 +100,7 @@ def _sides(angles: Numbers, on: NDArray[np.bool_]) -> NDArray[np.int_]:
 
 
 def _groups(sides: NDArray[np.int_]) -> list[list[int]]:
-    """Units that are on the same side whenever they are on the grid."""
+    """Groups of units that are on the same side whenever they are on the grid."""
     groups: list[list[int]] = []
     for unit, side in enumerate(sides):
         for group in groups:
@@ -116,7 +119,7 @@ def _row_apart(one: NDArray[np.int_], other: NDArray[np.int_]) -> int | None:
 
 
 def _mean(angles: Numbers, on: NDArray[np.bool_]) -> Numbers:
-    """Of the units on the grid [rad], shape (n,); not a number where there are none."""
+    """Mean angle of the units on the grid [rad], shape (n,); NaN if all units are off the grid."""
     count = on.sum(axis=0)
     total = np.where(on, angles, 0.0).sum(axis=0)
     mean: Numbers = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
@@ -152,7 +155,7 @@ def _forget_turns_off_the_grid(angles: Numbers, on: NDArray[np.bool_]) -> None:
 
 
 def _rating(system: System, settings: Settings, name: str) -> float:
-    """[MVA]; a stiff source is stronger than everything."""
+    """Rating of a unit [MVA]; that of a stiff source is infinite."""
     return np.inf if _angle_variable(system, name) == "source.theta" else _start(system, settings, name, "S_n", 0.0)
 
 

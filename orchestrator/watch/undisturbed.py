@@ -1,4 +1,4 @@
-"""The undisturbed state: before the first event nothing may move, and nothing may grow."""
+"""The undisturbed state: before the first event the system must stand still."""
 
 from collections.abc import Iterator, Mapping
 
@@ -12,22 +12,22 @@ from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen, is_derivative, unit
 
 LEAST_GROWTH = 1e-6
-"""A growth is reported once a signal is this far from its start, as a part of 1 or of the start."""
+"""Smallest reported growth: distance of a signal from its start, as a part of 1 or of the start."""
 
 LEAST_MOTION = 1e-4
-"""The same for a motion that does not grow, such as that of a start that was no steady state."""
+"""Smallest reported motion without growth, such as that from a start that is not a steady state, in the same unit."""
 
 _STEEP = 0.2
-"""What grows by itself had less than this part of a motion in half the time."""
+"""A motion grows by itself if it had less than this part of its extent after half the time."""
 
 FEWEST_LOOKS = 3
-"""A growth rises over at least so many looks; else it is a jump."""
+"""Least number of looks over which a growth rises; a faster rise is a jump."""
 
 _ROUNDING, _LARGE = 1e-13, 0.03
-"""A growth is measured between these parts of 1 or of the start."""
+"""Range in which a growth is measured, as parts of 1 or of the start."""
 
 _AGREE = 0.2
-"""Two measurements of a growth agree to this part."""
+"""Largest relative difference between two measurements of a growth that agree."""
 
 
 def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Finding]:
@@ -65,7 +65,9 @@ def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Fin
 
 
 def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
-    """How far every signal but angles has been from its start, beside 1 or its start; shape (count,), never falling."""
+    """Largest distance of every signal except angles from its start up to each look, as a part of 1 or of the start.
+    Shape (count,); it never falls.
+    """
     found = {}
     for name, signal in {**seen.values, **seen.last}.items():
         if is_derivative(name) or unit(name, system) == "rad":
@@ -78,7 +80,7 @@ def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
 
 
 def _is_growth(motion: Numbers) -> bool:
-    """Whether a motion rose steeply from next to nothing, over several looks."""
+    """Whether a motion rose steeply from almost 0 over several looks."""
     reached = int(np.argmax(motion >= 0.5 * motion[-1]))
     if reached == 0 or motion[reached // 2] > _STEEP * motion[reached]:
         return False
@@ -86,17 +88,18 @@ def _is_growth(motion: Numbers) -> bool:
 
 
 def _rising(motion: Numbers) -> NDArray[np.bool_]:
-    """Looks at which a growth is out of the rounding and not yet so large that something limits it."""
+    """Looks at which a growth exceeds rounding and is not yet limited."""
     floor = max(10 * motion[1], _ROUNDING)
     rising: NDArray[np.bool_] = (motion > floor) & (motion < min(0.3 * motion[-1], _LARGE))
     return rising
 
 
 def _growth(seen: Seen, motions: Mapping[str, Numbers]) -> Oscillation:
-    """Growth rate and frequency (0 where nothing turns) where the growth shows first.
+    """Growth rate and frequency of the signal that shows the growth first; the frequency is 0 if the signal does not
+    turn.
 
-    The rate is that of the extent, over every communication step, and the frequency that of the turns. Where the looks
-    are close enough for the frequency, the matrix pencil gives both more exactly.
+    The rate follows from the extent over every communication step, and the frequency from the turns. If the looks are
+    close enough for the frequency, the matrix pencil gives both more exactly.
     """
     coupled = {name: m for name, m in motions.items() if name in seen.turns and _is_growth(m)} or motions
     size = min(_LARGE, 0.3 * max(float(m[-1]) for m in coupled.values()))

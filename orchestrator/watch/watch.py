@@ -1,6 +1,6 @@
-"""All that is watched, put together."""
+"""The watch over a run: all checks together."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -8,9 +8,12 @@ import numpy as np
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import Event
+from orchestrator.coupling.filtered_recorder import FilteredRecorder
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
+from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
 from orchestrator.watch.finding import Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
 from orchestrator.watch.response import resting_signals, unsettled_response
@@ -25,38 +28,66 @@ from orchestrator.watch.undisturbed import undisturbed_motion
 class Watch:
     """Watches one run of a scenario.
 
-    What is coupled is watched at every communication step: whether it is a number, its extremes, how often it turns.
-    Everything else is watched at looks, some milliseconds apart: what is recorded, limits and angles.
+    Coupled outputs are watched at every communication step: whether they are finite, their extremes and their turns.
+    Recorded signals, limits and angles are watched at looks, some milliseconds apart.
+
+    Parameters
+    ----------
+    prepared
+        The scenario.
+    sink
+        Where all recorded rows go; the recorder then keeps only those of the looks.
 
     Attributes
     ----------
     observers
-        To be given to the run, in this order.
+        Observers for the run, in this order.
     recorder
-        The scenario's own.
+        The recorder of the scenario.
     """
 
-    def __init__(self, prepared: PreparedScenario) -> None:
+    def __init__(self, prepared: PreparedScenario, sink: RowSink | None = None) -> None:
         self._prepared = prepared
-        self.recorder = Recorder(prepared.record, prepared.record_every)
         every = look_every(prepared.step_size, prepared.record_every, prepared.stop_time)
+        keep = (
+            max(1, every // prepared.record_every) if sink is not None else 1
+        )  # what is on the disk need not be in memory
+        self.recorder = (
+            FilteredRecorder(prepared.record, prepared.record_every, sink=sink, keep=keep)
+            if prepared.record_filtered
+            else Recorder(prepared.record, prepared.record_every, sink=sink, keep=keep)
+        )
         needed = dict.fromkeys(
             [*limit_signals(prepared.system), *angle_signals(prepared.system), *speed_signals(prepared.system)]
         )
-        at_each_look = set(prepared.record) if every % prepared.record_every == 0 else set()
-        self._watcher = Watcher([name for name in needed if name not in at_each_look], every)
+        self._looks_at_records = every % prepared.record_every == 0 and not prepared.record_filtered
+        if self._looks_at_records:
+            needed = dict.fromkeys(name for name in needed if name not in set(prepared.record))
+        elif prepared.record_filtered:
+            needed |= dict.fromkeys(prepared.record)
+        self._watcher = Watcher(list(needed), every)
         self.observers = (self.recorder, self._watcher)
 
-    def findings(self, failure: CosimError | None = None) -> list[Finding]:
-        """What was wrong, in the order of its beginning; after the run, also after one that failed."""
-        seen = self._watcher.seen(self.recorder)
+    def findings(
+        self, failure: CosimError | None = None, late_starts: Mapping[str, str] | None = None
+    ) -> list[Finding]:
+        """The findings, in the order of their beginning; available after the run, even after one that failed.
+
+        Parameters
+        ----------
+        failure
+            What ended the run.
+        late_starts
+            As `Master` has them.
+        """
+        seen = self._watcher.seen(self.recorder if self._looks_at_records else None)
         told = judged(seen, self._prepared.system, self._prepared.events) if len(seen.times) > 1 else ()
-        found = chain(_failure(failure), _not_finite(seen), told)
+        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), told)
         return sorted(found, key=lambda finding: finding.time)
 
 
 def judged(seen: Seen, system: System, events: Sequence[Event]) -> list[Finding]:
-    """All that the signals show."""
+    """All findings from the signals."""
     settings = Settings(system, events, seen.times)
     end = float(seen.times[-1])
     happened = [time for time in settings.effective_times() if time < end]
@@ -72,25 +103,38 @@ def judged(seen: Seen, system: System, events: Sequence[Event]) -> list[Finding]
         *run_away(seen, system, settings, parts, slipped=bool(lost)),
     ]
     if any(finding.figures["slips_at_the_end"] for finding in lost):
-        return found  # everything swings with the slip
+        return found  # all signals swing with the slip
     if happened and [finding.kind for finding in undisturbed] != ["undisturbed_motion"]:
         parts = [part for part in parts if part.begin >= happened[0]]
     units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
-    return [*found, *_first_of_each(_responses(seen, system, parts, units))]
+    responses = _Responses(seen, system, units, disturbances(system, events, end))
+    told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
+    return [*found, *told, *not_judged(responses.masked)]
 
 
-def _responses(seen: Seen, system: System, parts: Sequence[Stretch], units: Sequence[str]) -> Iterator[Finding]:
-    """What is found in each stretch as a whole, or else between its events that nobody notices."""
-    for part in parts:
-        whole = unsettled_response(seen, system, part, units)
-        yield from whole
-        if part.breaks and not whole:
-            for piece in part.parts():
-                yield from unsettled_response(seen, system, piece, units)
+class _Responses:
+    """Findings stretch by stretch; ``masked`` has the stretches whose motion may come from noise, with its sources."""
+
+    def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
+        self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
+        self.masked: dict[Stretch, Sequence[Unrest]] = {}
+
+    def found(self, part: Stretch) -> list[Finding]:
+        """Findings in a stretch as a whole, or, if it shows no findings, between its unnoticed events."""
+        pieces = list(part.parts())
+        whole = self._one(part, told=len(pieces) == 1)
+        return whole or [f for piece in pieces for f in self._one(piece)] if part.breaks else whole
+
+    def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
+        acting = among(self._disturbances, part)
+        found = unsettled_response(self._seen, self._system, part, self._units, noisy=bool(acting))
+        if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
+            self.masked[part] = acting
+        return found
 
 
 def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
-    """The first finding of each kind, which says that there are others."""
+    """The first finding of each kind, with a note on further ones."""
     by_kind: dict[Kind, list[Finding]] = {}
     for finding in found:
         by_kind.setdefault(finding.kind, []).append(finding)
@@ -100,8 +144,20 @@ def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
     ]
 
 
+def _late(starts: Mapping[str, str]) -> Iterator[Finding]:
+    """Components whose outputs were not there when their partners were initialised."""
+    for component, text in starts.items():
+        variable = text.split(" ", 1)[0].partition(".")[2]
+        message = (
+            f"{text}: the FMU of component {component!r} computes its outputs only as initialisation ends, so "
+            "everything else starts from a wrong value, and what is found to move from the start follows from it; "
+            "`gfor check --only initial_outputs` shows it alone"
+        )
+        yield Finding("undisturbed_motion", 0.0, component, variable, message)
+
+
 def _failure(error: CosimError | None) -> Sequence[Finding]:
-    """A run that a component ended."""
+    """The finding on a run that a component ended."""
     if not isinstance(error, ComponentError):
         return ()
     time = error.time or 0.0
@@ -111,7 +167,7 @@ def _failure(error: CosimError | None) -> Sequence[Finding]:
 
 
 def _not_finite(seen: Seen) -> Sequence[Finding]:
-    """Signals that nothing is coupled to, each once."""
+    """Findings on signals without connection that are not finite, each once."""
     found = []
     for name, signal in seen.values.items():
         bad = np.flatnonzero(~np.isfinite(signal))

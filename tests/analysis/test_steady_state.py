@@ -42,3 +42,12 @@ def test_where_power_does_not_balance_at_rated_frequency_there_is_no_fixed_point
     with master_of("gfor", {"sg1.P_0": -0.2}) as master, pytest.raises(AnalysisError, match="no steady state") as error:
         find_operating_point(master)
     assert "generation and load" in str(error.value)
+
+
+def test_the_error_says_where_a_models_author_looks_first():
+    """The start values of the component that moves; no Newton iteration is counted where none helped."""
+    with master_of("base", {"sg2.theta_0": 0.05}) as master, pytest.raises(AnalysisError) as error:
+        find_operating_point(master, max_iterations=0)
+    said = str(error.value)
+    assert "0 Newton iterations" not in said
+    assert said.index("start values of the component") < said.index("generation and load balance")

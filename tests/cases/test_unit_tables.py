@@ -3,7 +3,10 @@
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.parameter_files import read_parameter_file
 from orchestrator.errors import CaseError
+from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.sweep import plan_sweep
 from tests.cases.test_network_sources import SMALL
 
 CASE = """\
@@ -94,6 +97,25 @@ def test_the_frequency_goes_to_everything_that_has_one_and_no_other_may_be_set(c
 )
 def test_whose_share_counts(case, scenario, overrides, shares):
     (ready,) = case().prepare([scenario], overrides)
+    v = ready.values
+    found = tuple(v[f"gfor{n}.S_n"] / (v[f"gfor{n}.S_n"] + v[f"sg{n}.S_n"]) for n in (7, 20))
+    assert found == pytest.approx(shares)
+
+
+@pytest.mark.parametrize(
+    ("vary", "fixed", "shares"),
+    [
+        ("gfor7.droop.R_f=0.03,0.04", {"units.alpha": 0.2}, (0.2, 0.2)),  # before the file's share of one unit
+        ("units.alpha=0.3,0.6", {"units.alpha": 0.2, "units.alpha.20": 0.4}, (0.3, 0.3)),  # what is varied before all
+    ],
+)
+def test_whose_share_counts_in_a_sweep(case, tmp_path, vary, fixed, shares):
+    (tmp_path / "pf.toml").write_text('[set]\n"units.alpha.20" = 0.5\n', encoding="utf-8")
+    file = read_parameter_file(tmp_path / "pf.toml")
+    planned = plan_sweep(case(), [parse_vary(vary)], ["plain"], fixed, None,
+                         parameters=[file])  # fmt: skip
+    task = planned.task(planned.scenarios[0], (0,))
+    (ready,) = planned.case.prepare([task.scenario], task.overrides, None, None, task.layers)
     v = ready.values
     found = tuple(v[f"gfor{n}.S_n"] / (v[f"gfor{n}.S_n"] + v[f"sg{n}.S_n"]) for n in (7, 20))
     assert found == pytest.approx(shares)

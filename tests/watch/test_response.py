@@ -49,6 +49,16 @@ def test_a_constant_amplitude_is_told_from_a_slow_decay(hertz):
         assert found(a=response(rate, hertz)) == []
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.3])
+@pytest.mark.parametrize("ripple", [44.0, 60.0])
+def test_a_small_ripple_does_not_hide_the_frequency_of_a_large_swing(rate, ripple):
+    large, small = response(rate, 5.2, 2e-3), response(rate, ripple, 2e-4, settling=0.0)
+    (finding,) = found(a=lambda t: large(t) + small(t) - 0.9)
+    assert finding.kind == ("growing_oscillation" if rate else "sustained_oscillation")
+    assert finding.figures["frequency_hz"] == pytest.approx(5.2, rel=0.01)
+    assert finding.figures["growth_rate"] == pytest.approx(rate, abs=0.02)
+
+
 def test_a_limit_cycle_has_a_beginning():
     """ẋ = growth that saturates: x² is logistic."""
 

@@ -1,0 +1,136 @@
+"""Choices of what a scenario is built of; a case file, a parameter file and ``--set`` write them among the values.
+
+``<component>.native`` chooses the kind of FMU, ``units.alpha`` the converters' share of the units. No FMU has such a
+variable. They are taken out where a layer of values is made, and the preparation reads them before it knows the FMUs.
+"""
+
+import fnmatch
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from orchestrator.cases.schema import Value
+
+ALPHA = "units.alpha"
+"""Key of the share that all converters have; ``units.alpha.<label>`` is that of one unit."""
+
+_NATIVE = "native"
+
+Place = Callable[[str], str]
+"""Key → where it is written."""
+
+
+@dataclass(frozen=True)
+class NativeChoice:
+    """Whether some components run as native FMUs.
+
+    Attributes
+    ----------
+    pattern
+        Name of a component, or a pattern such as ``*``.
+    given
+        As it is written.
+    place
+        Where it is written.
+    """
+
+    pattern: str
+    given: Value
+    place: str
+
+    def fits(self, component: str) -> bool:
+        """Whether the choice is for a component."""
+        return fnmatch.fnmatch(component, self.pattern)
+
+    @property
+    def native(self) -> bool:
+        """The choice.
+
+        Raises
+        ------
+        ValueError
+            If something else than true or false is written.
+        """
+        if not isinstance(self.given, bool):
+            raise ValueError(f"native = {self.given!r}; it must be true or false")
+        return self.given
+
+
+@dataclass(frozen=True)
+class ShareChoice:
+    """A converter's share of its unit.
+
+    Attributes
+    ----------
+    label
+        Of the unit; empty for all units.
+    given
+        As it is written.
+    place
+        Where it is written.
+    """
+
+    label: str
+    given: Value
+    place: str
+
+    @property
+    def share(self) -> float:
+        """From 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            If something else is written.
+        """
+        if isinstance(self.given, bool | str) or not 0 <= self.given <= 1:
+            raise ValueError(f"alpha = {self.given!r}; it must be a number from 0 to 1")
+        return float(self.given)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What one source gives: a parameter file, the scenario, or the command line.
+
+    Attributes
+    ----------
+    values
+        Of the components' variables, by ``component.variable``.
+    natives
+        Kinds of FMU, in the source's order.
+    shares
+        Converters' shares; the one for all units comes first, so that those for one unit override it.
+    place
+        Where a value is written.
+    """
+
+    values: Mapping[str, Value]
+    natives: tuple[NativeChoice, ...]
+    shares: tuple[ShareChoice, ...]
+    place: Place
+
+
+def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
+    """Part what a source gives into values and choices.
+
+    Parameters
+    ----------
+    given
+        By ``component.variable`` or a choice's key.
+    place
+        Where a key is written.
+    has_units
+        Whether the case has a table of units; without one, nothing has a share.
+    """
+    values: dict[str, Value] = {}
+    natives: list[NativeChoice] = []
+    shares: list[ShareChoice] = []
+    for key, value in given.items():
+        pattern, _, variable = key.partition(".")
+        if has_units and (key == ALPHA or key.startswith(f"{ALPHA}.")):
+            shares.append(ShareChoice(key.removeprefix(ALPHA).removeprefix("."), value, place(key)))
+        elif variable == _NATIVE:
+            natives.append(NativeChoice(pattern, value, place(key)))
+        else:
+            values[key] = value
+    shares.sort(key=lambda choice: choice.label != "")
+    return Layer(values, tuple(natives), tuple(shares), place)

@@ -1,0 +1,176 @@
+"""Faults among a case file's events: what they do to connections and components, and which cannot stand together."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of
+from orchestrator.cases.schema import ComponentFaultTable, ComponentTripTable, TimeOutTable, WireEventTable
+from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.events import (
+    Event,
+    NotANumber,
+    ParameterChange,
+    Silence,
+    UnitSwitching,
+    WireFault,
+    WireRecovery,
+)
+from orchestrator.coupling.imperfections import DropOut
+from orchestrator.errors import InputError
+from orchestrator.fmi.instance import is_isolated
+
+_BREAKER = "connected"
+
+
+def wire_events(draft: Draft, table: WireEventTable, clock: Clock, where: str) -> list[Event]:
+    """What an imperfection that begins at a time, and may end, does to every connection that is meant.
+
+    Parameters
+    ----------
+    draft
+        Takes the notes.
+    table
+        The imperfection with its times.
+    clock
+        Whose communication points the times must be.
+    where
+        Place of the table in the file.
+    """
+    end = table.end
+    if end is not None:
+        if end <= table.time:
+            text = f"end = {end:g} s is not after time = {table.time:g} s; give a later end, or leave it out"
+            draft.note(where, text)
+            return []
+        try:
+            clock.index(end, "the end of the event")
+        except InputError as error:
+            draft.note(where, str(error))
+            return []
+    events: list[Event] = []
+    for connection in connections_meant(draft, table.connection, where):
+        imperfection = imperfection_of(draft, table, connection, clock, where)
+        if imperfection is None:
+            continue
+        draft.system.foresee(connection, imperfection)
+        target = connection.target.component
+        events.append(WireFault(table.time, target, connection, imperfection))
+        if end is not None:
+            events.append(WireRecovery(end, target, connection, imperfection))
+    return events
+
+
+def component_events(draft: Draft, table: ComponentFaultTable, where: str) -> list[Event]:
+    """What a fault of a whole component comes down to."""
+    name = table.component
+    plan = draft.system.components.get(name)
+    if plan is None:
+        if name not in draft.known:
+            draft.note(where, f"there is no component {name!r}; the case has: {', '.join(draft.tables)}")
+        return []
+    if isinstance(table, ComponentTripTable):
+        return _trip(draft, table, where)
+    if isinstance(table, TimeOutTable):
+        if not is_isolated(plan.description, plan.isolated):
+            draft.note(
+                where,
+                f"component {name!r} runs in this process, where nothing limits how long it takes to answer; give it "
+                "'isolated = true' to try a time-out",
+            )
+            return []
+        return [Silence(table.time, name)]
+    if not any(c.source.component == name for c in draft.system.connections):
+        draft.note(where, f"component {name!r} feeds nothing, so that nobody would notice what its outputs are")
+        return []
+    return [NotANumber(table.time, name)]
+
+
+def _trip(draft: Draft, table: ComponentTripTable, where: str) -> list[Event]:
+    """Its breaker opens: that of the grid's port, and its own; where there is neither, what it gives becomes 0."""
+    name, components = table.component, draft.system.components
+    own = _BREAKER in components[name].description.variables
+    port = f"{name}.{_BREAKER}"
+    grid = next((other for other, plan in components.items() if port in plan.description.variables), None)
+    if grid is not None:
+        return [UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
+    if own:
+        return [ParameterChange(table.time, name, _BREAKER, False)]
+    given = [c for c in draft.system.connections if c.source.component == name]
+    if not given:
+        draft.note(where, f"component {name!r} has no breaker and feeds nothing, so that its trip would change nothing")
+    for connection in given:
+        draft.system.foresee(connection, DropOut(0.0))
+    return [WireFault(table.time, c.target.component, c, DropOut(0.0)) for c in given]
+
+
+# -- what cannot stand together --------------------------------------------------------------------
+
+
+def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clock) -> list[Event]:
+    """Note events that set the same at the same time; the others, without ends that another beginning replaces.
+
+    Parameters
+    ----------
+    draft
+        Takes the notes.
+    events
+        Each with its place in the file.
+    clock
+        Two times in one communication step are the same.
+    """
+    seen: dict[tuple[int, str], tuple[Event, str]] = {}
+    for event, where in events:
+        for what in _set_by(event):
+            first = seen.setdefault((clock.index(event.time, "the event"), what), (event, where))
+            if first[0] is not event:
+                draft.note(
+                    where,
+                    f"{what} is set at {event.time:g} s by {first[1]} already, and only one of the two could hold; "
+                    "remove one, or give it another time",
+                )
+    obsolete = _replaced_ends(draft, events)
+    return [event for event, _ in events if id(event) not in obsolete]
+
+
+def _set_by(event: Event) -> Iterator[str]:
+    match event:
+        case WireFault():
+            yield f"{_kind(event)} of {event.connection}"
+        case WireRecovery():
+            return
+        case NotANumber():
+            yield f"the outputs of {event.component}"
+        case _:
+            for component, settings in event.changes().items():
+                for variable in settings:
+                    yield f"{component}.{variable}"
+
+
+def _replaced_ends(draft: Draft, events: Sequence[tuple[Event, str]]) -> set[int]:
+    """Ends at which another imperfection of the kind begins; one that begins before the other's end is noted."""
+    by_kind: dict[tuple[str, str], list[tuple[WireFault, WireRecovery | None, str]]] = {}
+    for k, (event, where) in enumerate(events):
+        if isinstance(event, WireFault):
+            after = events[k + 1][0] if k + 1 < len(events) else None
+            mine = isinstance(after, WireRecovery) and after.connection == event.connection
+            end = after if mine and isinstance(after, WireRecovery) else None
+            by_kind.setdefault((str(event.connection), _kind(event)), []).append((event, end, where))
+    obsolete = set()
+    for (connection, kind), faults in by_kind.items():
+        for (one, end, where), (other, _, elsewhere) in pairwise(sorted(faults, key=lambda f: f[0].time)):
+            if end is not None and end.time == other.time:
+                obsolete.add(id(end))
+            elif one.time < other.time and (end is None or end.time > other.time):
+                until = "the run's end" if end is None else f"{end.time:g} s"
+                draft.note(
+                    elsewhere,
+                    f"{kind} of {connection} begins at {other.time:g} s, while that of {where} lasts from "
+                    f"{one.time:g} s to {until}; give that one an end by then",
+                )
+    return obsolete
+
+
+def _kind(event: WireFault) -> str:
+    kind = type(event.imperfection)
+    return "the loss" if kind is DropOut else f"the {kind.__name__.lower()}"

@@ -1,0 +1,69 @@
+"""What of a scenario is recorded and how often, and whether that is what the case wants."""
+
+import fnmatch
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.names import variables_of
+from orchestrator.coupling.clock import Clock
+from orchestrator.errors import InputError, Problem
+
+_EQUAL = 1e-6
+"""An interval is a multiple of the step if it is one to this part of a step."""
+
+
+def record_every(draft: Draft, clock: Clock, stop_time: float) -> tuple[int, tuple[Problem, ...]]:
+    """Communication steps between two rows, and the questions that a run asks about the interval that the case states.
+
+    Parameters
+    ----------
+    draft
+        The scenario.
+    clock
+        The communication step.
+    stop_time
+        Of the run [s].
+    """
+    solver = draft.case.solver
+    steps = solver.record_interval / clock.step_size
+    every = max(1, round(steps))
+    if "record_interval" in solver.model_fields_set:
+        place = draft.place("solver", "record_interval")
+        given = f"{solver.record_interval:g} s"
+        if abs(steps - every) > _EQUAL:
+            rule = f"{given} is no multiple of the communication step of {clock.step_size:g} s"
+            text = f"{rule}; rows are recorded every {every * clock.step_size:g} s instead"
+            return every, (Problem(place, text),)
+        if solver.record_interval > stop_time:
+            text = f"{given} is longer than the run of {stop_time:g} s; its start is the only row"
+            return every, (Problem(place, text),)
+    return every, ()
+
+
+def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
+    """All Real outputs that fit one of the file's patterns, and questions of a run about what it leaves out."""
+    questions: list[Problem] = []
+    plans = {name: plan.description for name, plan in draft.system.components.items()}
+    outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
+    wanted = {name for pattern in draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
+    if outputs and not wanted and draft.case.solver.record:
+        text = f"nothing is recorded in scenario {draft.name!r}: none of its outputs fits a pattern"
+        questions.append(Problem(draft.place("solver", "record"), text))
+    ring = draft.case.analysis.ring_down
+    shown = [(draft.place("analysis", "ring_down"), ring.signal)] if ring else []
+    shown += [
+        (draft.place("plots", k, "panels", n, "signal"), panel.signal)
+        for k, plot in enumerate(draft.case.plots)
+        for n, panel in enumerate(plot.panels)
+    ]
+    for place, expression in shown:
+        if missing := [name for name in _variables(expression) if name in outputs and name not in wanted]:
+            text = f"{expression!r} is not shown, because solver.record leaves out {' and '.join(missing)}"
+            questions.append(Problem(place, text))
+    return tuple(name for name in outputs if name in wanted), questions
+
+
+def _variables(expression: str) -> list[str]:
+    try:
+        return variables_of(expression)
+    except InputError:
+        return []  # a problem of its own

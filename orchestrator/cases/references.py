@@ -1,0 +1,65 @@
+"""Published figures of a scenario, where the values that they were published for are the scenario's own."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.imperfection_tables import sets_imperfection
+from orchestrator.cases.names import close_names
+from orchestrator.cases.schema import ReferenceModeTable, Value
+from orchestrator.cases.values import convert
+
+
+def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> dict[str, ReferenceModeTable]:
+    """The modes of ``[reference]`` for a scenario; none where a condition of ``when`` does not hold.
+
+    A condition is compared in the variable's own unit, with the value that is set, else with the default. A name that
+    nothing has is noted as a problem.
+
+    Parameters
+    ----------
+    draft
+        The scenario with its values.
+    imperfections
+        Numbers of the connections' imperfections, by key.
+    """
+    table = draft.case.reference
+    if table is None:
+        return {}
+    held = [_holds(draft, key, wanted, imperfections) for key, wanted in table.when.items()]
+    return table.modes.get(draft.name, {}) if all(held) else {}
+
+
+def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, float | bool]) -> bool:
+    place = draft.place("reference", "when", key)
+    if sets_imperfection(key):
+        return key in imperfections and _equal(imperfections[key], wanted)
+    name, _, variable = key.partition(".")
+    if name not in draft.known and draft.whole:
+        hint = close_names(name, sorted(draft.known), f"the case has: {', '.join([*draft.case.components][:12])}")
+        draft.note(place, f"there is no component {name!r}; {hint}")
+        return False
+    plan = draft.system.components.get(name)
+    if plan is None:
+        return False  # another scenario has it
+    info = plan.description.variables.get(variable)
+    if info is None:
+        if draft.tables[name].fmu is None:
+            hint = close_names(variable, plan.description.parameters, "`gfor info` lists the variables")
+            draft.note(place, f"component {name!r} has no variable {variable!r}; {hint}")
+        return False  # the FMU of somebody else may lack what the catalogue's model has
+    try:
+        converted = convert(info, wanted)
+    except ValueError as error:
+        draft.note(place, str(error))
+        return False
+    value = plan.value(variable)
+    return value is not None and _equal(value, converted)
+
+
+def _equal(value: Value, wanted: Value) -> bool:
+    try:
+        return bool(np.isclose(float(value), float(wanted)))
+    except ValueError:
+        return value == wanted
