@@ -1,0 +1,82 @@
+"""The calls of HELICS that both the hub and a federate of ours make."""
+
+import json
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+from fmus.toolchain.extras import require
+from orchestrator.federation.choice import address_of
+
+CORE = "zmq"
+"""HELICS's own default, and the only core of its packages that always works between machines."""
+
+FAULT_MARK, OURS_MARK = "fault", "gfor-cosim"
+"""Texts that a federate publishes as ``component/fault`` and ``component/gfor-cosim``."""
+
+
+@cache
+def library() -> ModuleType:
+    """The package; it takes half a second to import, so only the processes of a federation do."""
+    require("--engine helics", "helics")
+    import helics  # noqa: PLC0415 - of the extra `federation`, and slow to import
+
+    module: ModuleType = helics
+    return module
+
+
+def join(name: str, broker: str, seconds: float) -> Any:
+    """A federate at a broker.
+
+    Raises
+    ------
+    helics.HelicsException
+        If the broker does not answer within the time [s], or the name is taken.
+    """
+    helics = library()
+    host, port = address_of(broker)
+    info = helics.helicsCreateFederateInfo()
+    helics.helicsFederateInfoSetCoreTypeFromString(info, CORE)
+    wait = f"{max(1, round(1000 * seconds))}ms"
+    helics.helicsFederateInfoSetCoreInitString(
+        info, f"--federates=1 --broker_address=tcp://{host}:{port} --timeout={wait} --loglevel=error"
+    )
+    helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
+    return helics.helicsCreateValueFederate(name, info)
+
+
+def text_of(error: Exception) -> str:
+    """What HELICS says, without the number in front."""
+    return str(error).partition("] ")[2] or str(error)
+
+
+def ask(federate: Any, target: str, query: str) -> Any:
+    """The answer to a query, with its JSON read where it is JSON."""
+    helics = library()
+    answer = helics.helicsQueryExecute(helics.helicsCreateQuery(target, query), federate)
+    if isinstance(answer, str):
+        try:
+            return json.loads(answer)
+        except ValueError:
+            return answer
+    return answer
+
+
+def optional_subscription(federate: Any, name: str, unit: str) -> Any:
+    """An input that may stay without a source."""
+    helics = library()
+    handle = helics.helicsFederateRegisterSubscription(federate, name, unit)
+    helics.helicsInputSetOption(handle, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, 1)
+    return handle
+
+
+def publication(federate: Any, name: str, unit: str) -> Any:
+    """A publication of a double."""
+    helics = library()
+    return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_DOUBLE, unit)
+
+
+def text_publication(federate: Any, name: str) -> Any:
+    """A publication of a text."""
+    helics = library()
+    return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_STRING, "")

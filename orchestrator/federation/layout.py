@@ -1,0 +1,104 @@
+"""Which values a federation exchanges, and when; times of HELICS are whole nanoseconds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One exchange within each communication step, for the federates of one group; times from its beginning [ns].
+
+    Attributes
+    ----------
+    publish, compute, read
+        When gfor publishes inputs, when the federates compute, and when gfor reads their outputs.
+    """
+
+    publish: int
+    compute: int
+    read: int
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One component that is a federate.
+
+    Attributes
+    ----------
+    inputs, outputs
+        Variables that gfor publishes, and Real outputs that it can subscribe to.
+    needed
+        Those outputs that other components are connected to.
+    start
+        Numbers that the component is given before its start, by variable.
+    units
+        Of all of them.
+    slot
+        Number of its slot.
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    needed: tuple[str, ...]
+    start: dict[str, float]
+    units: dict[str, str]
+    slot: int
+    external: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """All exchanges of a federation; ``period`` is the communication step [ns]."""
+
+    period: int
+    slots: tuple[Slot, ...]
+    parts: tuple[Part, ...]
+
+
+def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]) -> Layout:
+    """The exchanges of a scenario some of whose components are federates.
+
+    Raises
+    ------
+    InputError
+        If there is no such component, or the schedule or the communication step cannot be kept over HELICS.
+    """
+    system, known = prepared.system, prepared.system.components
+    for option, given in (("--federate", names), ("--external", external)):
+        if wrong := [name for name in given if name not in known]:
+            raise InputError(
+                f"{option} {wrong[0]}: scenario {prepared.name!r} has no component {wrong[0]!r}; "
+                f"components: {', '.join(known)}"
+            )
+    if not prepared.schedule.is_plain:
+        raise InputError("--engine helics needs a schedule with held inputs and a plain clock; leave --like out")
+    period = round(prepared.step_size * 1e9)
+    wanted = {*names, *external}
+    groups = [[n for n in group if n in wanted] for group in prepared.schedule.groups]
+    groups = [group for group in groups if group]
+    if abs(prepared.step_size * 1e9 - period) > 1e-6 or period < 2 * len(groups):
+        raise InputError(
+            f"communication step {prepared.step_size:g} s: HELICS counts time in whole nanoseconds, and each group "
+            "with federates needs two of them in a step; give another step with --step"
+        )
+    edges = [period * i // len(groups) for i in range(len(groups) + 1)]
+    slots = tuple(Slot(a, (a + b) // 2, b) for a, b in pairwise(edges))
+    parts = []
+    for slot, group in enumerate(groups):
+        for name in group:
+            plan = known[name]
+            variables = plan.description.variables
+            inputs = [c.target.variable for c in system.connections if c.target.component == name]
+            outputs = [v for v in plan.description.outputs if variables[v].type == "Real"]
+            start = {v: float(x) for v, x in (plan.parameters | plan.inputs).items() if not isinstance(x, str)}
+            needed = dict.fromkeys(c.source.variable for c in system.connections if c.source.component == name)
+            units = {v: variables[v].unit for v in (*inputs, *outputs, *start)}
+            parts.append(
+                Part(name, tuple(inputs), tuple(outputs), tuple(needed), start, units, slot, name in set(external))
+            )
+    return Layout(period, slots, tuple(parts))
