@@ -25,7 +25,7 @@ from orchestrator.fmi.interrupts import calls
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
 _STRETCH = 20000
-"""Steps done at a stretch, so that an interrupt from the keyboard is heard."""
+"""Number of steps in one call of the C library; an interrupt from the keyboard takes effect between two calls."""
 
 STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state."""
@@ -33,7 +33,7 @@ STILL = 1e-9
 
 @dataclass
 class Bench:
-    """How a device is started, and between which variables it is seen.
+    """Start of a device, and the variables through which it is measured.
 
     Attributes
     ----------
@@ -42,17 +42,17 @@ class Bench:
     inputs, outputs
         Names, such as ``v_re``, ``v_im`` and ``i_re``, ``i_im``.
     rest
-        Inputs at the operating point, shape (m,).
+        Values of the inputs at the operating point, shape (m,).
     held
-        Constants for inputs that the bench does not move.
+        Constant values of the inputs that the bench does not change.
     step_size
         Communication step [s].
     restore
-        Whether the FMU's state may be saved and restored; None for: if the FMU can.
+        Whether the bench saves and restores the FMU's state; None if it does so with every FMU that can.
     isolated
         As in `open_component`.
     longest_wait
-        Time [s] after which a device that does not stand still is given up.
+        Longest time that the device may take to come to rest [s].
     """
 
     description: FmuDescription
@@ -73,7 +73,7 @@ class Bench:
 
     @contextmanager
     def runs(self) -> Iterator["Runs"]:
-        """Runs from one and the same operating point.
+        """Runs that all begin at the same operating point.
 
         Raises
         ------
@@ -93,9 +93,9 @@ class Runs:
     Attributes
     ----------
     still_after
-        How long the device needed to come to rest [s].
+        Time that the device needed to come to rest [s].
     operating_point
-        Outputs there, shape (p,).
+        Outputs at the operating point, shape (p,).
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -183,7 +183,9 @@ class Runs:
             self._hold(self._rest_index)
 
     def _come_to_rest(self) -> Numbers:
-        """Hold the voltage until nothing moves any more; where the power flow's values hold, that is at once."""
+        """Hold the voltage until no output moves. A device that starts exactly at the power flow's values is at rest at
+        once.
+        """
         bench = self._bench
         second = round(1.0 / bench.step_size)
         while True:

@@ -5,7 +5,7 @@ communication step is fitted to it. All other components are perturbed where the
 always; the box's states in it are those of the fitted model and mean nothing one by one, only together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, find_spectrum
 from orchestrator.analysis.state_access import StateAccess, obstacle
-from orchestrator.analysis.steady_state import OperatingPoint
+from orchestrator.analysis.steady_state import OperatingPoint, what_to_check
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
@@ -30,7 +30,7 @@ STEADY = 1e-6
 """Largest difference of the box's current [pu] at the ideal bus from the power flow's."""
 
 STILL = 1e-9
-"""Largest change of a known component's state in one communication step, as where all components are known."""
+"""Largest change of a known component's state in one communication step; the same limit holds without a black box."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class BoxedSystem:
     component
         The box.
     residual
-        Largest change of a known component's state in one communication step, and of the box's current between what
-        it starts with and what it settles to at the ideal bus.
+        The larger of two changes: of a known component's state in one communication step, and of the box's current from
+        its start to its rest at the ideal bus.
     warnings
-        Why the modes from 0.1 to 2 Hz are in doubt, as far as the other components are the reason.
+        Reasons in the other components for doubts about the modes from 0.1 to 2 Hz.
     """
 
     component: str
@@ -82,7 +82,12 @@ def component_participation(mode: Mode, component: str) -> float:
 
 
 def linearize_with_box(
-    master: Master, component: str, excitation: Excitation | None = None, *, restore: bool | None = None
+    master: Master,
+    component: str,
+    excitation: Excitation | None = None,
+    *,
+    restore: bool | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> BoxedSystem:
     """Identify one component and linearise the coupled system around where the master is.
 
@@ -91,24 +96,26 @@ def linearize_with_box(
     master
         Initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
     component
-        The box; only inputs are set and outputs read.
+        Name of the black box. Only its inputs are set and its outputs read.
     excitation
-        The signals that the box is given; the usual ones where None.
+        Signals that excite the box; the usual signals where None.
     restore
-        Whether the box's state may be saved and restored; None for: if its FMU can.
+        Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
+    report
+        As `measure`.
 
     Raises
     ------
     InputError
         If there is no such component.
     AnalysisError
-        If the operating point is none, or the box cannot be identified there.
+        If the system is not at rest at the operating point, or the box cannot be identified there.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
     require_fitting()
     residual = _check_still(master, [component])
-    response, moved = _respond(master, component, excitation or Excitation(), restore=restore)
+    response, moved = _respond(master, component, excitation or Excitation(), restore=restore, report=report)
     identified = fit(response)
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
@@ -124,14 +131,15 @@ def modes_with_boxes(
     frequency_range: tuple[float, float],
     critical: float | None = None,
     excitation: Excitation | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> ModesResult:
-    """Modes as `modes_of` finds them, but what hides its states is identified; nothing is, where all show theirs.
+    """Modes as `modes_of` finds them; components that hide their states are identified first.
 
     Parameters
     ----------
     prepared, master, frequency_range, critical
         As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
-    excitation
+    excitation, report
         As `linearize_with_box`.
 
     Raises
@@ -146,7 +154,7 @@ def modes_with_boxes(
     residual = _check_still(master, boxes)
     known = {}
     for name in boxes:
-        response, moved = _respond(master, name, excitation or Excitation())
+        response, moved = _respond(master, name, excitation or Excitation(), report=report)
         known[name] = _as_component(name, fit(response))
         residual = max(residual, moved)
     point = OperatingPoint(residual, residual / master.clock.step_size, residual, 0, {})
@@ -154,14 +162,19 @@ def modes_with_boxes(
 
 
 def _respond(
-    master: Master, name: str, excitation: Excitation, *, restore: bool | None = None
+    master: Master,
+    name: str,
+    excitation: Excitation,
+    *,
+    restore: bool | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> tuple[FrequencyResponse, float]:
-    """Measure one component at an ideal bus; how far its current moves there from the power flow's, as well."""
+    """Measure one component at an ideal bus. Also return the difference of its current from the power flow's."""
     exchange, plan = master.exchanges[name], master.system.components[name]
     bench = Bench(
         plan.description,
         plan.parameters,
-        rest=master.y[exchange.sources].copy(),
+        rest=master.arriving(name),
         inputs=exchange.inputs.names,
         outputs=exchange.outputs.names,
         held=plan.inputs,
@@ -169,7 +182,7 @@ def _respond(
         restore=restore,
         isolated=plan.isolated,
     )
-    response = measure(bench, excitation)
+    response = measure(bench, excitation, report)
     moved = float(np.abs(response.operating_point - exchange.outputs.values).max())
     if not moved <= STEADY:
         raise AnalysisError(
@@ -181,7 +194,9 @@ def _respond(
 
 
 def _check_still(master: Master, boxes: Sequence[str]) -> float:
-    """Largest change of a state that is known in one communication step; nothing can be solved for beside a box."""
+    """Largest change of a known state in one communication step. With a black box, no better operating point can be
+    solved for.
+    """
     moves = {name: _movement(master, name) for name in master.components if name not in boxes}
     worst = max(moves, key=lambda name: moves[name], default=None)
     if worst is None:
@@ -189,8 +204,7 @@ def _check_still(master: Master, boxes: Sequence[str]) -> float:
     if not moves[worst] <= STILL:
         raise AnalysisError(
             f"no steady state: from the power flow's start, a communication step changes a state of component "
-            f"{worst!r} by {moves[worst]:.3g}, where {STILL:g} is allowed; check its start values, and that generation "
-            "and load balance at rated frequency"
+            f"{worst!r} by {moves[worst]:.3g}, where {STILL:g} is allowed; {what_to_check(master)}"
         )
     return moves[worst]
 

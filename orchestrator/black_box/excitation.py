@@ -1,4 +1,4 @@
-"""Signals that excite a device, and what their responses say of its frequency response.
+"""Signals that excite a device, and its frequency response from the responses to them.
 
 The device is seen at communication points: u[k] holds over step k, and y[k] is read at its end. Its response is
 M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 0, 0, …
@@ -23,7 +23,7 @@ def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int
 
 
 def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Numbers:
-    """One period of a sum of cosines of equal size, with Schroeder's phases so that it never gets high.
+    """One period of a sum of cosines of equal size. Schroeder's phases keep its peak low.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Number
     period
         Number of steps of one period.
     amplitude
-        Of the sum: its largest magnitude.
+        Largest magnitude of the sum.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Comple
     Parameters
     ----------
     m
-        Shape (n, p), until it has died out.
+        Response, shape (n, p), long enough to have died out.
     """
     total = np.zeros((len(frequencies), m.shape[1]), dtype=complex)
     turn = -2j * np.pi * np.asarray(frequencies)[:, None] * step_size

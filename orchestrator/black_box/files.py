@@ -1,4 +1,4 @@
-"""What an identification leaves behind: the measured response, the fitted model, and a picture of both."""
+"""Files of an identification: the measured response, the fitted model, and a picture of both."""
 
 import json
 from pathlib import Path
@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-import scipy.io
 from matplotlib.figure import Figure
 
 from orchestrator.analysis.linear_model import IDENTIFIED
@@ -14,7 +13,8 @@ from orchestrator.black_box.fitting import IdentifiedModel
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.black_box.passivity import Passivity
 from orchestrator.report.plot_style import STYLE, colour, save_figure
-from orchestrator.results.storage import save_table
+from orchestrator.results.storage import save_matrices, save_table
+from orchestrator.safe_files import write_text
 
 
 def save_identification(
@@ -25,9 +25,9 @@ def save_identification(
     Parameters
     ----------
     response
-        As it was measured.
+        The measured response.
     model
-        As it was fitted.
+        The fitted model.
     passive
         Passivity of the response.
     folder
@@ -39,14 +39,14 @@ def save_identification(
     lists = {key: np.array(list(values), dtype=object).reshape(-1, 1) for key, values in
              (("inputs", model.inputs), ("outputs", model.outputs))}  # fmt: skip
     content = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "step_size": model.step_size}
-    scipy.io.savemat(matrices, content | lists)
-    summary.write_text(json.dumps(identification_json(response, model, passive), indent=1) + "\n", encoding="utf-8")
+    save_matrices(content | lists, matrices)
+    write_text(summary, json.dumps(identification_json(response, model, passive), indent=1) + "\n")
     _plot(response, model, passive, picture)
     return [table, matrices, summary, picture]
 
 
 def identification_json(response: FrequencyResponse, model: IdentifiedModel, passive: Passivity) -> dict[str, Any]:
-    """What was found, in figures."""
+    """The figures of an identification."""
     slowest_first = sorted(model.poles.tolist(), key=abs)
     return {
         "method": response.method,

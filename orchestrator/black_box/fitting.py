@@ -24,14 +24,15 @@ _WANTED = 1e-5
 """Largest relative error of a fit with which no larger one is tried; the measurement's own bound where that is more."""
 
 _MOST_ITERATIONS = 30
-"""Of the pole relocation; one that has not converged by then has more poles than the response has."""
+"""Largest number of iterations of the pole relocation. A fit that has not converged by then has more poles than the
+response."""
 
 _COUNTS = 1e-7
 """A residue's singular value counts from this part of the largest response on."""
 
 
 def require_fitting() -> None:
-    """Refuse, before anything is measured, what cannot be fitted afterwards.
+    """Refuse a measurement whose response cannot be fitted, before the measurement begins.
 
     Raises
     ------
@@ -111,7 +112,7 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     warped = np.tan(np.pi * response.frequencies * H) / (np.pi * H)
     data = response.strictly_proper
     p, m = data.shape[1:]
-    # scikit-rf knows square ports only; what is missing is filled with zeros and left out again.
+    # scikit-rf takes square ports only: missing rows or columns are filled with zeros, and removed from the result.
     ports = max(p, m)
     square = np.zeros((len(warped), ports, ports), dtype=complex)
     square[:, :p, :m] = data

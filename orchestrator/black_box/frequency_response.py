@@ -1,5 +1,6 @@
 """Frequency response of a device on the test bench, by multi-sine or by pulses, each value with a bound."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import chain, repeat
 from math import ceil
@@ -14,14 +15,14 @@ from orchestrator.errors import AnalysisError
 
 METHODS = ("multisine", "pulse")
 _MOST_SECONDS = 400.0
-"""After so long a response must have settled [s]."""
+"""Time after which a response must have settled [s]."""
 
 _APART = 10.0
-"""Periods are compared over at least so long [s]: neighbours that are short always look alike."""
+"""Shortest time between two periods that are compared [s]: short periods in direct succession always look alike."""
 
 _AWAY = 0.1
-"""A periodic response has a mean of zero, and one to a pulse ends at zero, as every excitation does; a device that
-keeps more than this part of the response's size has left its operating point."""
+"""Every excitation has a mean of zero or ends at zero, and the response must do the same. A device whose response keeps
+more than this part of its size has left the operating point."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Excitation:
         ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each
         followed until it has died out.
     lowest_hz, highest_hz, lines
-        Range of frequencies [Hz], and about how many.
+        Range of frequencies [Hz], and approximate number of frequencies.
     amplitude
-        Largest deviation of an input [its unit]; everything is done at half of it as well.
+        Largest deviation of an input [its unit]. Every measurement is repeated with half of it.
     settled
-        Periods, or the rest of a pulse response, may still differ by this part of the largest response.
+        Two successive periods, or the rest of a pulse response, may still differ by this part of the largest response.
     """
 
     method: str = "multisine"
@@ -64,8 +65,8 @@ class FrequencyResponse:
     values
         Shape (f, p, m).
     bounds
-        For every value: how far half the amplitude and the last repetition lead away from it, added up. It is a bound
-        for noise, transients and the leading nonlinearity; shape (f, p, m).
+        Bound of the error of every value, shape (f, p, m): the sum of its differences from the value at half the
+        amplitude and from the last repetition. It covers noise, transients and the leading nonlinearity.
     feedthrough
         Direct effect of inputs on outputs, shape (p, m).
     step_size
@@ -73,7 +74,7 @@ class FrequencyResponse:
     operating_point
         Outputs at rest, shape (p,).
     seconds
-        Time simulated on the bench.
+        Time simulated on the bench [s].
     """
 
     frequencies: Numbers
@@ -99,22 +100,31 @@ class FrequencyResponse:
 
     @property
     def largest_bound(self) -> float:
-        """Of all frequencies, relative to the response there (2-norms)."""
+        """Largest bound of all frequencies, relative to the response at the same frequency (2-norms)."""
         size = np.linalg.norm(self.values, ord=2, axis=(1, 2))
         return float((np.linalg.norm(self.bounds, ord=2, axis=(1, 2)) / size).max())
 
     def continuous(self) -> Complex:
         """The response of the device itself, without the hold: M over (1 − e^(−jωH))/(jωH).
 
-        It leaves out what the hold folds down from above the communication rate, so it is close only well below half
-        of that.
+        Components above half the communication rate appear at lower frequencies; they are ignored. The result is close
+        only well below half the communication rate.
         """
         x = 2j * np.pi * self.frequencies * self.step_size
         return np.asarray(self.values * (x / (1 - np.exp(-x)))[:, None, None])
 
 
-def measure(bench: Bench, excitation: Excitation) -> FrequencyResponse:
+def measure(bench: Bench, excitation: Excitation, report: Callable[[str], None] | None = None) -> FrequencyResponse:
     """Measure a device.
+
+    Parameters
+    ----------
+    bench
+        The device at an ideal bus.
+    excitation
+        What it is excited with.
+    report
+        Called with a sentence before each of the runs, which may take minutes.
 
     Raises
     ------
@@ -133,11 +143,17 @@ def measure(bench: Bench, excitation: Excitation) -> FrequencyResponse:
     values = np.zeros((len(lines), len(bench.outputs), len(bench.inputs)), dtype=complex)
     bounds = np.zeros(values.shape)
     seconds = 0.0
+    told, runs_in_all = report or (lambda text: None), 2 * len(bench.inputs)
+    told(f"{bench.description.path.name}: brought to rest at an ideal bus")
     with bench.runs() as runs:
         direct, operating_point = runs.feedthrough(excitation.amplitude), runs.operating_point
         for column in range(len(bench.inputs)):
-            found = []
+            found: list[tuple[Complex, Numbers]] = []
             for amplitude in (excitation.amplitude, excitation.amplitude / 2):
+                told(
+                    f"{bench.description.path.name}: response to {bench.inputs[column]} from {frequencies[0]:g} to "
+                    f"{frequencies[-1]:.4g} Hz, run {2 * column + len(found) + 1} of {runs_in_all}"
+                )
                 one = _by_pulses if excitation.method == "pulse" else _by_multisine
                 response, uncertainty, time = one(runs, bench, excitation, lines, column, amplitude)
                 found.append((response, uncertainty))
@@ -154,7 +170,7 @@ def measure(bench: Bench, excitation: Excitation) -> FrequencyResponse:
 def _by_multisine(
     runs: Runs, bench: Bench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
 ) -> tuple[Complex, Numbers, float]:
-    """Response at the lines and what two successive periods differ by, each of shape (f, p)."""
+    """Response at the lines, and the difference of two successive periods, each of shape (f, p)."""
     period = round(1 / (e.lowest_hz * bench.step_size))
     if abs(period * e.lowest_hz * bench.step_size - 1) > 1e-9:
         raise AnalysisError(
@@ -184,7 +200,7 @@ def _by_multisine(
 def _by_pulses(
     runs: Runs, bench: Bench, e: Excitation, lines: NDArray[np.int64], column: int, amplitude: float
 ) -> tuple[Complex, Numbers, float]:
-    """The same from a pulse up and a pulse down, so that even parts of the device drop out."""
+    """Response and difference from a pulse up and a pulse down; the even parts of the device cancel."""
     part = round(_APART / bench.step_size)
     silence = np.zeros((part, len(bench.inputs)))
     frequencies: Numbers = np.asarray(lines * e.lowest_hz, dtype=float)
@@ -220,7 +236,7 @@ def _check_returned(bench: Bench, column: int, away: float, size: float) -> None
     Raises
     ------
     AnalysisError
-        If what remains of the response [pu] is too large a part of it.
+        If the rest of the response [pu] is too large a part of it.
     """
     if not away <= _AWAY * size:
         raise AnalysisError(

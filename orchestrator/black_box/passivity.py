@@ -22,9 +22,9 @@ class Passivity:
     index
         Smallest eigenvalue of (Y + Yᴴ)/2 [unit of Y], shape (f,).
     relative
-        The same over the largest singular value of Y: from −1, all it does is deliver, to 1.
+        ``index`` over the largest singular value of Y: from −1, where the device only delivers power, to 1.
     bounds
-        Of the index, from the bounds of Y.
+        Bounds of ``index``, from the bounds of Y.
     """
 
     frequencies: Numbers

@@ -10,21 +10,22 @@ from typing import Any
 from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, file_hash
 from orchestrator.errors import InputError
+from orchestrator.safe_files import write_text
 
 KEPT = "check.json"
-"""The report's name in a certificate's folder."""
+"""Name of the report's file in a certificate's folder."""
 
 
 @dataclass(frozen=True)
 class Acceptance:
-    """What the tests found.
+    """The result of the acceptance tests.
 
     Attributes
     ----------
     faults
-        Names of what is wrong.
+        Names of the faults.
     report
-        All of it, as `gfor check --json` prints it.
+        The whole report, as `gfor check --json` prints it.
     """
 
     trusted: bool
@@ -39,11 +40,11 @@ class Acceptance:
     def keep(self, folder: Path) -> None:
         """Write the report into a certificate's folder."""
         text = json.dumps(self.report, indent=1, ensure_ascii=False)
-        (folder / KEPT).write_text(text + "\n", encoding="utf-8")
+        write_text(folder / KEPT, text + "\n")
 
 
 def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
-    """Run the tests, or take the report that an earlier start left in the folder, and leave one there."""
+    """Run the tests and write the report into the folder; a report of an earlier start is used if it fits."""
     kept = folder / KEPT
     if kept.is_file():
         try:
@@ -61,7 +62,7 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     Raises
     ------
     InputError
-        If it is none, is not of this FMU, binding and version, or does not hold all checks.
+        If the file is not a report, belongs to another FMU, binding or version, or does not hold all checks.
     """
     remedy = "write it with `gfor check FILE.fmu --json`, or leave --check away to have the tests run"
     try:

@@ -1,4 +1,4 @@
-"""The study's case file with a converter in it: everything that a point depends on but its reactance."""
+"""The study's case file with a converter in it. It holds everything that a point depends on, except its reactance."""
 
 import shutil
 import tomllib
@@ -12,14 +12,15 @@ from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.schema import Value
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.safe_files import write_text
 
 BASE = BUILT_IN / "norm631" / "case.toml"
-"""The study, with our converter in it."""
+"""Case file of the study with our converter, from which a certificate's case is made."""
 
 WITHOUT, WITH = "without", "with"
 
 FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"
-"""Files of a certificate's folder."""
+"""Names of files in a certificate's folder."""
 
 _HEAD = """\
 # Damping test of {fmu}{binding}, written by `gfor certify`.
@@ -29,7 +30,8 @@ _HEAD = """\
 
 
 def write_case(request: CertificationRequest, switches: Mapping[str, bool], folder: Path) -> Case:
-    """Write ``case.toml`` into a folder, and lay the FMU and its binding beside it, so that it stands alone.
+    """Write ``case.toml`` into a folder, and copy the FMU and its binding beside it. The folder then needs no other
+    files.
 
     Parameters
     ----------
@@ -49,19 +51,19 @@ def write_case(request: CertificationRequest, switches: Mapping[str, bool], fold
     path = folder / CASE
     behind = f" behind {_in_comment(request.binding)}" if request.binding else ""
     head = _HEAD.format(fmu=_in_comment(request.fmu), binding=behind)
-    path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
+    write_text(path, head + tomli_w.dumps(tables))
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **switches}.items()}
-    _check(load_case(path), request, own)  # here, where a value's place is its option and not a line of this file
+    _check(load_case(path), request, own)  # here an error can name the option that gave a value
     for name, values in ((WITHOUT, request.study_values), (WITH, {**request.study_values, **own})):
         scenario = tables["scenarios"][name]
         if values:
             scenario["set"] = {**scenario.get("set", {}), **values}
-    path.write_text(head + tomli_w.dumps(tables), encoding="utf-8")
+    write_text(path, head + tomli_w.dumps(tables))
     return load_case(path)
 
 
 def _in_comment(file: Path) -> str:
-    """A file's name for a comment of TOML: in quotes and escaped where it has signs that no comment may have."""
+    """A file's name for a comment in TOML: quoted and escaped if it has characters that a comment must not contain."""
     return file.name if file.name.isprintable() else ascii(file.name)
 
 

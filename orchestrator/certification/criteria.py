@@ -15,10 +15,10 @@ from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
 FREQUENCIES = (0.1, 1.5)
-"""Of the modes that are judged [Hz], both ends included."""
+"""Range of frequencies of the judged modes [Hz], both ends included."""
 
 PAIRED = (0.08, 1.875)
-"""A mode in the judged range is compared with none outside of these frequencies [Hz]."""
+"""Range of frequencies in which a judged mode may lie in the other system [Hz]."""
 
 LEAST_DAMPING = 0.05
 """Damping ratio that a judged mode needs."""
@@ -29,7 +29,7 @@ LEAST_AMPLITUDE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class ModeVerdict:
-    """A mode with the converter, and what it was without.
+    """A mode with the converter, and the same mode without the converter.
 
     Attributes
     ----------
@@ -38,10 +38,10 @@ class ModeVerdict:
     before
         Eigenvalue of the same mode without the converter; None where the converter introduces the mode.
     similarity
-        How surely it is the same, from 0 to 1, by the shape over the states that both systems have; where there is
-        none, that of the likeliest which is no other mode's.
+        Similarity of the two modes, from 0 to 1, by their shapes over the states that both systems have. If the
+        converter introduces the mode, the similarity of the best candidate that is not matched with another mode.
     components
-        Who takes part most, in words.
+        The components that take part most, in words.
     """
 
     eigenvalue: complex
@@ -63,7 +63,7 @@ class ModeVerdict:
 
     @property
     def before_percent(self) -> float | None:
-        """Damping of the same mode without the converter [%]; None where there was none."""
+        """Damping of the same mode without the converter [%]; None if there is no such mode."""
         return None if self.before is None else 100 * damping_ratio(self.before)
 
 
@@ -82,7 +82,9 @@ def is_judged(frequency_hz: float) -> bool:
 
 
 def is_near(frequency_hz: float) -> bool:
-    """Whether a judged mode may have been at this frequency without the converter, or come to be there with it."""
+    """Whether a judged mode may have this frequency without the converter, or a mode of this frequency may become a
+    judged one.
+    """
     return PAIRED[0] <= frequency_hz <= PAIRED[1]
 
 
@@ -104,21 +106,21 @@ def eigenvalue_test(having: ModeSet, lacking: ModeSet, components: list[str] | N
         Modes of the system with and without the converter; those a little outside the judged range are useful,
         since a mode may enter it.
     components
-        For each mode of ``having``: who takes part.
+        The components that take part in each mode of ``having``.
     """
     found = [m for m in _matched(having, lacking, components) if is_judged(m.frequency_hz)]
     return sorted(found, key=lambda v: v.damping_percent)
 
 
 def neighbouring_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
-    """Modes outside the judged range as far as they are known, by frequency; none of them is judged."""
+    """Known modes outside the judged range, by frequency. They are listed only, without a judgement."""
     found = [m for m in _matched(having, lacking, components) if not is_judged(m.frequency_hz)]
     reason = "outside the judged range"
     return [replace(m, accepted=True, reason=reason) for m in sorted(found, key=lambda m: m.frequency_hz)]
 
 
 def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) -> Iterator[ModeVerdict]:
-    """Every mode with the converter, beside what it was without."""
+    """Every mode with the converter, with the same mode without it."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
         alike = np.where(_comparable(having, lacking), similarities(having, lacking), 0.0)
@@ -133,7 +135,9 @@ def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) ->
 
 
 def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
-    """Which pairs may be one mode: a judged one is far from none that lies outside of the judged range."""
+    """Mask of the pairs that may be one mode: a judged mode and a mode that is not judged must have near
+    frequencies.
+    """
     judged, near = ([[f(hz) for hz in s.frequencies] for s in (having, lacking)] for f in (is_judged, is_near))
     forbidden = np.logical_and.outer(judged[0], np.logical_not(near[1]))
     forbidden |= np.logical_and.outer(np.logical_not(near[0]), judged[1])
@@ -141,9 +145,9 @@ def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
 
 
 def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
-    """Row → column, each used once, so that the sum of the similarities is largest; none below the threshold.
-
-    With the row's largest alone, one mode without the converter could stand for several with it, and excuse them all.
+    """Column for each row. Each column is used once, the sum of the similarities is largest, and pairs below the
+    threshold are left out. If each row took its largest similarity, one mode without the converter could excuse several
+    modes with it.
     """
     enough = np.where(alike >= THRESHOLD, alike, 0.0)
     rows, columns = scipy.optimize.linear_sum_assignment(enough, maximize=True)
@@ -151,7 +155,7 @@ def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
 
 
 def judge_mode(value: complex, before: complex | None) -> tuple[bool, str]:
-    """Whether a mode with the converter is accepted, given the same one without it, and why."""
+    """Whether a mode with the converter is accepted, judged by the same mode without it, and the reason."""
     percent = 100 * damping_ratio(value)
     limit = 100 * LEAST_DAMPING
     if damping_ratio(value) >= LEAST_DAMPING:
@@ -170,7 +174,8 @@ def stability_fault(
     with_converter: Mapping[str, Any] | None = None,
     without: Mapping[str, Any] | None = None,
 ) -> str | None:
-    """What no range of frequencies excuses: an eigenvalue that grows [1/s] where none grew without the converter.
+    """The fault of a converter that makes the system unstable at any frequency, or whose stability is not known; None
+    without such a fault. A system that was unstable without the converter excuses it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which damping controllers are active: set where the FMU has our variables, else declared by the applicant."""
+"""The active damping controllers: they are set if the FMU has our variables, otherwise the applicant declares them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,13 +28,13 @@ class DampingControllers:
     pod
         One of `PODS`.
     source
-        How that is known, in words.
+        The source of ``pod``, in words.
     settings
-        Values to be set for it, by the FMU's variable.
+        Values to be set for these controllers, by the FMU's variable.
     declared
-        Letters of those, active or not, that only the applicant speaks of.
+        Letters of the controllers, active or not, that only the applicant declares.
     unseen
-        Letters of active ones with a switch and without an output that shows what they do.
+        Letters of active controllers with a switch but without an output that shows their effect.
     """
 
     pod: str
@@ -44,7 +44,7 @@ class DampingControllers:
     unseen: str = ""
 
     def in_words(self) -> str:
-        """For a headline, with what is not known of each."""
+        """The active controllers for a headline, with a note on each one that is not certain."""
         active = self.pod.removeprefix("none")
         if not active:
             return f"without POD{_AS_DECLARED if self.declared else ''}"
@@ -56,12 +56,12 @@ class DampingControllers:
 
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
-    """What a request comes to for an FMU.
+    """The damping controllers that a request sets or declares for an FMU.
 
     Raises
     ------
     InputError
-        If ``--pod`` says otherwise than ``--set`` or the binding.
+        If ``--pod`` contradicts ``--set`` or the binding.
     """
     known = {letter: _state(description, request, letter) for letter in "pq"}
     if request.pod is None:
@@ -99,7 +99,7 @@ def _with_unseen(source: str, unseen: str) -> str:
 
 
 def _partly(known: Mapping[str, bool | None], pod: str) -> str:
-    """How it is known where the FMU does not show both controllers."""
+    """The source of ``pod`` if the FMU does not show both controllers."""
     hidden = [f"POD-{letter.upper()}" for letter, value in known.items() if value is None]
     if len(hidden) == len(known):
         return DECLARED
@@ -124,9 +124,9 @@ def _is_switch(info: VariableInfo | None) -> bool:
 
 
 def _bound(description: FmuDescription, name: str) -> bool | None:
-    """What the binding sets a switch to; None where it does not."""
+    """The value that the binding gives a switch; None if it gives no value."""
     if isinstance(description, BoundDescription):
-        value: Value | None = description.port.settings.get(description.natives.get(name, name))
+        value: Value | None = description.port.settings.get(description.inner_names.get(name, name))
         return None if value is None else bool(value)
     return None
 

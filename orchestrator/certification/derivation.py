@@ -1,4 +1,4 @@
-"""What of a certificate follows from the files beside it and from its own points, derived again."""
+"""Statements of a certificate that follow from its files and its own points, derived again."""
 
 import math
 import tomllib
@@ -21,7 +21,7 @@ from orchestrator.fmi.origin import read_origin
 
 
 def derived_faults(folder: Path, content: dict[str, Any]) -> list[str]:
-    """What does not follow: counts, departures, values, origin of the FMU, sentence, and dampings lowered."""
+    """Statements that do not follow: counts, departures, values, origin of the FMU, sentence, and lowered dampings."""
     faults = list(_of_points(content))
     try:
         request = _request(folder, content)
@@ -77,7 +77,7 @@ def _of_request(request: CertificationRequest, content: dict[str, Any]) -> Itera
 
 
 def _of_case(path: Path, content: dict[str, Any]) -> Iterator[str]:
-    """The case file sets what the certificate says, and nothing else."""
+    """Compare the values of the case file with those of the certificate, in both directions."""
     own = {f"{CONVERTER}.{k}": v for k, v in {**content["values"], **content["pod_values"]}.items()}
     scenarios = tomllib.loads(path.read_text(encoding="utf-8"))["scenarios"]
     base = tomllib.loads(BASE.read_text(encoding="utf-8"))["scenarios"]
@@ -99,7 +99,7 @@ def _of_fmu(request: CertificationRequest, description: FmuDescription, content:
 def _controllers(
     request: CertificationRequest, description: FmuDescription, content: dict[str, Any]
 ) -> DampingControllers | None:
-    """Those that are stated, as they follow with ``--pod`` or without it; None where they follow from neither."""
+    """The stated damping controllers, derived with ``--pod`` or without it; None if they follow from neither."""
     stated = (content["pod"], content["pod_source"], content["pod_values"])
     for given in (None, content["pod"]):
         again = CertificationRequest(request.fmu, request.binding, request.values, given)
@@ -115,7 +115,7 @@ def _controllers(
 def _of_sentence(request: CertificationRequest, description: FmuDescription, content: dict[str, Any]) -> Iterator[str]:
     controllers = _controllers(request, description, content)
     if controllers is None:
-        return  # said already
+        return  # reported above
     verdicts = [
         PointVerdict(p["X_L"], (), None, None, tuple(p["faults"]), unknown=p["unknown"]) for p in content["points"]
     ]

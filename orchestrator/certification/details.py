@@ -1,4 +1,4 @@
-"""For whom, by whom, when and where a test was made, from a file of the user's."""
+"""Details of a test, from a file of the user: client, laboratory, date and place."""
 
 import datetime
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class _Table(Table):
 
 @dataclass(frozen=True)
 class Details:
-    """What a file said; an empty text is a line to be filled in by hand."""
+    """The details of a file. An empty text becomes a line to be filled in by hand."""
 
     number: str = ""
     applicant: str = ""

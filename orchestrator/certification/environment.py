@@ -1,4 +1,4 @@
-"""On what a test was computed: operating system, Python, libraries, and the state of this program."""
+"""The environment of a computation: operating system, Python, libraries, and the state of this program."""
 
 import platform
 import subprocess
@@ -19,7 +19,9 @@ def environment() -> dict[str, str]:
 
 
 def commit() -> str:
-    """Of the checkout that this runs from, with a word on changes that are not in it; else that there is none."""
+    """The commit of the checkout that this program runs from, with a note on uncommitted changes; otherwise a note that
+    there is no checkout.
+    """
     if not (_ROOT / ".git").exists():
         return "none: installed from a package"
     try:

@@ -1,4 +1,4 @@
-"""All that a certificate says, as JSON: the verdicts with their figures, and what is needed to verify them."""
+"""The contents of a certificate as JSON: the verdicts with their figures, and the data that a verification needs."""
 
 import math
 from dataclasses import asdict
@@ -23,7 +23,7 @@ FORMAT = 2
 
 
 def certification_json(c: Certification) -> dict[str, Any]:
-    """All verdicts with their figures, and all that they are of."""
+    """All verdicts with their figures, and the description of the test."""
     return {
         "format": FORMAT,
         "norm": "Norma técnica de supervisión 631 v2.0 (2020), section 5.10",

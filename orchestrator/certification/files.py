@@ -1,4 +1,4 @@
-"""What a damping test leaves behind: the page, the figures as JSON, the responses as NetCDF, and the hashes of all."""
+"""Files of a damping test: the page, the figures as JSON, the responses as NetCDF, and the hashes of all files."""
 
 import hashlib
 import json
@@ -17,6 +17,8 @@ from orchestrator.certification.figures import certification_json
 from orchestrator.certification.report import page
 from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
+from orchestrator.results.storage import save_netcdf
+from orchestrator.safe_files import write_text
 
 HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
 
@@ -25,11 +27,11 @@ def save(certification: Certification, folder: Path, *, pdf: bool = False) -> li
     """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
     html, target = folder / HTML, folder / JSON
     made = datetime.now(UTC).replace(microsecond=0)
-    responses_dataset(certification).to_netcdf(folder / RESPONSES, engine="scipy")
+    save_netcdf(responses_dataset(certification), folder / RESPONSES)
     hashes = _hashes(certification, folder)
     content = {"made": made.isoformat(), **certification_json(certification)}
     stated = hashes | {f"{JSON}, its figures": figures_hash(content)}
-    html.write_text(page(certification, stated, made), encoding="utf-8")
+    write_text(html, page(certification, stated, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
     write_sealed(content, target)
@@ -42,18 +44,22 @@ def _hashes(c: Certification, folder: Path) -> dict[str, str | None]:
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:
-    """Write JSON with a hash of everything else in it."""
+    """Write JSON that contains a hash of all its other contents."""
     text = json.dumps({**content, "seal": seal_of(content)}, indent=1, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def seal_of(content: Mapping[str, Any]) -> str:
-    """SHA-256 of all that a certificate's JSON says; against accidents, since anybody can compute it."""
+    """SHA-256 of the contents of a certificate's JSON. It shows accidental changes only, because anybody can compute
+    it.
+    """
     return _hash_without(content, "seal")
 
 
 def figures_hash(content: Mapping[str, Any]) -> str:
-    """SHA-256 of the same without the hashes of files: the page states it, and so belongs to these figures alone."""
+    """SHA-256 of the contents without the hashes of files. The page states this hash, which ties the page to these
+    figures.
+    """
     return _hash_without(content, "seal", "files")
 
 

@@ -1,4 +1,4 @@
-"""The form of a certificate's JSON: everything that is read of it is there, and of its kind."""
+"""The form of a certificate's JSON: the entries that a verification reads, and their types."""
 
 import json
 from pathlib import Path
@@ -129,12 +129,12 @@ class _Certificate(_Table):
 
 
 def check_form(file: Path, content: dict[str, Any]) -> None:
-    """Refuse a certificate of which something is missing, or of another kind.
+    """Refuse a certificate with a missing entry, or with an entry of another type.
 
     Raises
     ------
     InputError
-        Naming the first such entry, what it holds, and how many others there are.
+        With the first such entry, its value, and the number of further ones.
     """
     remedy = "the certificate is damaged: take the file that `gfor certify` wrote, or make it anew"
     try:

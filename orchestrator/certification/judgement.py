@@ -20,19 +20,19 @@ from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointR
 from orchestrator.certification.swings import SwingTest, slow_part, swing_test
 
 SETTLING = 0.5
-"""From this long after the event [s] the signal is taken for a free response and decomposed into modes."""
+"""Time after the event [s] from which the signal counts as a free response and is decomposed into modes."""
 
 RATED_POWER = 1350.0
-"""What the norm's study has the converter feed in [MW]."""
+"""Active power of the converter in the norm's study [MW]."""
 
 _SAME_POWER = 0.01
-"""Part of it by which the start may differ."""
+"""Largest relative difference of the power at the start."""
 
 _LEAST_MOVEMENT = 1e-6
-"""Of a damping controller's output [pu]: one that moves less does nothing."""
+"""Least movement of an active damping controller's output [pu]."""
 
 LOWERED = 2.0
-"""A damping that the converter lowers by more than this [percentage points] is remarked."""
+"""A mode gets a remark if the converter lowers its damping by more than this [percentage points]."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class TimeVerdict:
     Attributes
     ----------
     other_reading
-        The swings with the first extremum kept.
+        The judgement with the first extremum kept.
     """
 
     signal: str
@@ -58,14 +58,14 @@ class TimeVerdict:
 
 @dataclass(frozen=True)
 class PointVerdict:
-    """Everything the norm says of one reactance.
+    """The judgement of the norm on one reactance.
 
     Attributes
     ----------
     neighbours
-        Modes just outside the judged range; they are listed and not judged.
+        Modes just outside the judged range, which are listed but not judged.
     base_time
-        The criterion on the system without the converter, for comparison; it is not judged.
+        The time-domain criterion on the system without the converter, for comparison only.
     faults
         Why the point is not accepted; empty where it is.
     unknown
@@ -85,7 +85,7 @@ class PointVerdict:
 
     @property
     def judged(self) -> bool:
-        """Whether all that the judgement needs is known."""
+        """Whether all data for the judgement are known."""
         return not self.unknown
 
     @property
@@ -95,19 +95,19 @@ class PointVerdict:
 
     @property
     def eigenvalues_accepted(self) -> bool:
-        """Whether there are modes to judge, and all are damped well enough."""
+        """Whether there are judged modes, and all of them have enough damping."""
         return bool(self.modes) and all(m.accepted for m in self.modes)
 
     @property
     def lowered(self) -> tuple[ModeVerdict, ...]:
-        """Modes, judged or beside, whose damping is lower by more than two points than without the converter."""
+        """Modes, judged or listed, whose damping is more than two points lower than without the converter."""
         every = (*self.modes, *self.neighbours)
         return tuple(
             m for m in every if m.before_percent is not None and m.before_percent - m.damping_percent > LOWERED
         )
 
     def of_base_critical(self) -> str:
-        """What the converter makes of the least damped mode, in words; empty where there was none."""
+        """The effect of the converter on the least damped mode, in words; empty if there was no such mode."""
         if self.base_critical is None:
             return ""
         was = f"the least damped mode without the converter, {_hertz_and_percent(self.base_critical)},"
@@ -165,7 +165,7 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
-    """Why a converter that ran was not in the norm's study, or did not stay in synchronism and come to rest."""
+    """Why a converter that ran does not fit the norm's study, lost synchronism, or did not come to rest."""
     wrong = []
     power = float("nan") if having.power is None else having.power
     if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
@@ -182,7 +182,7 @@ def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
 
 
 def _idle(having: PointResult, pod: str, letter: str) -> str | None:
-    """Why a damping controller is not what it was said to be, by an output as ours; None where that does not show."""
+    """Why an output contradicts the stated damping controllers; None if the outputs do not show them or agree."""
     name = f"{CONVERTER}.delta_{letter}_pod"
     values = having.signals.get(name)
     if values is None:

@@ -1,4 +1,4 @@
-"""What a response shows of synchronism and rest: a converter that slips or swings for ever is not accepted."""
+"""Synchronism and rest in a response: a converter that slips or never stops swinging is not accepted."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -11,10 +11,10 @@ from orchestrator.certification.swings import SLOWEST_PERIOD
 from orchestrator.watch.finding import UNSTABLE
 
 LARGEST_DEVIATION = 2.5
-"""Of the frequency at bus 2 from its start [Hz]; the study moves it by about 0.1 Hz."""
+"""Largest accepted deviation of the frequency at bus 2 from its start [Hz]; the study moves it by about 0.1 Hz."""
 
 LATE_SWING = 0.5
-"""Largest swing in the last third of the record, as a part of that in the first 10 s after the event.
+"""Largest accepted swing in the last third of the record, as a part of the swing in the first 10 s after the event.
 
 A mode of 0.1 Hz with 5 % of damping, the slowest and least damped that the norm accepts, keeps 0.29 in 61 s.
 """
@@ -32,7 +32,7 @@ def motion_faults(
     event_time
         [s]
     findings
-        What the watch saw of the run, as `Finding.as_json` has it.
+        Findings of the watch on the run, in the form of `Finding.as_json`.
     """
     yield from (str(finding["message"]) for finding in findings if finding["kind"] in UNSTABLE)
     frequency = signals.get(FREQUENCY)
@@ -49,7 +49,7 @@ def motion_faults(
 
 
 def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -> Iterator[str]:
-    """A swing, from peak to peak, in the last third after the event, without a straight drift."""
+    """The swing from peak to peak in the last third after the event, after removing a straight drift."""
     begin = float(times[-1]) - (float(times[-1]) - event_time) / 3
     first, last = (times >= event_time) & (times <= event_time + SLOWEST_PERIOD), times >= begin
     if last.sum() < 3 or not first.any() or not np.isfinite(signal).all():

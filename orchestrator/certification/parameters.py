@@ -1,4 +1,4 @@
-"""All parameters of the certified FMU: what its file has, what was used, and who changed it."""
+"""All parameters of the certified FMU: the value of its file, the value used, and the origin of a change."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.description import FmuDescription, VariableInfo
-from orchestrator.fmi.port import START, BoundDescription
+from orchestrator.fmi.port import START, BoundDescription, without_binding
 from orchestrator.fmi.values import Scalar
 
 _FLOW = ("Q_0", "theta_0")
@@ -20,9 +20,9 @@ class ParameterRow:
     Attributes
     ----------
     start, used
-        By the file, and in the study; None where the file has none.
+        Values in the file and in the study; None if the file gives no value.
     changed_by
-        Empty where nobody did.
+        Origin of the change; empty for an unchanged value.
     """
 
     name: str
@@ -35,10 +35,9 @@ class ParameterRow:
 
 def parameter_rows(c: Certification) -> list[ParameterRow]:
     """Parameters, and inputs that are held, in the order of the file."""
-    native = c.description.native if isinstance(c.description, BoundDescription) else c.description
     values = {own: (value, by) for own, value, by in _values(c, c.description)}
     rows = []
-    for info in native.variables.values():
+    for info in without_binding(c.description).variables.values():
         if info.causality == "parameter" or info.name in values:
             start = _start(info)
             used, by = values.get(info.name, (start, ""))
@@ -54,7 +53,7 @@ def _start(info: VariableInfo) -> Scalar | None:
 
 
 def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str, Scalar, str]]:
-    """Own name, value and who gave it, for everything that is not left at its start."""
+    """The FMU's own name, the value and its origin, for every variable that is not left at its start value."""
     bound = description if isinstance(description, BoundDescription) else None
     given = {name.partition(".")[2]: v for name, v in c.values.items() if name.startswith(f"{CONVERTER}.")}
     if bound:
@@ -67,7 +66,7 @@ def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str
                 scale = rating if m.per_rating else 1.0
                 yield m.variable, scale * m.factor * value + m.offset, f"{_by(c, name)}, {name} of the binding"
     for name, passed in given.items():
-        target = bound.natives.get(name) if bound else name
+        target = bound.inner_names.get(name) if bound else name
         if target is not None and not (bound and name in START):
             yield target, passed, _by(c, name)
 

@@ -24,15 +24,15 @@ from orchestrator.study.modes import modes_of, running
 from orchestrator.watch.watch import Watch
 
 COMPUTED = (0.05, 3.0)
-"""Frequencies of the modes that are kept [Hz]: more than is judged, so that a mode is found that enters the range, and
-that those just outside are listed."""
+"""Frequencies of the kept modes [Hz]. The range is wider than the judged one, which shows modes that enter it, and
+lists modes just outside."""
 
 CONVERTER = "converter"
 POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
 
 _SIGNAL = "signal "
-"""Begins the names of signals among a stored point's arrays."""
+"""Beginning of the names of signals among a stored point's arrays."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class CertificatePointTask:
     Attributes
     ----------
     case, fingerprint
-        Path of the case file, and as in a sweep's task.
+        Path of the case file, and its fingerprint as in `SweepPointTask`.
     key
-        Names the point's file: a hash of all that the result depends on.
+        Name of the point's file: a hash of everything that the result depends on.
     black_box
         Identify the converter even if it shows its states.
     """
@@ -66,7 +66,7 @@ class PointResult:
     modes
         From 0.05 to 3 Hz, least damped first.
     components
-        Who takes part in each of them, in words.
+        The components that take part in each mode, in words.
     growth
         Largest real part of any eigenvalue [1/s], zeros left out.
     stability
@@ -74,19 +74,20 @@ class PointResult:
     residual
         Of the steady state.
     identified
-        Order of the model that stands for the converter in the modes; None where its own states do.
+        Order of the identified model that replaces the converter in the modes; None if the converter's own states are
+        used.
     linearised
         How the linear model of every component was found: perturbed, directional, packed or identified.
     fit_errors
-        Of the components that were identified: largest relative difference of model and measured response.
+        Largest relative difference between the fitted model and the measured response, for each identified component.
     power
-        What the converter feeds into its bus at the start, by its current [MW]; None without the converter.
+        Active power of the converter at the start, from its current [MW]; None without the converter.
     signals
-        By name, each of the shape of ``times``.
+        Signals by name, each of the shape of ``times``.
     findings
-        What the watch saw of the run, as `Finding.as_json` has it.
+        Findings of the watch on the run, in the form of `Finding.as_json`.
     failure
-        Why there are no modes, or the response is not whole.
+        Why there are no modes, or why the response is incomplete.
     """
 
     X_L: float
@@ -114,7 +115,7 @@ class PointResult:
 
     @classmethod
     def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
-        """That of a point whose worker died."""
+        """The result of a point whose worker died."""
         return cls(task.X_L, task.scenario, failure=str(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -133,14 +134,14 @@ class PointResult:
             signals = {name.removeprefix(_SIGNAL): arrays.pop(name) for name in recorded}
             modes = None if names is None else ModeSet(**arrays, names=tuple(names))
             header["warnings"] = tuple(header["warnings"])
-            header["findings"]  # a point without them was not watched: it is computed anew
+            header["findings"]  # a stored point without findings was not watched, and is computed again
             return cls(**header, modes=modes, times=times, signals=signals)
         except (KeyError, TypeError, ValueError):
             return None
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
-    """Steady state, modes and response of one point; what fails becomes part of the result.
+    """Steady state, modes and response of one point; a failure becomes part of the result.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def compute_point(task: CertificatePointTask) -> PointResult:
             _compute(case, task, result)
     except CosimError as error:
         result.failure = str(error)
-    except Exception as error:  # whatever a foreign FMU or library does, the other points go on
+    except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
         result.failure = f"{type(error).__name__}: {error}"
     return result
 

@@ -5,12 +5,12 @@ from orchestrator.certification.point import COMPUTED, CONVERTER
 
 
 def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
-    """Modes and response of a point, as commands to be given in the certificate's folder.
+    """Commands for the modes and the response of a point, to be given in the certificate's folder.
 
     Parameters
     ----------
     identified
-        Whether a model identified at its port stands for the converter in the modes.
+        Whether an identified model replaces the converter in the modes.
     """
     which = f"{CASE} --scenario {scenario} --set grid.X_L={X_L!r}"
     low, high = COMPUTED

@@ -15,11 +15,11 @@ from orchestrator.certification.request import missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 
 _SAME = 1e-9
-"""Relative difference of a figure that is derived from others."""
+"""Largest relative difference of a figure from its derivation from other figures."""
 
 
 def rejudge(content: dict[str, Any], responses: xr.Dataset) -> list[str]:
-    """What does not follow from the figures."""
+    """Verdicts that do not follow from the figures."""
     faults = []
     if content["signal"] != watched(content["pod"]):
         faults.append(f"the signal {content['signal']} is not the one that is watched with POD {content['pod']!r}")

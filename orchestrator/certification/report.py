@@ -82,7 +82,7 @@ def _findings(c: Certification) -> str:
 
 
 def _remark(c: Certification) -> Iterator[str]:
-    """That dampings are lowered, and the lowest of them."""
+    """The remark that dampings are lowered, with the lowest of them."""
     lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
     if lowered:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
@@ -131,7 +131,7 @@ def _overview(c: Certification) -> str:
 
 
 def _said(v: PointVerdict) -> str:
-    """The verdict of a point, with a remark where the norm does not ask for this point."""
+    """The verdict of a point, with a remark if the norm does not require this point."""
     beyond = "" if len(missing_reactances([v.X_L])) < len(missing_reactances([])) else ", beyond the norm's"
     return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
 

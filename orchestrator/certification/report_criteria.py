@@ -15,7 +15,7 @@ from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, leg
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
 
 _SHOWN = 30.0
-"""Part of the response that is drawn, from the event on [s]; all of it is judged."""
+"""Length of the drawn part of the response, from the event on [s]. The whole response is judged."""
 
 
 def before(value: complex | None) -> str:
@@ -122,7 +122,7 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
 
 
 def _construction(time: TimeVerdict, last: float) -> Iterator[ChartCurve]:
-    """The norm's lines, as far as they are in the picture."""
+    """The parts of the norm's construction lines that lie in the picture."""
     red = "#a11d1d"
     for s in time.swings.swings:
         if s.after.time <= last and s.number <= 6:

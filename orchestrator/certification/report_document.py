@@ -1,4 +1,6 @@
-"""What makes a certificate a document: for whom, of what exactly, computed on what, and how to check it."""
+"""Parts of a certificate beside the criteria: the client, the FMU, the environment of the computation, and how to check
+it.
+"""
 
 from collections.abc import Mapping
 from html import escape
@@ -19,7 +21,7 @@ from orchestrator.report.html.elements import table
 from orchestrator.report.linearised import exceptions_in_words
 
 _LINE = '<span class="blank"></span>'
-"""To be filled in by hand."""
+"""A line to be filled in by hand."""
 
 Hashes = Mapping[str, str | None]
 
@@ -32,12 +34,12 @@ def details(c: Certification) -> str:
 
 
 def signal_name(signal: str) -> str:
-    """What is watched in time, in words."""
+    """The signal of the time-domain criterion, in words."""
     return "the frequency at bus 2" if signal == FREQUENCY else "SG1's active power"
 
 
 def converter(c: Certification, hashes: Hashes) -> str:
-    """The FMU, what was set of it, and how its modes were found."""
+    """The FMU, its changed values, and how its modes were found."""
     origin = read_origin(c.description.path)
     values = {**c.request.values, **c.controllers.settings, **c.request.study_values}
     given = {
@@ -77,7 +79,7 @@ def _voltage(c: Certification) -> str:
 
 
 def parameters(c: Certification) -> str:
-    """The whole list, with what was changed."""
+    """All parameters of the FMU, with the changed ones marked."""
     rows = [
         [escape(r.name), _text(r.start), f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
          escape(r.unit), escape(r.changed_by or "–"), escape(r.description)] for r in parameter_rows(c)
@@ -94,7 +96,7 @@ def _text(value: Scalar | None) -> str:
 
 
 def binding(c: Certification, hashes: Hashes) -> str:
-    """Its whole text."""
+    """The whole text of the binding."""
     if c.request.binding is None:
         return "<p>None: the FMU has the variables of our port.</p>"
     text = escape(c.request.binding.read_text(encoding="utf-8"))
@@ -102,7 +104,7 @@ def binding(c: Certification, hashes: Hashes) -> str:
 
 
 def acceptance(c: Certification) -> str:
-    """What `gfor check` found."""
+    """The results of `gfor check`."""
     if c.acceptance is None:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}
@@ -117,7 +119,9 @@ def acceptance(c: Certification) -> str:
 
 
 def provenance(c: Certification, hashes: Hashes) -> str:
-    """On what it was computed, hashes, how to compute a point again, and what all this does not prove."""
+    """The environment of the computation, hashes, commands that compute a point again, and the limits of the
+    certificate's proof.
+    """
     machine = table("Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2)
     files = table("SHA-256 of the files beside this page", ["File", "SHA-256"],
                   [[escape(name), str(value)] for name, value in hashes.items()], left=2)  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is to be certified, and how far that is the norm's own test."""
+"""The request for a certificate, and its departures from the norm's own test."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,7 +9,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
-"""X_L of the norm [pu, 100 MVA]."""
+"""Values of X_L in the norm [pu, 100 MVA]."""
 
 PODS = ("none", "p", "q", "pq")
 
@@ -22,7 +22,7 @@ _FIXED = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 
 @dataclass(frozen=True)
 class CertificationRequest:
-    """What is to be certified.
+    """The request for a certificate.
 
     Attributes
     ----------
@@ -31,12 +31,13 @@ class CertificationRequest:
     values
         Values of the converter's own variables, by name.
     pod
-        One of `PODS`: which damping controllers are to be active; None to see it from ``pod_p.enabled``,
+        The active damping controllers, as one of `PODS`; None to read them from ``pod_p.enabled`` and
         ``pod_q.enabled``.
     study_values
         Values of the study's other components, by ``component.variable``.
     black_box
-        Identify the converter for the modes even if it shows its states; one that does not is always identified.
+        Identify the converter for the modes even if it shows its states. A converter that hides them is always
+        identified.
     """
 
     fmu: Path
@@ -48,12 +49,12 @@ class CertificationRequest:
     black_box: bool = False
 
     def check(self) -> None:
-        """Whether there are files, and no value that the norm varies by itself.
+        """Check that the files exist, and that no value is set which the norm itself varies.
 
         Raises
         ------
         InputError
-            Naming what cannot be used.
+            With the file or value that cannot be used.
         """
         for file in (self.fmu, *([self.binding] if self.binding else [])):
             if not file.is_file():
@@ -67,18 +68,18 @@ class CertificationRequest:
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """What was changed of the study itself, so that it is not the norm's."""
+        """Changes of the study itself, by which it departs from the norm."""
         changed = {f"converter.{name}": self.values[name] for name in _FIXED if name in self.values}
         return tuple(f"{name} = {shown(value)}" for name, value in {**self.study_values, **changed}.items())
 
 
 def same_reactance(one: float, other: float) -> bool:
-    """Whether two values [pu] are one."""
+    """Whether two reactances [pu] are equal."""
     return math.isclose(one, other, rel_tol=1e-9)
 
 
 def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
-    """Those of the norm that are not among some."""
+    """Reactances of the norm that are missing among the given ones."""
     values = list(done)
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))
 

@@ -27,7 +27,7 @@ from orchestrator.points.store import PointStore
 
 @dataclass
 class Certification:
-    """The study, done.
+    """The results of the study.
 
     Attributes
     ----------
@@ -38,11 +38,11 @@ class Certification:
     points
         By scenario and X_L.
     stored
-        How many of them an earlier start had left.
+        Number of points that were stored by an earlier start.
     details
-        For whom and by whom the test was made.
+        Details of the test, such as client and laboratory.
     acceptance
-        The result of the FMU's acceptance tests; None where they were not run.
+        The result of the FMU's acceptance tests; None if they were not run.
     """
 
     request: CertificationRequest
@@ -70,7 +70,7 @@ class Certification:
 
     @property
     def fit_errors(self) -> dict[str, float]:
-        """Largest of all points, of the components that were identified."""
+        """Largest fit error over all points, for each identified component."""
         found: dict[str, float] = {}
         for point in self.points.values():
             for component, error in point.fit_errors.items():
@@ -79,7 +79,7 @@ class Certification:
 
     @property
     def signal(self) -> str:
-        """What the time-domain criterion watches."""
+        """The signal that the time-domain criterion judges."""
         return watched(self.pod)
 
     @property
@@ -105,7 +105,7 @@ class Certification:
         return self.acceptance is not None and not self.acceptance.trusted
 
     def sentence(self) -> str:
-        """The result, and where."""
+        """The result as a sentence, with the reactances concerned."""
         subject = f"The converter {self.description.model_name!r} {self.controllers.in_words()}"
         said = {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)
         if self.acceptance is not None and self.refused:
@@ -142,14 +142,14 @@ def certify(
     Parameters
     ----------
     request
-        What is to be certified, and how.
+        The request for the certificate.
     executor
         Where the points are computed.
     folder
-        Takes the study's case file, the FMU and its binding, and every point as soon as it is there: those that are
-        there already are not computed again.
+        Folder for the study's case file, the FMU, its binding, and every point as soon as it is computed. Stored points
+        are not computed again.
     report
-        Is told how many points are done, of how many.
+        Called with the number of points done and the total number.
 
     Raises
     ------
@@ -178,9 +178,9 @@ def certify(
 def _laid_case(
     request: CertificationRequest, controllers: DampingControllers, folder: Path
 ) -> dict[str, PreparedScenario]:
-    """Both scenarios of the study's case, which is written into the folder.
+    """Write the study's case into the folder, and prepare its two scenarios.
 
-    Where the request is refused, what is there already stays as it is.
+    If the request is refused, existing files are kept.
     """
     first = {"grid.X_L": request.reactances[0]}
 
@@ -198,7 +198,9 @@ def _laid_case(
 
 
 def _refused(request: CertificationRequest, error: CaseError, trial: str) -> CaseError:
-    """The same problems, of the user's own files: the case file was made from the request, and is gone."""
+    """The same problems with places in the user's own files, because the case file that was made from the request is
+    deleted.
+    """
     own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
 
     def said(text: str) -> str:
@@ -234,7 +236,7 @@ def _tasks(
     prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
 ) -> list[CertificatePointTask]:
     """One scenario at all reactances."""
-    # The case file names the binding, if there is one: what that says is in the scenario's content, where it matters.
+    # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
     content = {
         "case": BASE.read_text(encoding="utf-8"),
         **scenario_content(prepared),

@@ -1,4 +1,4 @@
-"""The time-domain criterion of the norm: how much of an oscillation is left after four periods.
+"""The time-domain criterion of the norm: the part of an oscillation that is left after four periods.
 
 Maxima P1, P2, … of the signal are joined by straight lines; ΔPkMk is the vertical distance from the minimum Mk between
 Pk and Pk+1 to the line through these two. Accepted is ΔP5M5 < 0.25·ΔP1M1. For a single mode that asks for 5.5 %
@@ -13,7 +13,7 @@ import scipy.signal
 from orchestrator.arrays import Numbers
 
 LARGEST_RATIO = 0.25
-"""ΔP5M5 over ΔP1M1 must be less."""
+"""ΔP5M5 over ΔP1M1 must be less than this."""
 
 JUDGED_SWING = 5
 
@@ -21,7 +21,8 @@ RESOLUTION = 1e-3
 """A turn of the signal counts if it moves back by more than this part of the signal's whole range after the event."""
 
 SLOWEST_PERIOD = 10.0
-"""Of the modes that the norm judges [s]: without a turn for so long, no such mode is left above the resolution."""
+"""Longest period of a judged mode [s]. If the signal does not turn for this time, no judged mode is left above the
+resolution."""
 
 
 FASTEST = 5.0
@@ -65,13 +66,13 @@ class SwingTest:
     Attributes
     ----------
     dropped
-        The first extremum, towards which the oscillation starts; None where nothing was dropped.
+        The first extremum, towards which the oscillation starts; None if no extremum was dropped.
     swings
-        As many as the record holds.
+        All swings that the record holds.
     ratio
-        ΔP5M5/ΔP1M1; 0 where the oscillation has died out before, None where the record cannot tell.
+        ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
     reason
-        Of the verdict, in words.
+        Reason of the verdict, in words.
     """
 
     dropped: Extremum | None
@@ -82,10 +83,10 @@ class SwingTest:
 
 
 def slow_part(times: Numbers, signal: Numbers) -> Numbers:
-    """The signal without what is faster than `FASTEST`, such as the ripple of a network resonance.
+    """The signal without parts faster than `FASTEST`, such as the ripple of a network resonance.
 
-    A Butterworth filter of order 4, forth and back, so that nothing is shifted in time and the judged modes keep
-    their size to 0.1 %.
+    A Butterworth filter of order 4 runs over the signal forwards and backwards. It causes no delay, and the judged
+    modes keep their size to 0.1 %.
     """
     if not np.isfinite(signal).all():
         return signal

@@ -1,4 +1,4 @@
-"""What the report says of the study, of how the norm was read, and of what a certificate proves."""
+"""Texts of the report on the study, on the reading of the norm, and on the proof that a certificate gives."""
 
 from collections.abc import Iterable, Sequence
 
@@ -57,7 +57,7 @@ voltage of a bus without capacitance would not be determined. With 5 ms no dampi
 
 
 def reading(pod: str) -> str:
-    """Rules as they were applied, with what had to be decided."""
+    """The rules as they were applied, with the decisions where the norm leaves a choice."""
     return _READING.format(watched=_BY_FREQUENCY if "p" in pod.removeprefix("none") else _BY_POWER)
 
 
@@ -68,12 +68,12 @@ and that its points come out again from the FMU.</p>"""
 
 
 def count(missing: Sequence[float]) -> str:
-    """How many of the norm's reactances were judged."""
+    """A phrase with the number of the norm's reactances that were judged."""
     return f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}"
 
 
 def converter_model(points: Iterable[PointResult]) -> str:
-    """What stands for the converter in the modes: its own states, a model inside its FMU, or one that was fitted."""
+    """The converter's model in the modes: its own states, a model inside its FMU, or a fitted model."""
     known = [p for p in points if p.modes is not None]
     boxes = [p for p in known if p.identified is not None]
     if boxes:

@@ -9,19 +9,19 @@ PASSES, FAILS, INCOMPLETE = "passes", "fails", "incomplete"
 EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
 
 NOT_TRUSTED = 4
-"""Exit code where the damping test is passed, and an acceptance test of the FMU failed."""
+"""Exit code if the damping test is passed but an acceptance test of the FMU failed."""
 
 DOES_NOT_HOLD = 5
-"""Exit code of a certificate whose verdict counts for nothing, as something in it does not agree."""
+"""Exit code for a certificate with a contradiction, whose verdict is worthless."""
 
 
 def exit_code(verdict: str, *, refused: bool) -> int:
-    """Of a verdict; ``refused`` where an acceptance test failed."""
+    """The exit code of a verdict; ``refused`` says that an acceptance test failed."""
     return NOT_TRUSTED if verdict == PASSES and refused else EXIT_CODES[verdict]
 
 
 def incomplete_because(missing: Sequence[float], departures: Sequence[str]) -> str:
-    """What the norm asks for and was not done; empty where all of it was."""
+    """The parts of the norm's test that were not done; empty if the test is complete."""
     reasons = []
     if missing:
         done = len(REACTANCES) - len(missing)

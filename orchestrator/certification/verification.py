@@ -27,24 +27,26 @@ from orchestrator.points.executor import Executor, WorkerLostError
 from orchestrator.points.key import fingerprint, key_of, reference_to
 
 TOLERANCE = 1e-5
-"""Of an eigenvalue by its size, and of a signal by its range: other processors round otherwise."""
+"""Largest difference of a recomputed eigenvalue relative to its size, and of a signal relative to its range. Different
+processors round differently."""
 
 TOLERANCE_IDENTIFIED = 1e-3
-"""Of an eigenvalue of a system with an identified model in it, whose fit makes more of rounding."""
+"""Largest relative difference of an eigenvalue if the system contains an identified model, whose fit amplifies
+rounding."""
 
 _NEEDED = (FMU, CASE, RESPONSES, HTML)
 
 
 @dataclass
 class Verification:
-    """What was found.
+    """The result of a verification.
 
     Attributes
     ----------
     faults
-        What does not agree, in words; empty where everything does.
+        Contradictions, in words; empty if everything agrees.
     agreed
-        What does.
+        Statements that agree, in words.
     """
 
     faults: list[str] = field(default_factory=list)
@@ -62,7 +64,7 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
     Raises
     ------
     InputError
-        If there is none, or it is of a form that this program does not know.
+        If there is no certificate, or this program does not know its form.
     """
     file = path / JSON if path.is_dir() else path
     try:
@@ -102,7 +104,7 @@ def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
 
 
 def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> None:
-    """The page states the hash of the figures that it shows, and the verdict's sentence as it is."""
+    """Check that the page states the hash of its figures and the unchanged sentence of the verdict."""
     if not page.is_file():
         return
     text = page.read_text(encoding="utf-8", errors="replace")
@@ -152,7 +154,7 @@ def chosen_points(content: dict[str, Any], wanted: Sequence[float]) -> list[dict
     Raises
     ------
     InputError
-        If it has none at one of them.
+        If the certificate has no point at one of the reactances.
     """
     chosen = []
     for X_L in wanted:
@@ -178,13 +180,13 @@ def verify_points(
     folder
         Of the certificate.
     content
-        What the certificate's JSON file says.
+        Contents of the certificate's JSON file.
     points
-        Those of its points that are to be computed.
+        Points of the certificate to compute again.
     executor
         Where they are computed.
     report
-        Is told how many computations are done, of how many: two for each point.
+        Called with the number of computations done and their total, two for each point.
     """
     found = Verification()
     case = load_case(folder / CASE)
@@ -222,7 +224,9 @@ def _compare_point(
 
 
 def _differ_figures(point: dict[str, Any], scenario: str, again: PointResult, tolerance: float) -> Iterator[str]:
-    """Stability at all frequencies, the power fed in, and the model that stood for the converter."""
+    """Differences in stability at all frequencies, in the power fed in, and in the model that replaces the
+    converter.
+    """
     stated, growth = point["growth"][scenario], again.growth
     known = np.nan if stated is None else float(stated)
     if not (np.isnan(known) and np.isnan(growth)) and not abs(known - growth) <= tolerance * max(1.0, abs(growth)):
@@ -245,7 +249,7 @@ def _stated_modes(point: dict[str, Any], scenario: str) -> list[dict[str, Any]]:
 
 
 def _differ_modes(stated: list[complex], again: list[complex], tolerance: float) -> tuple[str, str]:
-    """A fault, else what to say of the difference."""
+    """A fault, or otherwise a sentence on the difference."""
     if len(stated) != len(again):
         return f"{len(again)} come out and {len(stated)} were certified", ""
     pairs = zip(_sorted(stated), _sorted(again), strict=True)

@@ -1,12 +1,15 @@
-"""A running system whose POD controllers can be set, and linearised with any setting.
+"""A running system that is linearised with any setting of its POD controllers.
 
 Gain and lead/lag are tunable and the controllers' signals are zero in steady state, so the operating point is the same
 for every setting: only the converters need be linearised again, and the rest of the system is kept.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from orchestrator.analysis.continuation import Eigenpair, follow_along
 from orchestrator.analysis.examination import Examination, examine
@@ -16,7 +19,9 @@ from orchestrator.analysis.modes import damping_ratio
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.pod_design.lead_lag import LeadLag
+from orchestrator.pod_design.kept import KeptFigures, digest
+from orchestrator.pod_design.lead_lag import NO_COMPENSATION, LeadLag
+from orchestrator.points.store import Arrays
 
 _TUNED = ("enabled", "K", "T_S1", "T_S2")
 
@@ -31,7 +36,7 @@ class PodSetting:
 
 @dataclass(frozen=True)
 class Placed:
-    """A setting and the target mode that it gives."""
+    """A setting, and the target mode with this setting."""
 
     setting: PodSetting
     pair: Eigenpair
@@ -48,7 +53,7 @@ class Placed:
 
 
 class PodLoop:
-    """Sets one controller of some components alike, and linearises.
+    """Gives one controller of several components a common setting, and linearises the system.
 
     Parameters
     ----------
@@ -58,6 +63,8 @@ class PodLoop:
         Names of the components that have the controller.
     controller
         ``pod_p`` or ``pod_q``.
+    kept
+        Figures that an earlier start of the same design has left.
 
     Raises
     ------
@@ -65,23 +72,27 @@ class PodLoop:
         If a controller's parameters cannot be changed while its FMU runs.
     """
 
-    def __init__(self, master: Master, components: Sequence[str], controller: str) -> None:
+    def __init__(
+        self, master: Master, components: Sequence[str], controller: str, kept: KeptFigures | None = None
+    ) -> None:
+        self._kept = kept or KeptFigures()
         self._master, self._components, self._controller = master, tuple(components), controller
         for name in components:
             _check_tunable(name, master.components[name].description, controller)
-        self._apply(PodSetting(0.0, LeadLag(0.0, 0.0, 0)))
+        off = PodSetting(0.0, NO_COMPENSATION)
+        self._apply(off)
         self._blocks = Blocks(master)
         self._off = compose(self._blocks, master.schedule)
+        self._latest: tuple[PodSetting, LinearModel] | None = (off, self._off)
 
     def model(self, setting: PodSetting) -> LinearModel:
         """The linear model of the whole system with this setting."""
         if setting.gain == 0:
             return self._off
-        self._linearize_converters(self._blocks, setting)
-        return compose(self._blocks, self._master.schedule)
+        return self._model(setting)
 
     def examine(self, setting: PodSetting) -> Examination:
-        """The verdict on the whole system with this setting, at any frequency, and what is to be said beside it.
+        """The verdict on the whole system with this setting, at any frequency, with its warnings.
 
         Raises
         ------
@@ -89,12 +100,22 @@ class PodLoop:
             If the communication step is so long that a slow mode is lost.
         """
         system = where_given(lambda: self._continuous_model(setting))
-        self._linearize_converters(self._blocks, setting)
-        model = compose(self._blocks, self._master.schedule)
+        model = self._model(setting)
         return examine(self._master, self._blocks, model, system)
 
+    def _model(self, setting: PodSetting) -> LinearModel:
+        """The step map with this setting, composed of the blocks; linearised once where it is asked for in a row."""
+        if self._latest is not None and self._latest[0] == setting:
+            self._apply(setting)
+            return self._latest[1]
+        self._latest = None  # until the blocks are whole again
+        self._linearize_converters(self._blocks, setting)
+        model = compose(self._blocks, self._master.schedule)
+        self._latest = setting, model
+        return model
+
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
-        """The same without any communication step, with half the gain and with the gain; it is linear in the gain.
+        """The continuous models with half the gain and with the gain. The state matrix is linear in the gain.
 
         Raises
         ------
@@ -122,9 +143,9 @@ class PodLoop:
         Parameters
         ----------
         start
-            Where the mode is known. It must have the same lead/lag, or a gain of 0.
+            A setting with its known mode. It must have the same lead/lag, or a gain of 0.
         filters
-            By default those of the start.
+            The lead/lag at the new gain; by default that of ``start``.
 
         Raises
         ------
@@ -136,16 +157,40 @@ class PodLoop:
             raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
         if gain == start.setting.gain:
             return Placed(setting, start.pair)
+        what = {"from": astuple(start.setting), "pair": _digest_of(start.pair), "to": astuple(setting)}
+        found = self.figures("place", what, lambda: self._followed(start, setting))
+        return Placed(setting, Eigenpair(complex(found["eigenvalue"]), found["left"], found["right"]))
+
+    def _followed(self, start: Placed, setting: PodSetting) -> Arrays:
         pair = follow_along(
             start.pair, lambda value: self.model(replace(setting, gain=value)), start.setting.gain, setting.gain
         )
-        return Placed(setting, pair)
+        return {"eigenvalue": np.array(pair.eigenvalue), "left": pair.left, "right": pair.right}
+
+    def figures(self, kind: str, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
+        """Figures of this loop, from the disk where an earlier start of the same design has left them.
+
+        Parameters
+        ----------
+        kind
+            What they are.
+        what
+            What they depend on.
+        compute
+            Gives them.
+        """
+        own = {"kind": kind, "components": self._components, "controller": self._controller}
+        return self._kept.get({**own, **what}, compute)
 
     def _apply(self, setting: PodSetting) -> None:
         values = {"enabled": setting.gain != 0, "K": setting.gain, "T_S1": setting.filters.T_S1,
                   "T_S2": setting.filters.T_S2}  # fmt: skip
         for name in self._components:
             self._master.components[name].set({f"{self._controller}.{key}": value for key, value in values.items()})
+
+
+def _digest_of(pair: Eigenpair) -> str:
+    return digest(np.array(pair.eigenvalue), pair.left, pair.right)
 
 
 def _check_tunable(name: str, description: FmuDescription, controller: str) -> None:

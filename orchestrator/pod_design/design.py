@@ -20,6 +20,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
+from orchestrator.pod_design.kept import figures_of
 from orchestrator.pod_design.lead_lag import (
     NO_COMPENSATION,
     LeadLag,
@@ -33,18 +34,19 @@ from orchestrator.pod_design.lead_lag import (
 from orchestrator.pod_design.margins import Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine
 from orchestrator.pod_design.target import Target, check_range, find_target, mode_name
+from orchestrator.points.store import PointStore
 from orchestrator.study.modes import named_modes, running
 
 StageReport = Callable[[str], None]
 
 _OFF = PodSetting(0.0, NO_COMPENSATION)
 
-_MET = 5e-4  # a damping ratio that falls short by less counts as met: 0.05 points
+_MET = 5e-4  # a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
 
 
 @dataclass(frozen=True)
 class DesignRequest:
-    """What is asked for.
+    """The requirements of a design.
 
     Attributes
     ----------
@@ -57,7 +59,7 @@ class DesignRequest:
     compensated_gain
         Compute the gain from the sensitivity with the lead/lag in place, instead of the one without it.
     least_damping
-        Damping ratio below which no other mode may be pushed.
+        The design may not push the damping ratio of any other mode below this value.
     """
 
     controller: str
@@ -99,11 +101,11 @@ class PodDesign:
     filters, gain, designed
         By the paper's equations, and the closed loop with them.
     final
-        The closed loop with the final setting: the refined one, else the same.
+        The closed loop with the final setting: the refined setting, or ``designed`` without refinement.
     before, after
         The other modes without the controller, and with the final setting.
     broken
-        What the final setting does to other modes that it must not.
+        The prohibited effect of the final setting on other modes; empty if there is no such effect.
     examined_before, examined
         The verdict over the whole spectrum without the controller and with the final setting, and what it rests on.
     """
@@ -148,7 +150,7 @@ class PodDesign:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be said beside the verdicts, each once."""
+        """Warnings that belong to the verdicts, each once."""
         return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
 
     @property
@@ -168,7 +170,7 @@ class PodDesign:
 
     @property
     def worst_other(self) -> Mode | None:
-        """The least damped mode with the final setting but the one that counts as the target."""
+        """The least damped mode with the final setting, leaving out the mode that counts as the target."""
         return self.after.worst_beside(self.final.eigenvalue)
 
     @property
@@ -184,13 +186,22 @@ class PodDesign:
         return "lower" if self.gain > self.unbounded_gain else "upper"
 
 
-def design_pod(case: Case, request: DesignRequest, report: StageReport = lambda text: None) -> PodDesign:
+def design_pod(
+    case: Case,
+    request: DesignRequest,
+    report: StageReport = lambda text: None,
+    store: PointStore | None = None,
+) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
     Parameters
     ----------
+    case, request
+        Of what, and what is asked for.
     report
-        Told what is being computed.
+        Called with the name of each stage when the stage begins.
+    store
+        Keeps figures on the way as soon as they are there; those that are there already are not computed again.
 
     Raises
     ------
@@ -224,7 +235,7 @@ def design_pod(case: Case, request: DesignRequest, report: StageReport = lambda 
     with running(prepared) as master:
         report("operating point")
         find_operating_point(master)
-        loop = PodLoop(master, target.components, request.controller)
+        loop = PodLoop(master, target.components, request.controller, figures_of(prepared, store))
         report("modes without the controller")
         examined = loop.examine(_OFF)
         with _with_stability(examined.stability):
@@ -245,7 +256,7 @@ def design_pod(case: Case, request: DesignRequest, report: StageReport = lambda 
 
 @contextmanager
 def _with_stability(stability: Stability) -> Iterator[None]:
-    """An error that ends a design says as well that the system is unstable without the controller, where it is."""
+    """Add to an error that ends a design that the system is unstable without the controller, if it is."""
     try:
         yield
     except (InputError, AnalysisError) as error:
@@ -256,7 +267,7 @@ def _with_stability(stability: Stability) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Start:
-    """What is there before the design begins."""
+    """The scenario, the operating point and the modes before the design begins."""
 
     case: str
     request: DesignRequest
@@ -333,7 +344,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
 
 
 def _unstable(stability: Stability) -> str | None:
-    """What is wrong with a design after which the system is not known to be stable, at whatever frequency."""
+    """The fault of a design with which the system is not known to be stable at all frequencies; None if it is."""
     if stability.stable:
         return None
     subject = "the system is" if stability.stable is False else "whether the system is stable is"
@@ -341,7 +352,7 @@ def _unstable(stability: Stability) -> str | None:
 
 
 def _required(request: DesignRequest, initial: complex) -> float:
-    """ζ_d, checked against what is there already."""
+    """ζ_d, checked against the damping ratio without the controller."""
     present = damping_ratio(initial)
     required = request.damping if request.damping is not None else present + request.damping_increment
     if required <= present:

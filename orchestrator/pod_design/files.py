@@ -88,7 +88,7 @@ def provenance(d: PodDesign, command: str) -> list[str]:
 
 
 def _rounded(value: float) -> float:
-    """Eight significant digits: far beyond what a setting can mean, and legible."""
+    """A number with eight significant digits: legible, and far more precise than any controller's setting."""
     return float(f"{value:.8g}")
 
 

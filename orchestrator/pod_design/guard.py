@@ -1,4 +1,4 @@
-"""What a POD setting does to all the other modes."""
+"""The effect of a POD setting on all other modes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +13,11 @@ from orchestrator.arrays import Vector
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
 
 _SAME = 1e-5
-"""Eigenvalues nearer to each other, relative to their size, are the same one, computed in two ways."""
+"""Two eigenvalues that differ by less than this part of their size are one eigenvalue, computed in two ways."""
 
 _EQUAL = 1e-3
-"""Damping ratios that differ by less count as equal, and growth rates that differ by less than this part of them."""
+"""Damping ratios that differ by less than this count as equal, and growth rates that differ by less than this part of
+their size."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class Surroundings:
     growth
         Real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows.
     named
-        The mode that the case's own rule gives the target's name; normally the target itself.
+        The mode to which the case's rule gives the target's name; normally the target itself.
     followed
-        The target that was followed; None where it is outside of 0.1 to 2 Hz or none was.
+        The target, as it was followed; None if it lies outside of 0.1 to 2 Hz or was not followed.
     """
 
     others: tuple[Mode, ...]
@@ -42,7 +43,7 @@ class Surroundings:
 
     @property
     def other_named(self) -> Mode | None:
-        """The mode of the target's name, where that is not the mode that was followed."""
+        """The mode with the target's name, if it differs from the mode that was followed."""
         return self.named if any(self.named is mode for mode in self.others) else None
 
     @property
@@ -56,19 +57,19 @@ class Surroundings:
         return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":
-        """The same, with a mode taken out of the others."""
+        """The same surroundings without one of the other modes."""
         return replace(self, others=tuple(m for m in self.others if m is not mode))
 
     def counting(self, target: complex) -> complex:
-        """The target [rad/s], or the mode that now bears its name where that has less damping.
+        """The less damped of two modes [rad/s]: the target, and the mode that now has the target's name.
 
-        A strong controller can make two modes trade places; then neither may be called the target alone.
+        A strong controller can make two modes trade places. Then the less damped of both counts as the target.
         """
         candidates = [target, *([self.other_named.eigenvalue] if self.other_named else [])]
         return min(candidates, key=damping_ratio)
 
     def worst_beside(self, target: complex) -> Mode | None:
-        """The least damped mode but the one that counts where ``target`` [rad/s] was followed; see `counting`."""
+        """The least damped mode, leaving out the mode that counts as ``target`` [rad/s]; see `counting`."""
         rest = self.others
         if self.other_named is not None and self.counting(target) == self.other_named.eigenvalue:
             followed = () if self.followed is None else (self.followed,)
@@ -81,7 +82,7 @@ class Surroundings:
 
 
 def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
-    """Everything but the mode at ``target`` [rad/s]; ``naming`` finds the mode that bears the target's name."""
+    """All modes except the one at ``target`` [rad/s]; ``naming`` finds the mode with the target's name."""
     spectrum = find_spectrum(model, *ELECTROMECHANICAL_HZ)
     others, followed = tuple(spectrum.modes), None
     if target is not None:
@@ -92,7 +93,9 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
-    """What a design does that it must not: make unstable, or push a mode below the least damping that was above it."""
+    """The prohibited effect of a design: the system becomes unstable, or a mode falls below the least damping that was
+    above it.
+    """
     if after.is_unstable and after.growth > (1 + _EQUAL) * before.growth:
         return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
     worst = after.worst
@@ -108,7 +111,9 @@ def breach(before: Surroundings, after: Surroundings, least: float) -> str | Non
 
 
 def extremes(model: LinearModel) -> tuple[complex, complex | None]:
-    """The eigenvalue [rad/s] of least damping from 0.1 to 2 Hz (−1 where there is none), and that which grows most."""
+    """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
+    [rad/s].
+    """
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
     weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
     return weakest, fastest_growth(values, step_map=model.step_size is not None)
@@ -120,7 +125,7 @@ def is_unstable(model: LinearModel) -> bool:
 
 
 def guarded(values: Vector) -> Vector:
-    """Those of some eigenvalues [rad/s] that are in the guarded range."""
+    """The eigenvalues [rad/s] in the guarded range of frequencies."""
     hertz = values.imag / (2 * np.pi)
     low, high = ELECTROMECHANICAL_HZ
     return np.asarray(values[(hertz >= low) & (hertz <= high)])

@@ -1,7 +1,7 @@
 """Equations of the POD design by eigenvalue sensitivity (the paper's section on the design of POD controllers).
 
-Pure functions on complex numbers; what they are given comes from linearisations of the coupled system. Eigenvalues
-are in rad/s with a positive imaginary part, gains in pu of the converter's rating.
+Pure functions on complex numbers; their arguments come from linearisations of the coupled system. Eigenvalues are in
+rad/s with a positive imaginary part, gains in pu of the converter's rating.
 """
 
 import cmath
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from orchestrator.errors import AnalysisError
 
 LARGEST_STAGE_ANGLE = 60.0
-"""What one lead/lag stage is customarily asked for at most [°]; beyond it a_j grows out of proportion."""
+"""Usual limit for the angle of one lead/lag stage [°]; beyond this angle a_j grows out of proportion."""
 
 LARGEST_TURN = 85.0
-"""What one lead/lag stage is asked for at all [°], to either side."""
+"""Absolute limit for the angle of one lead/lag stage, to either side [°]."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class LeadLag:
 
     @property
     def is_lead(self) -> bool:
-        """Whether it advances the phase."""
+        """Whether the lead/lag advances the phase."""
         return self.T_S1 > self.T_S2
 
     @property
@@ -57,7 +57,7 @@ NO_COMPENSATION = LeadLag(0.0, 0.0, 0)
 
 
 def predicted_mode(required_damping: float, initial: complex) -> complex:
-    """λ_d = −ζ_d·ω_0 + jω_0: the mode that is aimed at, its frequency unchanged."""
+    """λ_d = −ζ_d·ω_0 + jω_0: the mode that the design aims at, with unchanged frequency."""
     return complex(-required_damping * initial.imag, initial.imag)
 
 
@@ -107,7 +107,7 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     Raises
     ------
     AnalysisError
-        If a stage would have to turn by 90° or more, which none can.
+        If a stage would have to turn by 90° or more, which is impossible.
     """
     if stages == 0:
         return NO_COMPENSATION
@@ -141,7 +141,7 @@ def bounded(gain: float, bounds: tuple[float, float]) -> float:
 
 
 def local_non_compensated(compensated: complex, mode: complex, filters: LeadLag) -> complex:
-    """The sensitivity that would be there without the lead/lag, from that with it.
+    """The sensitivity without the lead/lag, computed from the sensitivity with it.
 
     At a mode s = λ the residue is multiplied by the compensation's transfer function at λ; dividing by it is exact for
     a gain of 0, and at a present gain tells by how much the compensation is to be turned.

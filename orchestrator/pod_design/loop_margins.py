@@ -19,7 +19,7 @@ from orchestrator.arrays import Matrix, Vector
 from orchestrator.errors import AnalysisError
 
 _FREQUENCIES = (0.01, 500.0)
-"""Where the loop is looked at [Hz]."""
+"""Range of frequencies in which the loop is examined [Hz]."""
 _POINTS_PER_DECADE = 150
 _NEGLIGIBLE = 1e-8
 """Singular values of A(K₂) − A(K₁) below this, relative to the largest, are rounding of the linearisation."""
@@ -27,18 +27,19 @@ _NEGLIGIBLE = 1e-8
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """How much can go wrong in a loop before it is unstable.
+    """Least changes of a loop that make it unstable, and its largest sensitivity.
 
     Attributes
     ----------
     phase_deg
-        Least phase shift [°], to either side, that makes the loop unstable; None where no gain around the loop is 1.
+        Least phase shift [°], to either side, that makes the loop unstable; None if the gain around the loop is 1 at no
+        frequency.
     phase_hz
-        Frequency at which it does [Hz].
+        Frequency of the oscillation that this phase shift sustains [Hz].
     delay
-        Least delay that does [s]; None likewise.
+        Least delay that makes the loop unstable [s]; None as for ``phase_deg``.
     delay_hz
-        Frequency at which it does [Hz].
+        Frequency of the oscillation that this delay sustains [Hz].
     peak
         Largest sensitivity 1/|1 + L|: 1 without feedback, above 2 is commonly held to be little robust.
     peak_hz

@@ -1,7 +1,9 @@
-"""How far a POD setting is from trouble: margins of its loop, and what small errors of its values do to the target."""
+"""Robustness of a POD setting: margins of its loop, and the effect of small errors in its values on the target."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
@@ -9,6 +11,7 @@ from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import extremes
 from orchestrator.pod_design.lead_lag import LeadLag
 from orchestrator.pod_design.loop_margins import LoopMargins, loop_margins
+from orchestrator.points.store import Arrays
 
 _STRIDE = 2**0.5
 _REACH = 8.0
@@ -27,12 +30,13 @@ class Margins:
     limit
         Damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost.
     lost_up, lost_down
-        The eigenvalue [rad/s] that is lost at the edge.
+        The eigenvalue [rad/s] that is lost just beyond ``up`` or ``down``.
     up, down
         Factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that
         happens neither up to ``reach`` (up) nor down to a gain of 0 (down).
     loop
-        Of the loop that is broken where the gain acts, in all components at once; None where ``no_loop`` says why.
+        Phase and delay margin of the loop, broken where the gain acts in all components at once. None if there is no
+        such margin; ``no_loop`` says why.
     variations
         Damping ratio of the target by name of the variation, such as ``T_S1 +20 %``; None where it cannot be followed.
     """
@@ -62,12 +66,12 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
     least
         Least damping ratio; the limit is lower where a mode is already below it.
     """
-    weakest, fastest = extremes(loop.model(nominal.setting))
+    weakest, fastest = _extremes(loop, nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
     def lost(factor: float) -> complex | None:
         setting = replace(nominal.setting, gain=nominal.setting.gain * factor)
-        weakest, fastest = extremes(loop.model(setting))
+        weakest, fastest = _extremes(loop, setting)
         if fastest and fastest.real > growth:
             return fastest
         return weakest if damping_ratio(weakest) < limit - 1e-9 else None
@@ -75,6 +79,17 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
     found, why = _of_loop(loop, nominal.setting)
     return Margins(limit, up, down, lost_up, lost_down, found, why, _variations(loop, off, nominal.setting))
+
+
+def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:
+    """See `extremes`."""
+
+    def computed() -> Arrays:
+        weakest, fastest = extremes(loop.model(setting))
+        return {"weakest": np.array(weakest), "fastest": np.array([] if fastest is None else [fastest], dtype=complex)}
+
+    found = loop.figures("extremes", {"setting": astuple(setting)}, computed)
+    return complex(found["weakest"]), next(iter(found["fastest"].tolist()), None)
 
 
 def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, str]:
@@ -85,7 +100,9 @@ def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, st
 
 
 def _edge(lost: Callable[[float], complex | None], stride: float) -> tuple[float | None, complex | None]:
-    """The factor up to which all holds, on the way from 1 to 8, or to 1/8 and then 0; and what is lost beyond it."""
+    """The last factor on the gain with which no mode is lost, on the way from 1 to 8, or to 1/8 and then 0; and the
+    eigenvalue that is lost beyond it.
+    """
     good, bad = 1.0, stride
     while (what := lost(bad)) is None:
         good = bad

@@ -28,7 +28,7 @@ from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
 
 @dataclass(frozen=True)
 class Judgement:
-    """On a setting: the damping ratio that counts, and what it does to other modes that it must not."""
+    """The judgement on a setting: the damping ratio that counts, and its prohibited effect on other modes."""
 
     damping: float
     broken: str | None
@@ -38,14 +38,15 @@ Judge = Callable[[Placed], Judgement]
 
 _GAINS = 9
 _TURN = 15.0
-"""Angle [°] by which the compensation is turned, to either side as long as that helps, once re-centring does not."""
+"""Step of the compensation's angle [°]. Once re-centring no longer helps, the angle is turned by this step to either
+side as long as that helps."""
 _ROUNDS = 5
 _WORTH = 5e-4
-"""A damping ratio that is better by less is not worth another round."""
+"""The search ends when a round raises the damping ratio by less than this."""
 _SMALL_GAIN = 0.1
-"""For the sensitivity at a gain of 0 [pu]."""
+"""Gain that stands for 0 in the sensitivity at a gain of 0 [pu]."""
 _TOLERANCE = 2e-4
-"""The gain is searched until the damping ratio is met within this."""
+"""The search for a gain ends when the damping ratio differs by less than this from the required one."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,12 @@ class GainSweep:
     why
         Where the lead/lag comes from.
     points
-        With rising gain.
+        The points of the sweep, with rising gain.
     chosen
         The smallest gain that meets the requirement, else the gain of the best damping.
     unstable
-        The gains of points with which the system is unstable [pu]; none are known beyond `MOST_STATES`.
+        The gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which
+        are not examined.
     """
 
     why: str
@@ -73,16 +75,16 @@ class GainSweep:
 
 @dataclass
 class Refinement:
-    """What was tried, and what came of it.
+    """The settings that the refinement tried, and its result.
 
     Attributes
     ----------
     chosen
-        The best setting that breaks no other mode; None if there is none within the bounds.
+        The best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists.
     score
-        Its damping ratio that counts.
+        Damping ratio of ``chosen`` that counts.
     met
-        Whether it has the required damping.
+        Whether ``chosen`` has the required damping.
     """
 
     sweeps: list[GainSweep] = field(default_factory=list)
@@ -93,7 +95,7 @@ class Refinement:
 
     @property
     def best(self) -> Placed:
-        """The best damping of all that was tried, whatever it does to other modes."""
+        """The best damping of all tried settings, whatever their effect on other modes."""
         return max((s.chosen for s in self.sweeps), key=lambda p: p.damping_ratio)
 
     @property
@@ -126,7 +128,7 @@ def refine(
     bounds
         Of the gain [pu].
     judge
-        Looks at all modes with a setting.
+        Judges a setting by all modes of the system.
     others
         The other modes without the controller [rad/s].
     """
@@ -172,7 +174,7 @@ def sweep(
     loop
         The running system with the controller to be set.
     off
-        The target with the controller off, from which it is followed.
+        The target with the controller off; following begins there.
     filters
         The lead/lag, the same at every gain.
     required
@@ -182,7 +184,7 @@ def sweep(
     why
         Where the lead/lag comes from, for people.
     special
-        A gain in the bounds that is looked at in any case [pu].
+        A gain within the bounds that the sweep always includes [pu].
     """
     points: list[Placed] = []
     here = off
@@ -192,7 +194,7 @@ def sweep(
         except AnalysisError:
             if not points:
                 raise
-            break  # so far the mode can be followed, and so far it was swept
+            break  # the mode could be followed up to this gain, and the sweep ends here
         points.append(here)
     above = next((k for k, p in enumerate(points) if p.damping_ratio >= required), None)
     if above == 0:
@@ -205,7 +207,7 @@ def sweep(
 
 
 def _unstable(loop: PodLoop, points: Sequence[Placed]) -> tuple[float, ...]:
-    """The gains that leave the system unstable; not looked for in a system with more states than are surveyed."""
+    """The gains with which the system is unstable; empty for a system with more states than are surveyed."""
     models = (loop.model(p.setting) for p in points)
     return tuple(
         p.setting.gain
@@ -242,7 +244,7 @@ def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
 
 
 def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[tuple[str, LeadLag]]:
-    """Lead/lag settings to try, each from what the sweeps before it brought."""
+    """Lead/lag settings to try; each follows from the results of the sweeps before it."""
     yield "as designed", first
     if first.N_S == 0 or not result.sweeps:
         return
@@ -271,7 +273,7 @@ def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[t
 def _surveyed(
     loop: PodLoop, result: Refinement, off: Placed, others: Sequence[complex], stages: int, bounds: tuple[float, float]
 ) -> Iterator[tuple[str, LeadLag, float | None]]:
-    """The best settings of all; looked for where nothing else has met the requirement."""
+    """The best settings of a survey, which is made only if no other setting has met the requirement."""
     states = len(loop.model(off.setting).names)
     if stages == 0 or bounds[1] <= 0:
         return
@@ -293,7 +295,9 @@ def _surveyed(
 
 
 def _turned(base: Placed, turn: float) -> LeadLag | None:
-    """The lead/lag of a setting with its angle changed, centred on the mode there; None if its stages cannot."""
+    """The lead/lag of a setting with another angle, centred on the mode of this setting; None if its stages cannot give
+    this angle.
+    """
     filters = base.setting.filters
     total = filters.N_S * filters.stage_angle_deg + turn
     if abs(total) >= LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
@@ -302,7 +306,7 @@ def _turned(base: Placed, turn: float) -> LeadLag | None:
 
 
 def recentred(loop: PodLoop, here: Placed) -> LeadLag:
-    """The design's formulas again, at the mode where it is and with the sensitivity that it has there."""
+    """The lead/lag by the design's formulas, with the present mode and its present sensitivity."""
     gain, filters = here.setting.gain, here.setting.filters
     change = 0.01 * gain or _SMALL_GAIN
     moved = loop.place(here, gain + change)
@@ -316,7 +320,9 @@ def recentred(loop: PodLoop, here: Placed) -> LeadLag:
 
 
 def _guarded(loop: PodLoop, found: GainSweep, judge: Judge, notes: list[str]) -> Placed | None:
-    """The sweep's choice, or the largest gain below it that leaves the other modes alone; None if none does."""
+    """The sweep's choice, or the largest gain below it without prohibited effect on other modes; None if every gain has
+    one.
+    """
     reason = judge(found.chosen).broken
     if reason is None:
         return found.chosen

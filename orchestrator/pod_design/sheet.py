@@ -13,20 +13,20 @@ from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, angle_deg, compensation_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.refinement import Refinement
-from orchestrator.report.tables import eigenvalue_text
+from orchestrator.report.tables import PlainTable, eigenvalue_text
 
 _MARK = "†"
-"""Behind what was swept with a gain that leaves the system unstable."""
+"""Mark behind a swept gain with which the system is unstable."""
 
 LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 
 def sheet(d: PodDesign) -> Iterable[Table | str]:
-    """The design step by step: formula, figures, units; then what came of it."""
-    yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: {d.case}, " + (
-        f"scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
+    """The design step by step with formulas, figures and units, and then its result."""
+    yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: " + escape(
+        f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
     )
-    steps = Table(header_style="bold")
+    steps = PlainTable(header_style="bold")
     for column in ("", "Step", "Formula", "Result"):
         steps.add_column(column, overflow="fold")
     for number, row in enumerate(_steps(d), start=1):
@@ -148,12 +148,12 @@ def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
 
 def _notes(d: PodDesign) -> Iterable[str]:
     for note in d.refinement.notes if d.refinement else ():
-        yield f"[dim]{note}[/dim]"
-    yield f"[bold {'green' if d.met else 'yellow'}]{'met' if d.met else 'not met'}[/]: {verdict(d)}"
+        yield f"[dim]{escape(note)}[/dim]"
+    yield f"[bold {'green' if d.met else 'yellow'}]{'met' if d.met else 'not met'}[/]: {escape(verdict(d))}"
 
 
 def verdict(d: PodDesign) -> str:
-    """In words: whether the requirement is met, by how much, and why not."""
+    """A sentence: whether the requirement is met, by how much, and if not, why."""
     text = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
     if d.after.other_named:
         text += (
@@ -182,7 +182,7 @@ def verdict(d: PodDesign) -> str:
 
 
 def _out_of_reach(d: PodDesign, r: Refinement) -> str:
-    """What the sweeps have shown."""
+    """Why the sweeps show that the requirement is out of reach."""
     if not r.sweeps:
         return "; the refinement could not follow the mode with any setting within the bounds"
     low, high = d.request.gain_bounds[0], max(s.points[-1].setting.gain for s in r.sweeps)
@@ -210,7 +210,7 @@ def mode_text(value: complex) -> str:
 
 
 def _growth(stability: Stability) -> str:
-    """The figure of the verdict's own sentence."""
+    """The growth rate, as in the verdict's sentence."""
     rate = stability.largest_growth_rate
     return stability.verdict if rate is None else f"{rate:+.4g} 1/s"
 
@@ -229,7 +229,7 @@ def _components(names: Sequence[str]) -> str:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
+    table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for column in columns:
         table.add_column(escape(column), overflow="fold")
     return table

@@ -1,8 +1,8 @@
-"""A survey of all settings of a POD, for where the search that begins at the design ends short of the requirement.
+"""A survey of all settings of a POD. It is made if the search that begins at the design does not meet the requirement.
 
 With one lead/lag the state matrix is A(K) = A_0 + K·D, so two linearisations of the converters give every gain. The
-best settings of a coarse grid are polished by Nelder and Mead's method. Which mode is the target's is left to the
-caller: here a setting is as good as the least damped mode that it moves.
+best settings of a coarse grid are polished by Nelder and Mead's method. The survey does not identify the target: it
+rates a setting by the least damped mode that the setting moves. The caller follows the target.
 """
 
 import math
@@ -18,10 +18,12 @@ from orchestrator.analysis.stability import grows
 from orchestrator.errors import AnalysisError
 from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.pod_design.guard import guarded
+from orchestrator.pod_design.kept import digest
 from orchestrator.pod_design.lead_lag import LARGEST_TURN, LeadLag, lead_lag_turning
+from orchestrator.points.store import Arrays
 
 MOST_STATES = 500
-"""In larger systems a survey would take longer than anybody waits."""
+"""Systems with more states are not surveyed, because a survey would take too long."""
 CENTRES = (0.5, 4.0)
 """Range of the lead/lag's centre, as parts of the mode's frequency."""
 
@@ -29,13 +31,13 @@ _TURNS, _CENTRES, _GAINS = 17, 7, 10
 _POLISHED = 3
 _EVALUATIONS = 150
 _UNMOVED = 0.02
-"""A mode that the controller moves by less than this fraction of its size is left out of the judgement."""
+"""The survey ignores a mode that the controller moves by less than this fraction of its size."""
 _HOPELESS = 1.0
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What was found.
+    """The result of a survey.
 
     Attributes
     ----------
@@ -44,7 +46,7 @@ class Survey:
     damping
         Damping ratio of the least damped mode that the best setting moves.
     settings
-        How many were looked at.
+        Number of settings that were examined.
     """
 
     best: tuple[PodSetting, ...]
@@ -55,7 +57,7 @@ class Survey:
 def survey(
     loop: PodLoop, initial: complex, others: Sequence[complex], stages: int, bounds: tuple[float, float]
 ) -> Survey:
-    """Look at all settings.
+    """Rate settings over the whole range of gain, angle and centre.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def survey(
 
 
 class _Ground:
-    """Settings as (turn, log of the centre, gain), with what they are worth; less is better."""
+    """Settings as (turn, log of the centre, gain), with their worth; a smaller worth is better."""
 
     def __init__(
         self, loop: PodLoop, initial: complex, others: NDArray[np.complex128], stages: int, bounds: tuple[float, float]
@@ -109,19 +111,26 @@ class _Ground:
         self._stages, self._bounds, self.settings = stages, bounds, 0
 
     def filters(self, place: Sequence[float]) -> LeadLag:
-        """The lead/lag at a place: its turn is a part of the most that its stages can do."""
+        """The lead/lag at a place. Its turn is given as a part of the largest angle that its stages can give."""
         turn = place[0] * LARGEST_TURN * self._stages
         return lead_lag_turning(turn, math.exp(place[1]) * self._initial.imag, self._stages)
 
     def over_gains(self, place: Sequence[float], gains: Sequence[float]) -> list[float]:
         """The worth of one lead/lag with some gains."""
+        what = {"place": list(place), "gains": list(gains), "bounds": self._bounds, "stages": self._stages,
+                "initial": digest(np.array(self._initial)), "others": digest(self._others)}  # fmt: skip
+        worths: list[float] = self._loop.figures("worth", what, lambda: self._worths(place, gains))["worths"].tolist()
+        self.settings += len(gains)
+        return worths
+
+    def _worths(self, place: Sequence[float], gains: Sequence[float]) -> Arrays:
         high = self._bounds[1]
         half, full = (model.A for model in self._loop.continuous_models(PodSetting(high, self.filters(place))))
         slope = (full - half) / (high / 2)
-        return [self._worth(np.linalg.eigvals(full + (gain - high) * slope).astype(complex)) for gain in gains]
+        found = [self._worth(np.linalg.eigvals(full + (gain - high) * slope).astype(complex)) for gain in gains]
+        return {"worths": np.array(found)}
 
     def _worth(self, values: NDArray[np.complex128]) -> float:
-        self.settings += 1
         if grows(values).any():
             return _HOPELESS
         moved = [v for v in guarded(values) if not np.any(np.abs(v - self._others) < _UNMOVED * abs(v))]

@@ -1,4 +1,4 @@
-"""What a POD design is made for: the scenario, the components with the controller, and the mode."""
+"""The target of a POD design: the scenario, the components with the controller, and the mode."""
 
 import fnmatch
 import math
@@ -16,14 +16,14 @@ CONTROLLERS = ("pod_p", "pod_q")
 
 @dataclass(frozen=True)
 class Target:
-    """A scenario and the components of it that are given one common setting.
+    """A scenario, and those of its components that get one common setting.
 
     Attributes
     ----------
     key
-        What the components are called in a parameter file: a pattern that fits them and no other, or their names.
+        Names of the components in a parameter file: one pattern that fits exactly these components, or each name.
     stages
-        N_S that they are to have.
+        N_S of the components' lead/lag.
     """
 
     scenario: str
@@ -42,20 +42,20 @@ def find_target(
     overrides: Mapping[str, Value],
     parameters: Sequence[ParameterFile],
 ) -> Target:
-    """The scenario that was asked for, else the one in which all PODs are there and off; and its components.
+    """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off.
 
     Parameters
     ----------
     case
-        In which it is designed.
+        The case for which the controller is designed.
     controller
         ``pod_p`` or ``pod_q``.
     scenario
-        Its name; where None, the one in which all PODs are there and off.
+        Name of the scenario; None for the one in which all PODs exist and are off.
     pattern
         Name or pattern of the components, such as ``gfor*``; all with the controller where None.
     stages
-        N_S of the lead/lag; that of the components where None.
+        N_S of the lead/lag; None for the components' own.
     overrides
         Values by ``component.variable``.
     parameters
@@ -120,18 +120,18 @@ def check_range(
     plan
         Components of the scenario, by name.
     components
-        Names of those that are looked at.
+        Names of the components to check.
     variable
-        Without the component.
+        Name of the variable inside a component.
     value
         In the variable's own unit.
     option
-        Of the command line; the error begins with it.
+        Option of the command line, with which the error begins.
 
     Raises
     ------
     InputError
-        If it is not.
+        If an FMU does not take the value.
     """
     for name in components:
         info = plan[name].description.variables[variable]
@@ -156,7 +156,7 @@ def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
 
 
 def mode_name(case: Case, wanted: str | None) -> str:
-    """The name of the mode to design for: the one that was asked for, else the case's first.
+    """The name of the mode to design for: the requested one, or by default the first mode that the case names.
 
     Raises
     ------

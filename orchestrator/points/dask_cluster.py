@@ -1,14 +1,28 @@
-"""Tasks on a Dask cluster, which may span many machines."""
+"""Tasks on a Dask cluster, which may span many machines.
 
+Scheduler, workers and client exchange pickled Python objects: each of them can have any program run by the others. TLS
+with certificates of one's own authority keeps strangers out; it does not protect one member of the cluster from
+another.
+"""
+
+import ipaddress
+import logging
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
+_LOG = logging.getLogger("gfor")
+
+TLS_FILES = ("ca.pem", "cert.pem", "key.pem")
+"""In the folder with certificates: the authority's, the client's, and the client's private key."""
+
 _PATIENCE = 30
-"""How long is waited for a scheduler and for its first worker [s]."""
+"""Longest time to wait for a scheduler, and then for its first worker [s]."""
 
 
 class DaskCluster:
@@ -17,11 +31,28 @@ class DaskCluster:
     Parameters
     ----------
     address
-        Of the scheduler, such as ``tcp://host:8786``. Its workers need this project, in the same version.
+        Of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in the
+        same version.
+    tls
+        Folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration says
+        where they are.
+
+    Raises
+    ------
+    InputError
+        If a file is missing in the folder, or the address is not for TLS.
     """
 
-    def __init__(self, address: str) -> None:
-        self.address = address
+    def __init__(self, address: str, tls: Path | None = None) -> None:
+        self.address, self._tls = address, tls
+        if tls is None:
+            return
+        if not address.startswith("tls://"):
+            raise InputError(f"--scheduler {address}: --tls needs an address that begins with tls://")
+        if missing := [name for name in TLS_FILES if not (tls / name).is_file()]:
+            raise InputError(
+                f"--tls {tls}: there is no {' and no '.join(missing)}; the folder must hold {', '.join(TLS_FILES)}"
+            )
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
@@ -44,12 +75,21 @@ class DaskCluster:
         """See `Executor.close`; the workers are the cluster's own."""
 
     def _client(self, distributed: Any) -> Any:
+        if not (self.address.startswith("tls://") or _on_this_machine(self.address)):
+            _LOG.warning(
+                "--scheduler %s: the connection is not encrypted and nobody is checked; whoever can reach the "
+                "scheduler can run programs on its workers and on this machine: use tls:// and --tls outside of a "
+                "network of your own",
+                self.address,
+            )
         try:
-            client = distributed.Client(self.address, timeout=_PATIENCE, set_as_default=False)
-        except (OSError, ValueError) as error:
+            client = distributed.Client(
+                self.address, timeout=_PATIENCE, set_as_default=False, security=self._security(distributed)
+            )
+        except (OSError, ValueError, TypeError) as error:  # Dask's, in this order: no answer, address, certificates
             raise InputError(
                 f"--scheduler {self.address}: no Dask scheduler answers there ({error}); start one with "
-                "`dask scheduler`, and give its address, such as tcp://host:8786"
+                "`dask scheduler`, and give its address, such as tcp://host:8786, or tls://host:8786 with --tls"
             ) from error
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)
@@ -60,6 +100,15 @@ class DaskCluster:
                 f"`dask worker {self.address}` where gfor-cosim is installed"
             ) from error
         return client
+
+    def _security(self, distributed: Any) -> Any:
+        """Dask's description of the certificates; None leaves it to Dask's own configuration."""
+        if self._tls is None:
+            return None
+        authority, certificate, key = (str(self._tls / name) for name in TLS_FILES)
+        return distributed.Security(
+            tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True
+        )
 
     def _result(self, distributed: Any, future: Any) -> Any:
         error = future.exception()
@@ -74,6 +123,14 @@ class DaskCluster:
                 "in this version, where the workers run"
             ) from error
         return future.result()
+
+
+def _on_this_machine(address: str) -> bool:
+    host = urlsplit(address).hostname or ""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return address.startswith("inproc://")
 
 
 def _distributed() -> Any:

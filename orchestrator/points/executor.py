@@ -9,7 +9,7 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 ATTEMPTS = 3
-"""How often a task may lose its worker before it is given up."""
+"""A task that has lost its worker this many times is given up."""
 
 
 class WorkerLostError(CosimError):
@@ -22,7 +22,7 @@ class Executor(Protocol):
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result | WorkerLostError]]:
-        """Give the index of each task with its result, as soon as it is there, in any order.
+        """Yield the index and the result of each task as soon as the result is there, in any order.
 
         An exception that ``function`` raises ends the run. A worker process that dies does not: its task is
         computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`.
@@ -30,5 +30,5 @@ class Executor(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the workers; they serve several runs until then."""
+        """End the workers. Until then they serve several calls of `run`."""
         ...

@@ -11,20 +11,20 @@ CountReport = Callable[[int, int], None]
 
 
 class Keyed(Protocol):
-    """What is asked of a point."""
+    """The task of one point."""
 
     @property
     def key(self) -> str:
-        """Name of its file, as `key_of` makes it."""
+        """Name of the point's file, as `key_of` makes it."""
         ...
 
 
 class Keepable(Protocol):
-    """What comes out of a point."""
+    """The result of one point."""
 
     @property
     def lasting(self) -> bool:
-        """Whether the same would come out again, so that it is worth keeping."""
+        """Whether computing the point again would give the same result. Only such results are kept."""
         ...
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -38,7 +38,7 @@ class Keepable(Protocol):
 
     @classmethod
     def lost(cls, task: Any, error: WorkerLostError) -> Self:
-        """That of a point whose worker died."""
+        """The result of a point whose worker died."""
         ...
 
 
@@ -54,7 +54,7 @@ def kept_or_computed(
     store: PointStore,
     report: CountReport,
 ) -> Iterator[tuple[int, Point, bool]]:
-    """Give the index of each task with its point, in any order, and whether an earlier start had left that.
+    """Yield, in any order, the index of each task, its point, and whether the point was already stored.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def kept_or_computed(
     executor
         Where the points are computed that are not stored yet.
     store
-        Has the points of earlier starts, and takes new ones that are worth keeping.
+        Holds the points of earlier starts. New lasting points are added to it.
     report
-        Is told how many points are done, of how many.
+        Called with the number of points done and the total number.
     """
     missing: list[int] = []
     for index, task in enumerate(tasks):

@@ -1,25 +1,35 @@
 """Tasks on the cores of this machine, in processes: FMUs with Python inside hold its lock, so threads would wait."""
 
 import multiprocessing
+import multiprocessing.util
 import os
 import signal
 import sys
+import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from functools import cache
 from multiprocessing import forkserver
 from multiprocessing.context import BaseContext
+from types import FrameType
 from typing import Any
 
+from fmus.toolchain.temporary import own_folder, remove
+from orchestrator.fmi.interrupts import calls
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
 _QUEUE_PER_WORKER = 2
-"""Tasks under way for each worker; the second one waits there so that no worker does."""
+"""Number of tasks that each worker is given at once. The second task is ready when the first one ends, which keeps the
+worker busy."""
 
 
 _SAFE_PATH = "PYTHONSAFEPATH"
+
+_LONGEST = 60
+"""Length of a folder's path in which sockets still have a name that is short enough: it may have about 100 bytes."""
 
 
 def number_of_cores() -> int:
@@ -33,14 +43,15 @@ class Processes:
     Parameters
     ----------
     imports
-        Modules that the tasks need. Where the system allows, they are imported once for all workers, from now on and
-        in the background: importing takes seconds, in which the caller can prepare the tasks.
+        Modules that the tasks need. Where the system allows it, one process imports them in the background, once for
+        all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile.
     """
 
     def __init__(self, workers: int, imports: Sequence[str] = ()) -> None:
         self.workers = workers
         self._context = _context(imports)
         self._pool: ProcessPoolExecutor | None = None  # starting a worker takes time
+        self._at_work = False
 
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
@@ -55,28 +66,31 @@ class Processes:
                 yield index, self._run_alone(function, tasks[index])
 
     def _run_together(self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]) -> Any:
-        """Compute what is waiting; ends early, with what was under way, if a worker dies."""
+        """Compute the waiting tasks. If a worker dies, end early and return the tasks that were being computed."""
         under_way: dict[Future[Result], int] = {}
         suspects: list[int] = []
         pool, whole = self._running_pool(), False
+        self._at_work = True
         try:
             while waiting or under_way:
                 try:
                     while waiting and len(under_way) < _QUEUE_PER_WORKER * self.workers:
-                        under_way[pool.submit(function, tasks[waiting[0]])] = waiting[0]
+                        with calls:  # a worker that is only half known could not be ended
+                            under_way[pool.submit(_computed, function, tasks[waiting[0]])] = waiting[0]
                         waiting.popleft()
                 except BrokenProcessPool:
                     break
                 done, _ = wait(under_way, return_when=FIRST_COMPLETED)
                 for future in done:
                     index = under_way.pop(future)
-                    if isinstance(future.exception(), BrokenProcessPool):
+                    if isinstance(future.exception(), _ENDED):
                         suspects.append(index)
                     else:
                         yield index, future.result()
                 if suspects:
                     break
             whole = not (waiting or under_way or suspects)
+            self._at_work = not whole
         finally:
             if not whole:  # a worker died, a task failed, or nobody wants the rest
                 self.close()
@@ -99,14 +113,16 @@ class Processes:
         """See `Executor.close`."""
         pool, self._pool = self._pool, None
         if pool is not None:
+            if self._at_work:
+                _end_workers(pool)
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
         for _ in range(ATTEMPTS - 1):
             pool = self._new_pool(1)
             try:
-                return pool.submit(function, task).result()
-            except BrokenProcessPool:
+                return pool.submit(_computed, function, task).result()
+            except _ENDED:
                 continue
             finally:
                 pool.shutdown(wait=True, cancel_futures=True)
@@ -130,6 +146,7 @@ def _context(imports: Sequence[str]) -> BaseContext:
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
     try:
+        _sockets_in_an_own_folder()
         forkserver.ensure_running()
     finally:
         if before is None:
@@ -139,9 +156,69 @@ def _context(imports: Sequence[str]) -> BaseContext:
     return context
 
 
+@cache
+def _sockets_in_an_own_folder() -> None:
+    """Have multiprocessing put its folder into one that is swept once this process is gone, however it ended."""
+    folder, before = own_folder("sockets"), tempfile.tempdir
+    if len(os.fsencode(folder)) > _LONGEST:
+        remove(folder)
+        return
+    tempfile.tempdir = str(folder)
+    try:
+        multiprocessing.util.get_temp_dir()
+    finally:
+        tempfile.tempdir = before
+    multiprocessing.util.Finalize(None, remove, args=(folder,), exitpriority=-101)  # it removes its own at -100
+
+
+class WorkerLeftError(Exception):
+    """A worker was told to leave what it was at; it takes nothing more."""
+
+
+_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
+"""What a future says whose worker is gone, or was told to go."""
+
+
+class _Work:
+    """What a worker is at: whether it has a task, and whether it takes another one."""
+
+    busy = leaving = False
+
+
+def _end_workers(pool: ProcessPoolExecutor) -> None:
+    """Have the workers leave what they are at; their FMUs end, and their temporary folders are removed.
+
+    The workers themselves stay until the pool lets them go: one that dies under way can hold the pool up for ever.
+    """
+    for process in list((pool._processes or {}).values()):
+        process.terminate()
+
+
+def _computed(function: Callable[[Task], Result], task: Task) -> Result:
+    """In a worker: the result of a task, unless SIGTERM came."""
+    if _Work.leaving:
+        raise WorkerLeftError
+    _Work.busy = True
+    try:
+        return function(task)
+    except (SystemExit, KeyboardInterrupt):  # all that the task had opened is closed by now
+        raise WorkerLeftError from None
+    finally:
+        _Work.busy = False
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """On SIGTERM: leave the task, but no FMU in the middle of a call."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # who asks twice does not want to wait
+    _Work.leaving = True
+    if _Work.busy:
+        calls.leave()
+
+
 def _start_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it, however it ends."""
+    """Ignore Ctrl-C, which the parent handles, leave a task on SIGTERM, and end when the parent ends for any reason."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

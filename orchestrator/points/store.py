@@ -1,4 +1,4 @@
-"""Finished points on disk: what was computed is not computed again, and an interrupted study continues."""
+"""Finished points on disk: no point is computed twice, and an interrupted study continues where it ended."""
 
 import json
 import os
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
+from orchestrator.safe_files import flush
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -34,18 +35,19 @@ class PointStore:
         return (header, arrays) if isinstance(header, dict) and header.pop("key", None) == key else None
 
     def save(self, key: str, header: Mapping[str, Any], arrays: Arrays) -> None:
-        """Write a point at once; only a whole file gets the name that `load` looks for.
+        """Write a point in one step: the file gets the name that `load` looks for only when it is complete.
 
         Raises
         ------
         InputError
-            If the folder takes no more.
+            If the file cannot be written, for example because the disk is full.
         """
         text = json.dumps({**header, "key": key}).encode()
         partial = self._path(key).with_suffix(f".{os.getpid()}.part")
         try:
             with partial.open("wb") as file:
                 np.savez(file, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **arrays)
+            flush(partial)
             partial.replace(self._path(key))
         except OSError as error:
             raise InputError(

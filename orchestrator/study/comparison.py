@@ -1,5 +1,6 @@
 """Recorded runs side by side: how far two differ in a signal, and the modes that each rings with."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,8 +8,14 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
+from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
+from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
+from orchestrator.results.recording import FOLDER, TRAJECTORY, open_recording, open_whole, parts_of
 from orchestrator.results.signals import signal
+from orchestrator.results.staging import unfinished
+from orchestrator.safe_files import PARTIAL
+from orchestrator.study.common_times import common_times
 
 _WEAKEST = 1e-3
 
@@ -22,7 +29,8 @@ class Comparison:
     deviations
         Largest deviation of each run from its own start [unit of the signal].
     largest, rms
-        Difference between the runs [unit of the signal], the second interpolated to the first one's times.
+        Difference between the runs at the times of the run with the longer interval [unit of the signal]; see
+        `common_times`.
     at
         Time of the largest difference [s].
     modes
@@ -39,23 +47,47 @@ class Comparison:
 
 
 def open_trajectory(path: Path) -> xr.Dataset:
-    """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it.
+    """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
+
+    Warns
+    -----
+    ResultsWarning
+        If the folder has no manifest, or its run did not end or still goes on.
 
     Raises
     ------
     InputError
-        If there is none.
+        If there is none, or it is not as its run wrote it.
     """
-    file = path / "trajectory.nc" if path.is_dir() else path
+    if parts_of(path / FOLDER):
+        dataset = open_recording(path / FOLDER)
+        if not dataset.sizes["time"]:
+            raise InputError(f"{path}: nothing was recorded yet")
+        reached = float(dataset["time"][-1])
+        text = f"{path}: this recording is not finished; it reaches t = {reached:.6g} s"
+        warnings.warn(text, ResultsWarning, stacklevel=2)
+        return dataset
+    file = path / TRAJECTORY if path.is_dir() else path
     if not file.is_file():
-        inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
-        hint = f"choose a scenario in it: {', '.join(inside)}" if inside else "`gfor run` writes one a scenario"
-        raise InputError(f"{path}: there is no trajectory.nc; {hint}")
+        raise InputError(f"{path}: there is no trajectory.nc; {_hint(path)}")
+    if path.is_dir() or (path.parent / MANIFEST).is_file():
+        checked(file.parent, [file.name])
     try:
-        with xr.open_dataset(file) as dataset:
-            return dataset.load()
+        dataset = open_whole(file)
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: it cannot be read as NetCDF: {error}") from error
+    if not dataset.sizes.get("time"):
+        raise InputError(f"{file}: nothing was recorded in it; run the scenario again")
+    return dataset
+
+
+def _hint(path: Path) -> str:
+    inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
+    if inside:
+        return f"choose a scenario in it: {', '.join(inside)}"
+    if begun := [folder.name for folder in unfinished(path.parent) if folder.name.startswith(f"{path.name}{PARTIAL}")]:
+        return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"
+    return "`gfor run` writes one a scenario"
 
 
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
@@ -68,8 +100,12 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     """
     found = signal(dataset, expression)
     if found is None:
-        names = ", ".join(map(str, list(dataset.data_vars)[:12]))
-        raise InputError(f"{label}: signal {expression!r} was not recorded; there are: {names} …")
+        known = list(map(str, dataset.data_vars))
+        hint = close_names(expression, known)
+        raise InputError(
+            f"{label}: signal {expression!r} was not recorded; there are: {', '.join(known[:12])} …; "
+            f"{hint + ' ' if hint else ''}A signal is 'a.b', or the difference 'a.b - c.d' of two"
+        )
     return found
 
 
@@ -104,13 +140,8 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
         If a run does not have the signal, or they have no time in common.
     """
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
-    end = min(float(first["time"][-1]), float(second["time"][-1]))
-    times = first["time"].values
-    times = times[(times >= float(second["time"][0])) & (times <= end)]
-    if len(times) < 2:
-        raise InputError(f"{labels[0]} and {labels[1]} have no time in common; nothing can be compared")
-    y_1 = np.interp(times, first["time"].values, first.values)
-    y_2 = np.interp(times, second["time"].values, second.values)
+    common = common_times(first["time"].values, second["time"].values, labels)
+    y_1, y_2 = (common.values(run, curve.values) for run, curve in enumerate((first, second)))
     difference = y_2 - y_1
     worst = int(np.argmax(np.abs(difference)))
     return Comparison(
@@ -119,16 +150,34 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
         (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
         float(abs(difference[worst])),
         float(np.sqrt(np.mean(difference**2))),
-        float(times[worst]),
+        float(common.times[worst]),
         (_strongest(first, start), _strongest(second, start)),
     )
 
 
-def most_different(a: xr.Dataset, b: xr.Dataset, count: int = 10) -> list[str]:
-    """Signals that both runs have, those first whose difference is largest beside their own deviation."""
+def most_different(
+    a: xr.Dataset, b: xr.Dataset, count: int = 10, labels: tuple[str, str] = ("the first run", "the second run")
+) -> list[str]:
+    """Signals that both runs have, those first whose difference is largest beside their own deviation.
+
+    Parameters
+    ----------
+    a, b
+        Trajectories of the two runs, compared at the times of `common_times`.
+    count
+        Most signals to be named.
+    labels
+        Names of the two runs for errors.
+
+    Raises
+    ------
+    InputError
+        If they have no time in common.
+    """
+    times = common_times(a["time"].values, b["time"].values, labels)
 
     def share(name: str) -> float:
-        one, other = (run[name].values[: min(a.sizes["time"], b.sizes["time"])] for run in (a, b))
+        one, other = (times.values(number, run[name].values) for number, run in enumerate((a, b)))
         deviation = max(np.abs(one - one[0]).max(), np.abs(other - other[0]).max(), 1e-12)
         return float(np.abs(one - other).max() / deviation)
 

@@ -1,7 +1,7 @@
 """The linear model of one component at the steady state of a scenario, to be packed into its FMU."""
 
-from orchestrator.analysis.component_linearization import PERTURBATIONS
 from orchestrator.analysis.linearization import linearize_within
+from orchestrator.analysis.perturbation import PERTURBATIONS
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.step_awareness import STEP_PARAMETER, knows_step

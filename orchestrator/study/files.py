@@ -3,13 +3,17 @@
 import cmath
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.recording import TRAJECTORY, open_whole
 from orchestrator.results.signals import relative_difference
-from orchestrator.results.storage import save_dataset, save_json, save_table
+from orchestrator.results.staging import ScenarioFolder
+from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
+from orchestrator.safe_files import write_text
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -19,25 +23,35 @@ _LEAST_PARTICIPATION = 1e-3
 """Smaller factors are left out of the files."""
 
 
-def save_run(result: RunResult, folder: Path) -> None:
-    """Write one scenario's trajectory and modes, as soon as they are there."""
-    scenario = folder / result.modes.prepared.name
-    save_dataset(result.dataset, scenario / "trajectory")
+def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -> None:
+    """Write what belongs to one scenario beside its recording, as soon as it is there, and put it in its place.
+
+    Raises
+    ------
+    ResultsError
+        If it cannot be written; what was recorded stays.
+    """
+    if csv:
+        save_csv(result.dataset, scenario.path / "trajectory.csv")
     if result.linear is not None:
-        result.linear.assign_attrs(result.dataset.attrs).to_netcdf(scenario / "linear.nc", engine="scipy")
-    save_table(_mode_rows([result.modes]), scenario / "modes.csv")
+        save_netcdf(result.linear.assign_attrs(result.dataset.attrs), scenario.path / "linear.nc")
+    save_table(_mode_rows([result.modes]), scenario.path / "modes.csv")
+    result.dataset.close()
+    reason = None if result.failure is None else str(result.failure)
+    result.dataset = open_whole(scenario.publish(reason) / TRAJECTORY)
 
 
 def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     """Write modes, participation and shapes of all scenarios; return the plots."""
-    folder.mkdir(parents=True, exist_ok=True)
     save_table(_mode_rows(results), folder / "modes.csv")
     save_table(_participation_rows(results), folder / "participation.csv")
     save_table(_shape_rows(results), folder / "mode_shapes.csv")
     reference = results[0].prepared.case.table.reference
-    circles = f"; circles: {reference.title}" if reference and any(r.references for r in results) else ""
+    names = ", ".join(dict.fromkeys(name for r in results for name in r.named))
+    circles = reference.title if reference and any(r.references for r in results) else ""
+    marks = "; ".join(f"{mark}: {text}" for mark, text in (("large", names), ("circles", circles)) if text)
     plots = [folder / "eigenvalues.png"]
-    plot_eigenvalues(results, f"Modes (large: electromechanical{circles})", plots[0])
+    plot_eigenvalues(results, f"Modes ({marks})" if marks else "Modes", plots[0])
     for plot, name in ((plot_participation, "participation.png"), (plot_mode_shapes, "mode_shapes.png")):
         if plot(results, folder / name):
             plots.append(folder / name)
@@ -47,8 +61,7 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
 def save_study(results: Sequence[RunResult], folder: Path) -> list[Path]:
     """Write what concerns all scenarios together; return the plots."""
     case = results[0].modes.prepared.case
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "case.toml").write_text(case.text, encoding="utf-8")
+    write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")
     save_json({"case": case.name, "scenarios": [summary_of(r) for r in results]}, folder / "summary.json")
     plots = []
@@ -162,9 +175,10 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "linearised": modes.linearised,
         "fit_errors": modes.fit_errors,
         "warnings": list(modes.warnings),
-        "stable_in_simulation": not result.went_unstable,
+        "stable_in_simulation": _stable_in_simulation(result),
         "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
+        "isolated": {name: [asdict(p) for p in found] for name, found in result.protections.items()},
     }
 
 
@@ -186,3 +200,10 @@ def _linear_differences(result: RunResult) -> dict[str, float] | None:
     if result.linear is None:
         return None
     return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}
+
+
+def _stable_in_simulation(result: RunResult) -> bool | None:
+    """None where a part of the run was not judged and nothing else was wrong."""
+    if result.went_unstable:
+        return False
+    return None if any(finding.kind == "not_judged" for finding in result.findings) else True

@@ -15,6 +15,7 @@ from orchestrator.analysis.steady_state import OperatingPoint, find_operating_po
 from orchestrator.arrays import Matrix
 from orchestrator.cases.names import variables_of
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.events import faults_among
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.study.modes import running
@@ -100,7 +101,7 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     Raises
     ------
     InputError
-        If an event switches something, or there is none: a linear model has no answer to that.
+        If an event switches something or is a fault, or there is none: a linear model has no answer to that.
     """
     switching = [
         str(event)
@@ -108,6 +109,8 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         for settings in event.changes().values()
         if any(isinstance(value, bool) for value in settings.values())
     ]
+    if faults := faults_among(prepared.events):
+        raise InputError(f"a linear model cannot follow a fault ({faults[0]}); leave --linear out")
     if switching:
         raise InputError(f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out")
     inputs = default_inputs(prepared)

@@ -5,13 +5,12 @@ import math
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.results.storage import provenance, save_json, save_table
+from orchestrator.results.storage import provenance, save_json, save_matrices, save_table
 
 
 def save_linear_model(
@@ -36,12 +35,10 @@ def save_linear_model(
     folder
         Where the files go; it is made where it is missing.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     matrices = {"A": model.A, "B": model.B, "C": model.C, "D": model.D}
     names = {"states": model.states, "inputs": model.inputs, "outputs": model.outputs}
     operating_point = [point.states.get(name, math.nan) for name in model.states]
-    scipy.io.savemat(
-        folder / "linear_model.mat",
+    save_matrices(
         matrices
         | {key: np.array(values, dtype=object).reshape(-1, 1) for key, values in names.items()}
         | {
@@ -50,6 +47,7 @@ def save_linear_model(
             "stability": json.dumps(stability.as_json()),
             "provenance": json.dumps({**provenance(prepared), "linearised": dict(model.sources)}),
         },
+        folder / "linear_model.mat",
     )
     entries = {
         "A": (model.states, model.states),

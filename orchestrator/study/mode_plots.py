@@ -19,6 +19,13 @@ _NAMED = 4
 """Components of each side of a mode shape that are named, largest first."""
 
 
+_RAY = "damping ray"
+"""Marks what belongs to a ray."""
+
+_RAY_LABEL = (0.055, 0.05)
+"""Room for a ray's label, in parts of the Axes' width and height."""
+
+
 def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> None:
     """Eigenvalue map of all scenarios as a picture."""
     with mpl.rc_context(STYLE):
@@ -53,8 +60,8 @@ def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) 
             [m.eigenvalue.real for m in modes],
             [m.frequency_hz for m in modes],
             marker="x",
-            s=[70 if result.name_of(m) else 30 for m in modes],
-            linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes],
+            s=[70 if result.name_of(m) else 30 for m in modes] or 30,  # the legend takes its mark from here
+            linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes] or 1.0,
             color=colour(index),
             label=result.label,
             zorder=3,
@@ -67,8 +74,8 @@ def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) 
         left = min(left, axis.get_xlim()[0])
     axis.set_xlim(left, 0.35)
     axis.set_ylim(0, highest_hz)
+    damping_rays(axis, left, highest_hz)
     if not first:
-        damping_rays(axis, left, highest_hz)
         axis.axvline(0, color="#888888", linewidth=0.8)
     axis.set_xlabel("Real part [1/s]")
     axis.set_ylabel("Frequency [Hz]")
@@ -83,13 +90,32 @@ def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
 
 
 def damping_rays(axis: Any, left: float, highest_hz: float) -> None:
-    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz]."""
+    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz].
+
+    Each has its label on it, inside of the Axes, whose limits must be set before. Rays that the Axes have are replaced.
+    """
+    for old in [artist for artist in (*axis.lines, *axis.texts) if artist.get_gid() == _RAY]:
+        old.remove()
+    labels: list[tuple[float, float]] = []
     for percent in (5, 10, 15, 20, 30):
         ratio = percent / 100
         slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi  # −Re λ per Hz
         end = min(highest_hz, -left / slope)
-        axis.plot([0, -slope * end], [0, end], color="#b0b0b0", linewidth=0.7, linestyle="--", zorder=1)
-        axis.annotate(f"{percent} %", (-slope * end, end), color="#888888", fontsize=8, ha="right", va="top")
+        axis.plot([0, -slope * end], [0, end], color="#b0b0b0", linewidth=0.7, linestyle="--", zorder=1, gid=_RAY)
+        labels.append(_place_of_label(axis, slope, labels))
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        words = {"color": "#888888", "fontsize": 8, "ha": "center", "va": "center"}
+        axis.text(*labels[-1], f"{percent} %", bbox=behind, zorder=1.5, gid=_RAY, **words)
+
+
+def _place_of_label(axis: Any, slope: float, others: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Where a ray's label lies on it: as far out as the edges and the other labels leave room."""
+    (left, right), (_, highest) = axis.get_xlim(), axis.get_ylim()
+    width, height = _RAY_LABEL[0] * (right - left), _RAY_LABEL[1] * highest
+    hertz = min(highest - 0.6 * height, (-left - 0.6 * width) / slope)
+    while hertz > height and any(abs(hertz - y) < height and abs(slope * hertz + x) < width for x, y in others):
+        hertz -= 0.25 * height
+    return -slope * hertz, hertz
 
 
 def plot_participation(results: Sequence[ModesResult], path: Path) -> bool:

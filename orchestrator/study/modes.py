@@ -27,7 +27,8 @@ from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
-from orchestrator.coupling.master import Master
+from orchestrator.coupling.master import Master, open_plan
+from orchestrator.federation.federation import Federation
 from orchestrator.results.mode_json import eigenvalue_json
 
 
@@ -126,9 +127,10 @@ def compute_modes(
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
 
-def running(prepared: PreparedScenario) -> Master:
-    """The scenario's FMUs, initialised."""
-    return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time)
+def running(prepared: PreparedScenario, federation: Federation | None = None) -> Master:
+    """The scenario's FMUs, initialised; those of a federation still in this process."""
+    opener = open_plan if federation is None else federation.open
+    return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener)
 
 
 def modes_of(
@@ -206,7 +208,7 @@ def modes_from(
         model=model,
         modes=shown,
         named=named,
-        references=_references(prepared),
+        references=dict(prepared.references),
         warnings=(
             *map(str, prepared.questions),
             *examined.warnings,
@@ -256,17 +258,6 @@ def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> 
         if mode is not None:
             found[table.name] = mode
     return found
-
-
-def _references(prepared: PreparedScenario) -> dict[str, ReferenceModeTable]:
-    table = prepared.case.table.reference
-    if table is None or not all(_same(prepared.values.get(name), value) for name, value in table.when.items()):
-        return {}
-    return table.modes.get(prepared.name, {})
-
-
-def _same(value: Any, wanted: Any) -> bool:
-    return value is not None and bool(np.isclose(float(value), float(wanted)))
 
 
 def modes_json(results: Sequence[ModesResult]) -> Mapping[str, Any]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import xarray as xr
 
+from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used, nearest
 from orchestrator.analysis.linearization import Blocks, compose
@@ -13,11 +14,28 @@ from orchestrator.analysis.state_access import obstacle
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.run_state import NOT_KEPT
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
-from orchestrator.errors import AnalysisError, CosimError, RunInterruptedError
+from orchestrator.errors import (
+    AnalysisError,
+    ComponentError,
+    CosimError,
+    NotTakenUpError,
+    ResultsError,
+    RunInterruptedError,
+)
+from orchestrator.federation.choice import Federates
+from orchestrator.federation.component import obstacle_of
+from orchestrator.federation.federation import Federation
+from orchestrator.federation.pace import Pace
+from orchestrator.fmi.instance import is_isolated, protections_of
+from orchestrator.fmi.interrupts import calls
+from orchestrator.fmi.protection import Protection, missing
+from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder, open_whole
 from orchestrator.results.signals import signal
 from orchestrator.results.storage import trajectory_dataset
+from orchestrator.study.checkpoints import Checkpoints
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 from orchestrator.watch.finding import UNSTABLE, Finding
@@ -61,6 +79,8 @@ class RunResult:
         The error that ended the run before its time.
     findings
         What the run did wrong, each said once, in the order of its beginning.
+    protections
+        What kept each foreign FMU from the rest of the machine, by component.
     """
 
     modes: ModesResult
@@ -71,6 +91,7 @@ class RunResult:
     linear: xr.Dataset | None = None
     failure: CosimError | None = None
     findings: list[Finding] = field(default_factory=list)
+    protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
 
     @property
     def went_unstable(self) -> list[Finding]:
@@ -84,12 +105,15 @@ def run_scenario(
     observers: Sequence[Observer] = (),
     *,
     linear: bool = False,
+    recording: RecordingFolder | None = None,
+    checkpoints: Checkpoints | None = None,
+    federates: Federates | None = None,
 ) -> RunResult:
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
     A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
-    A component that fails in the middle ends the run, and so does Ctrl-C; what was recorded until then is in the
-    result.
+    A component that fails in the middle ends the run, and so do Ctrl-C and SIGTERM; what was recorded until then is in
+    the result.
 
     Parameters
     ----------
@@ -101,26 +125,119 @@ def run_scenario(
         What else looks on at every step, such as a recorder.
     linear
         Compute the linear model's response as well.
+    recording
+        Where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
+    checkpoints
+        Keep the run while it goes on, and go on from the newest where one was left; not with federates.
+    federates
+        Components that run as federates at HELICS.
     """
-    watch = Watch(prepared)
+    if federates is not None:
+        if federates.announce is not None:
+            observers = [*observers, Pace(federates.announce)]
+        with Federation(prepared, federates) as federation:
+            return _run(federation.prepared, frequency_range, observers, linear, recording, None, federation)
+    try:
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints)
+    except NotTakenUpError as error:
+        if checkpoints is None:
+            raise
+        checkpoints.forget(str(error))
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints)
+
+
+def _run(
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float],
+    observers: Sequence[Observer],
+    linear: bool,
+    recording: RecordingFolder | None,
+    checkpoints: Checkpoints | None,
+    federation: Federation | None = None,
+) -> RunResult:
+    """See `run_scenario`.
+
+    Parameters
+    ----------
+    prepared, frequency_range, observers, linear, recording, checkpoints
+        As there.
+    federation
+        The federates that take part.
+    """
+    watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
-    with running(prepared) as master:
-        reasons = [text for component in master.components.values() if (text := obstacle(component))]
+    with running(prepared, federation) as master:
+        protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
+        reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
+        if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
+            modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
         try:
-            statistics = master.run(prepared.stop_time, prepared.events, [*watch.observers, *observers])
+            if federation is not None:
+                federation.begin(master)
+            statistics = master.run(
+                prepared.stop_time, prepared.events, [*watch.observers, *observers], checkpoints or NOT_KEPT
+            )
+        except NotTakenUpError:
+            raise
         except CosimError as error:
             failure = error
         except KeyboardInterrupt:
-            failure = RunInterruptedError(f"interrupted at t = {master.time:.6g} s")
-    dataset = trajectory_dataset(watch.recorder, prepared)
+            failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+    dataset, failure = _recorded(watch, prepared, recording, failure)
     ring_down, why_none = (None, "") if failure else _ring_down(modes, dataset)
-    if why_none:
-        modes = replace(modes, warnings=(*modes.warnings, why_none))
-    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, watch.findings(failure))
+    unprotected = tuple(
+        f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
+        for name, found in protections.items()
+        if (lacking := missing(found))
+    )
+    inside = tuple(
+        f"component {name!r} runs in gfor's own process, because the case and --trust-fmus say so"
+        for name, plan in prepared.system.components.items()
+        if plan.isolated is False and is_isolated(plan.description, None)
+    )
+    about_run = (*map(str, prepared.about_rows), *([why_none] if why_none else []), *unprotected, *inside)
+    modes = replace(modes, warnings=(*modes.warnings, *about_run))
+    return RunResult(
+        modes,
+        dataset,
+        statistics,
+        ring_down,
+        shifts,
+        follows,
+        failure,
+        watch.findings(failure, master.late_starts),
+        protections,
+    )
+
+
+def _diverging(master: Master) -> list[str]:
+    """What is known before the run of black boxes that the coupling does not bear; a run shows the rest."""
+    boxes = [name for name, component in master.components.items() if obstacle(component)]
+    try:
+        return coupling_growth(master, boxes)
+    except (AnalysisError, ComponentError):
+        return []  # they cannot be looked at so, which is no fault of theirs
+
+
+def _recorded(
+    watch: Watch, prepared: PreparedScenario, recording: RecordingFolder | None, failure: CosimError | None
+) -> tuple[xr.Dataset, CosimError | None]:
+    """What was recorded, and the failure, which may be that it cannot be written."""
+    further = {} if failure is None else {ENDED_EARLY: str(failure)}
+    if recording is None:
+        return trajectory_dataset(watch.recorder, prepared).assign_attrs(further), failure
+    try:
+        recording.join(recording.folder.parent / TRAJECTORY, further)
+        return open_whole(recording.folder.parent / TRAJECTORY), failure
+    except ResultsError as error:
+        kept = trajectory_dataset(watch.recorder, prepared)  # the looks, which are in memory
+        if failure is None or isinstance(failure, ResultsError):
+            return kept, failure or error
+        return kept, ResultsError(f"{failure}; and what was recorded is not published: {error}")
 
 
 def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:

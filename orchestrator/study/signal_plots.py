@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 
 from orchestrator.cases.schema import PlotTable
 from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
-from orchestrator.results.signals import signal
+from orchestrator.results.signals import outline, signal
 from orchestrator.study.run import RunResult
 
 
 def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> bool:
     """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded."""
-    if all(signal(r.dataset, panel.signal) is None for panel in table.panels for r in results):
+    if all(signal(r.dataset.isel(time=slice(1)), panel.signal) is None for panel in table.panels for r in results):
         return False
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 1.3 + 1.9 * len(table.panels)), layout="constrained")
@@ -49,10 +49,10 @@ def draw_signal(axis: Any, results: Sequence[RunResult], expression: str, scale:
         Index of the first run's colour: the number of runs that the Axes show already.
     """
     for index, result in enumerate(results, start=first):
-        data = signal(result.dataset, expression)
+        data = outline(result.dataset, expression)
         if data is not None:
             axis.plot(data["time"], scale * data, color=colour(index), label=result.modes.label)
-        follows = signal(result.linear, expression) if result.linear is not None else None
+        follows = outline(result.linear, expression) if result.linear is not None else None
         if follows is not None:
             axis.plot(follows["time"], scale * follows, color="black", linewidth=0.8, linestyle="--")
     axis.margins(x=0)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from orchestrator.report.tables import eigenvalue_text, first_few, make_table, share_text
+from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -72,7 +72,7 @@ def all_modes(result: ModesResult) -> Table:
 
 def mode_shapes(results: Sequence[ModesResult]) -> Table:
     """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
-    table = Table(title="Mode shapes", title_justify="left", title_style="bold", header_style="bold")
+    table = PlainTable(title="Mode shapes", title_justify="left", title_style="bold", header_style="bold")
     columns = ["Mode", "Swing together", "Against", "Participation by component"]
     columns += ["By area"] if any(r.areas for r in results) else []
     for column in columns:

@@ -5,10 +5,12 @@ import itertools
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orchestrator.cases.build_choices import ALPHA
+from orchestrator.cases.imperfection_tables import number_info, sets_imperfection
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import convert
@@ -18,9 +20,6 @@ from orchestrator.units import read_value, to_unit
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 _MOST = 100_000
-ALPHA = "units.alpha"
-"""The converters' share of a units table; with it the FMUs themselves may change."""
-
 _ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")
 
 
@@ -57,6 +56,8 @@ class Axis:
     ----------
     values
         What is set, in ``unit``.
+    multiple_of
+        Values between two of them are rounded to multiples of this; None where any value will do.
     """
 
     key: str
@@ -64,6 +65,7 @@ class Axis:
     title: str
     values: tuple[float | bool, ...]
     logarithmic: bool = False
+    multiple_of: float | None = None
 
 
 def parse_vary(text: str) -> Vary:
@@ -102,6 +104,8 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     """
     if vary.key == ALPHA:
         return _axis(vary, _ALPHA_INFO)
+    if sets_imperfection(vary.key):
+        return _imperfection_axis(vary, scenarios)
     pattern, _, variable = vary.key.partition(".")
     plans = {n: p for s in scenarios for n, p in s.system.components.items() if fnmatch.fnmatchcase(n, pattern)}
     if not plans:
@@ -119,6 +123,40 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     return _axis(vary, infos[0])
 
 
+def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) -> None:
+    """Refuse two axes that vary one variable.
+
+    Raises
+    ------
+    InputError
+        If there are such two; at no point of their grid would both have their values.
+    """
+    names = [*dict.fromkeys(name for s in scenarios for name in s.system.components)]
+    for one, other in itertools.combinations(axes, 2):
+        (pattern, _, variable), (second, _, same) = one.key.partition("."), other.key.partition(".")
+        if variable != same:
+            continue
+        both = [name for name in names if all(fnmatch.fnmatch(name, p) for p in (pattern, second))]
+        if both or fnmatch.fnmatch(pattern, second) or fnmatch.fnmatch(second, pattern):
+            shared = f"{both[0] if both else pattern}.{variable}"
+            raise InputError(
+                f"--vary {one.key} and --vary {other.key}: both vary {shared}, which can have one value only; leave "
+                "one of them out, or give all values in one list"
+            )
+
+
+def _imperfection_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
+    tables = {name: table for s in scenarios for name, table in s.case.table.imperfections.items()}
+    for scenario in scenarios:
+        tables |= scenario.case.scenarios[scenario.name].imperfections
+    try:
+        info = number_info(scenarios[0].system, tables, vary.key)
+    except InputError as error:
+        raise InputError(f"--vary {error}") from error
+    axis = _axis(vary, info)
+    return replace(axis, multiple_of=scenarios[0].step_size) if vary.key.endswith(".delay") else axis
+
+
 def _axis(vary: Vary, info: VariableInfo) -> Axis:
     try:
         if vary.limits is None:
@@ -130,7 +168,10 @@ def _axis(vary: Vary, info: VariableInfo) -> Axis:
         raise InputError(f"--vary {vary.key}: {error}") from error
     if len(set(values)) < len(values):
         raise InputError(f"--vary {vary.key}: a value stands in the list twice; leave one out")
-    return Axis(vary.key, "" if info.unit == "1" else info.unit, info.description, tuple(values), vary.logarithmic)
+    step = 1.0 if info.type == "Integer" else None
+    return Axis(
+        vary.key, "" if info.unit == "1" else info.unit, info.description, tuple(values), vary.logarithmic, step
+    )
 
 
 def _number(info: VariableInfo, limit: Value) -> float:

@@ -12,7 +12,7 @@ import xarray as xr
 
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.results.mode_json import eigenvalue_json
-from orchestrator.results.storage import provenance, save_table
+from orchestrator.results.storage import provenance, save_netcdf, save_table
 from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
@@ -272,6 +272,5 @@ def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dic
 
 def save_sweep(samples: Samples, folder: Path) -> None:
     """Write sweep.nc and sweep.csv."""
-    folder.mkdir(parents=True, exist_ok=True)
-    sweep_dataset(samples).to_netcdf(folder / "sweep.nc", engine="scipy")
+    save_netcdf(sweep_dataset(samples), folder / "sweep.nc")
     save_table(sweep_rows(samples), folder / "sweep.csv")

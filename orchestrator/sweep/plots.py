@@ -16,13 +16,13 @@ from orchestrator.sweep.sweep import ScenarioSweep
 from orchestrator.sweep.trajectories import Trajectory
 
 _LEAST_DAMPED = 75.0
-"""Modes that are damped more than this [%] all along are left out of the plane."""
+"""The complex plane leaves out modes whose damping stays above this [%] at all points."""
 
 _DASHES = ("-", "--", ":", "-.")
 
 
 def save_sweep_plots(samples: Samples, folder: Path) -> list[Path]:
-    """Draw what there is to draw; return the files."""
+    """Draw every plot that the sweep has data for; return the paths of the files."""
     plots: list[tuple[Callable[[Samples, Path], bool], str]] = [
         (plot_trajectories, "trajectories.png"),
         (plot_named, "named_modes.png"),

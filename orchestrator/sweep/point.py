@@ -1,14 +1,15 @@
-"""One point of a sweep: what is asked, and what comes out.
+"""One point of a sweep: its task and its result.
 
 Everything here can be sent to another process or another machine.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.threads import alone
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, CaseError, CosimError
@@ -27,29 +28,35 @@ class SweepPointTask:
     case
         Name of a built-in case, or path of a file that every worker can read.
     fingerprint
-        Of the case file's text and of the code that computes; a worker with others refuses.
+        Hash of the case file's text and of the code. A worker whose hash differs refuses the task.
+    layers
+        Parameter files and values of the command line, weakest first; each is assigned as a whole, as in a scenario.
     overrides
-        Values by ``component.variable``.
+        The varied values by ``component.variable``, which override all layers.
     step_size
         Communication step [s]; None for the case's.
     frequency_range
         Of the modes [Hz].
     key
-        Names the point's file: a hash of all that the result depends on.
+        Name of the point's file: a hash of everything that the result depends on.
+    trust_fmus
+        As `load_case`: the user's word holds in every worker.
     """
 
     case: str
     fingerprint: str
     scenario: str
+    layers: tuple[ParameterFile, ...]
     overrides: dict[str, Value]
     step_size: float | None
     frequency_range: tuple[float, float]
     key: str
+    trust_fmus: bool = False
 
 
 @dataclass(frozen=True)
 class PointRecord:
-    """The modes of a point, or why there are none.
+    """The modes of a point, or the reason why it has no modes.
 
     Attributes
     ----------
@@ -58,9 +65,9 @@ class PointRecord:
     named
         Names that the case gives to some of these modes, by index.
     error
-        The message of the failure; None where all is well.
+        The message of the failure; None for a point with modes.
     lasting
-        Whether the same would come out again: not so where a worker, the machine or an FMU was at fault.
+        Whether computing the point again would give the same result; False if a worker, the machine or an FMU failed.
     residual
         Of the steady state, as in `OperatingPoint`.
     linearised
@@ -85,7 +92,7 @@ class PointRecord:
 
     @classmethod
     def lost(cls, _: SweepPointTask, error: WorkerLostError) -> Self:
-        """That of a point whose worker died."""
+        """The record of a point whose worker died."""
         return cls(error=str(error), lasting=False)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -106,7 +113,7 @@ class PointRecord:
 
 def make_task(
     prepared: PreparedScenario,
-    fixed: Mapping[str, Value],
+    layers: Sequence[ParameterFile],
     varied: Mapping[str, Value],
     step_size: float | None,
     frequency_range: tuple[float, float],
@@ -117,23 +124,26 @@ def make_task(
     ----------
     prepared
         The scenario without what is varied: its FMUs and values go into the key.
-    fixed, varied
-        Overrides; the varied ones go first.
+    layers
+        Parameter files and values of the command line that hold at every point, weakest first.
+    varied
+        Values by ``component.variable``. They have priority over every layer.
     step_size
         Communication step [s]; the case's where None.
     frequency_range
         Modes of these frequencies are kept [Hz].
     """
-    overrides = {**fixed, **varied}
     content = {
         "case": prepared.case.text,
         **scenario_content(prepared),
-        "overrides": sorted(overrides.items()),
+        "layers": [list(layer.values.items()) for layer in layers],
+        "overrides": sorted(varied.items()),
         "step": step_size,
         "range": list(frequency_range),
     }
     reference, mark = reference_to(prepared.case), fingerprint(prepared.case)
-    return SweepPointTask(reference, mark, prepared.name, overrides, step_size, frequency_range, key_of(content))
+    return SweepPointTask(reference, mark, prepared.name, tuple(layers), dict(varied), step_size, frequency_range,
+                          key_of(content), prepared.case.trust_fmus)  # fmt: skip
 
 
 # -- computing ---------------------------------------------------------------------------------------
@@ -145,18 +155,18 @@ def compute_point(task: SweepPointTask) -> PointRecord:
     Raises
     ------
     InputError
-        If this worker has another case file or other code than the sweep was started with.
+        If this worker's case file or code differs from those that the sweep was started with.
     """
-    case = same_case(task.case, task.fingerprint)
+    case = same_case(task.case, task.fingerprint, task.trust_fmus)
     with alone():
         try:
-            (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size)
+            (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
             return _record(compute_modes(prepared, task.frequency_range))
         except CaseError as error:
             return PointRecord(error="; ".join(str(problem) for problem in error.problems))
         except CosimError as error:
             return PointRecord(error=str(error), lasting=isinstance(error, AnalysisError))
-        except Exception as error:  # whatever a foreign FMU or library does, the other points go on
+        except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
             return PointRecord(error=f"{type(error).__name__}: {error}", lasting=False)
 
 

@@ -8,14 +8,17 @@ import numpy as np
 
 from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.case import Case
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import CaseError, Problem
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
-from orchestrator.sweep.axes import ALPHA, Axis, Vary, grid_places, resolve
+from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
@@ -25,16 +28,16 @@ REFINEMENTS = 5
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What is to be computed.
+    """The points that a sweep computes.
 
     Attributes
     ----------
     axes
         Varied parameters; the last one runs fastest, and modes are followed along it.
     scenarios
-        Prepared without what is varied.
-    overrides
-        Values by ``component.variable`` that hold for all points.
+        The scenarios, prepared without the varied values.
+    layers
+        Parameter files, and after them the values of the command line, that hold for all points; weakest first.
     step_size
         Communication step [s]; None for the case's.
     frequency_range
@@ -44,9 +47,14 @@ class SweepPlan:
     case: Case
     axes: tuple[Axis, ...]
     scenarios: tuple[PreparedScenario, ...]
-    overrides: dict[str, Value]
+    layers: tuple[ParameterFile, ...]
     step_size: float | None
     frequency_range: tuple[float, float]
+
+    @property
+    def overrides(self) -> dict[str, Value]:
+        """Values by ``component.variable`` that hold for all points, those of the strongest layer that has the key."""
+        return {key: value for layer in self.layers for key, value in layer.values.items()}
 
     @property
     def number_of_points(self) -> int:
@@ -54,13 +62,13 @@ class SweepPlan:
         return len(self.scenarios) * int(np.prod([len(axis.values) for axis in self.axes]))
 
     def values(self, place: GridPlace) -> dict[str, Value]:
-        """What is set at a place; between two places of the last axis, what lies between their values."""
+        """The varied values at a place. A place between two grid points of the last axis has an interpolated value."""
         return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
         """The task of one point."""
         varied = self.values(place)
-        return make_task(prepared, self.overrides, varied, self.step_size, self.frequency_range)
+        return make_task(prepared, self.layers, varied, self.step_size, self.frequency_range)
 
 
 def _value_at(axis: Axis, position: float) -> Value:
@@ -68,9 +76,8 @@ def _value_at(axis: Axis, position: float) -> Value:
     if position == below:
         return axis.values[below]
     a, b, part = axis.values[below], axis.values[below + 1], position - below
-    if axis.logarithmic:
-        return float(a * (b / a) ** part)
-    return float(a + (b - a) * part)
+    value = float(a * (b / a) ** part if axis.logarithmic else a + (b - a) * part)
+    return value if axis.multiple_of is None else round(value / axis.multiple_of) * axis.multiple_of
 
 
 @dataclass
@@ -80,7 +87,7 @@ class ScenarioSweep:
     Attributes
     ----------
     points
-        By place, the refining ones between two places of the grid included.
+        Points by place, including the refining points between two places of the grid.
     trajectories
         Modes followed over the grid, those with a name first.
     """
@@ -95,7 +102,7 @@ class ScenarioSweep:
         return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
 
     def counts(self, axes: Sequence[Axis]) -> Counter[bool | None]:
-        """How many places of the grid are stable, are not, and have no verdict."""
+        """Numbers of grid places that are stable, that are not stable, and that have no verdict."""
         return Counter(self.points[place].stability.get("stable") for place in grid_places(axes))
 
     @property
@@ -114,9 +121,9 @@ class SweepResult:
     Attributes
     ----------
     computed, stored
-        Points that were computed now, and those that an earlier start had left.
+        Number of points computed now, and number of points read from an earlier start.
     refined
-        Points between those of the grid, among both.
+        Number of refining points between grid points; both numbers above include them.
     """
 
     plan: SweepPlan
@@ -141,33 +148,37 @@ def plan_sweep(
     overrides: Mapping[str, Value] | None = None,
     step_size: float | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    parameters: Sequence[ParameterFile] = (),
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs.
 
     Parameters
     ----------
     case
-        The file that is swept.
+        The case that is swept.
     vary
-        What is varied, one for each axis; modes are followed along the last one.
+        The varied parameters, one for each axis. Modes are followed along the last axis.
     scenarios
         Names; all of them where empty.
     overrides
-        Values by ``component.variable`` that hold at every point.
+        Values by ``component.variable`` that hold at every point; they go before the parameter files.
     step_size
         Communication step [s]; the case's where None.
     frequency_range
         Modes of these frequencies are followed [Hz].
+    parameters
+        Parameter files whose values hold at every point; a later one goes before an earlier one.
 
     Raises
     ------
     InputError
-        If something is wrong that no point can do anything about.
+        If a mistake concerns the sweep as a whole, such as an unknown scenario or parameter.
     """
-    fixed = dict(overrides or {})
-    prepared = case.prepare(scenarios, fixed, step_size)
+    prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
+    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), fixed, step_size, frequency_range)
+    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range)
+    refuse_doubles(axes, prepared)
     ends = [{axis.key: axis.values[end] for axis in axes} for end in (0, -1)]
     for varied in ends if any(axis.key == ALPHA for axis in axes) else ends[:1]:
         _check_end(plan, varied)
@@ -175,14 +186,25 @@ def plan_sweep(
 
 
 def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> None:
-    """Prepare one point at an end: it shows what cannot be varied, and builds FMUs that only appear there."""
-    try:
-        plan.case.prepare([plan.scenarios[-1].name], {**plan.overrides, **varied}, plan.step_size)
-    except CaseError as error:
-        marks = {f"--set {key}": f"--vary {key}" for key in varied}
-        wrong = [Problem(marks[p.place], p.text) for p in error.problems if p.place in marks]
-        if wrong:
-            raise CaseError(str(plan.case.path), wrong) from error
+    """Prepare one point of every scenario at an end of the grid. This finds parameters that cannot be varied, and
+    builds FMUs that only this end needs.
+    """
+    marks = {f"--set {key}": f"--vary {key}" for key in varied}
+    found: dict[Problem, list[str]] = {}
+    for name in [prepared.name for prepared in plan.scenarios]:
+        try:
+            plan.case.prepare([name], varied, plan.step_size, None, plan.layers)
+        except CaseError as error:
+            for problem in error.problems:
+                if problem.place in marks:
+                    found.setdefault(Problem(marks[problem.place], problem.text), []).append(name)
+    if found:
+        everywhere = len(plan.scenarios)
+        wrong = [
+            p if len(names) == everywhere else Problem(p.place, f"{p.text} (scenario {', '.join(names)})")
+            for p, names in found.items()
+        ]
+        raise CaseError(str(plan.case.path), wrong)
 
 
 def run_sweep(
@@ -191,16 +213,17 @@ def run_sweep(
     store: PointStore,
     report: CountReport = lambda done, total: None,
 ) -> SweepResult:
-    """Compute what is not stored yet, then follow the modes, with more points where one is not recognised.
+    """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
+    recognised.
 
     Parameters
     ----------
     plan
-        What is computed, as `plan_sweep` found it to be in order.
+        A plan that `plan_sweep` has checked.
     executor
         Where the points are computed.
     store
-        Keeps every point as soon as it is there.
+        Keeps every point as soon as it is computed.
     report
         Progress.
     """
@@ -242,8 +265,11 @@ def _fill(
 
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:
-    """Middles between neighbours along the last axis, ``width`` apart, with a mode that is not recognised."""
-    if any(isinstance(value, bool) for value in plan.axes[-1].values):
+    """Middles between two neighbours along the last axis, ``width`` apart, where a mode of the first is not recognised
+    in the second, and where there is a value in between: 1 and 2 of a whole number have none.
+    """
+    axis = plan.axes[-1]
+    if any(isinstance(value, bool) for value in axis.values):
         return
     modes: dict[GridPlace, ModeSet] = {p: r.modes for p, r in sweep.points.items() if r.modes is not None}
     for place in sorted(modes):
@@ -251,6 +277,8 @@ def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridP
         following = (*row, at + width)
         middle = (*row, at + width / 2)
         if following not in modes or middle in sweep.points:
+            continue
+        if _value_at(axis, middle[-1]) in (_value_at(axis, at), _value_at(axis, following[-1])):
             continue
         if is_ambiguous(modes[place], modes[following], plan.frequency_range):
             yield middle

@@ -6,6 +6,7 @@ import re
 from rich.markup import escape
 from rich.table import Table
 
+from orchestrator.report.tables import PlainTable
 from orchestrator.sweep.dataset import Samples
 from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.trajectories import GridPlace
@@ -15,12 +16,12 @@ _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 
 
 def trajectories(samples: Samples) -> Table:
-    """Where each trajectory leads, its least damping and its least similarity from point to point.
+    """The ends of each trajectory, its least damping and its least similarity from point to point.
 
-    Those with a name, or all where the case gives none.
+    The table shows the trajectories with a name, or all trajectories if the case names no mode.
     """
     title = escape(f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}")
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    table = PlainTable(title=title, title_justify="left", title_style="bold", header_style="bold")
     table.add_column("Mode", overflow="fold")
     for column in ("f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity"):
         table.add_column(escape(column), justify="right")
@@ -73,7 +74,7 @@ def stability(samples: Samples) -> list[str]:
 
 
 def remarks(samples: Samples) -> list[str]:
-    """What the user must know of points that failed, trajectories that break, and points in between."""
+    """Sentences on points that failed, on trajectories that break, and on refining points."""
     result, texts = samples.result, []
     failures = list(result.failures())
     if failures:
@@ -107,7 +108,9 @@ def remarks(samples: Samples) -> list[str]:
 
 
 def _warnings(samples: Samples) -> list[str]:
-    """Each kind of the points' warnings once, with how many points have it; figures make no kind of their own."""
+    """Each kind of warning once, with the number of points that have it. Two warnings that differ only in their figures
+    are of one kind.
+    """
     asked = {str(question) for sweep in samples.result.scenarios for question in sweep.prepared.questions}
     kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
     for sweep in samples.result.scenarios:

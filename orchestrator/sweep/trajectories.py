@@ -10,21 +10,21 @@ from orchestrator.analysis.mode_tracking import Followed, ModeSet, near_an_end, 
 from orchestrator.sweep.point import PointRecord
 
 GridPlace = tuple[float, ...]
-"""Indices of a point on all axes; not whole on the last one for points between those of the grid."""
+"""Indices of a point on all axes. Refining points have a fractional index on the last axis."""
 
 
 class Beginning(IntEnum):
-    """How a trajectory comes to be at a point."""
+    """How a mode at a point came into its trajectory."""
 
     START = 0
     """The first point of the grid, or the first after points that failed."""
     FOLLOWED = 1
     REFINED = 2
-    """Recognised only by points in between."""
+    """The mode was recognised only with refining points in between."""
     ENTERED = 3
-    """From beyond the range of frequencies."""
+    """The mode entered the range of frequencies here."""
     BROKEN = 4
-    """Not recognised in the point before: its former part is another trajectory, or there is none."""
+    """The mode was not recognised in the previous point, and begins a new trajectory."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class TrajectoryPoint:
     mode
         Index in the point's record.
     similarity
-        Least one on the way from the point of the grid before; NaN where the trajectory begins.
+        Least similarity on the way from the previous grid point; NaN where the trajectory begins.
     """
 
     mode: int
@@ -47,12 +47,13 @@ class TrajectoryPoint:
 
 @dataclass
 class Trajectory:
-    """A mode, followed.
+    """One mode that was followed over the grid.
 
     Attributes
     ----------
     name
-        That of the case, with a number where several trajectories have it in turn; else "mode" and a number.
+        The case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode"
+        and a number.
     carries
         The case's name.
     """
@@ -67,15 +68,15 @@ def find_trajectories(
 ) -> list[Trajectory]:
     """Follow the modes of a scenario along the last axis, row by row.
 
-    A row's first point is linked to that of the row before, and so is any mode that has no predecessor within its
-    row.
+    The first point of a row is linked to the first point of the previous row. A mode without predecessor in its own row
+    is linked to the previous row as well.
 
     Parameters
     ----------
     points
-        By place; failed ones are passed over.
+        Points by place; failed points are skipped.
     names
-        Of the modes that the case looks for, most important first.
+        Names of the modes that the case looks for, most important first.
     frequency_range
         [Hz]
     """
@@ -100,7 +101,9 @@ def _on_grid(place: GridPlace) -> bool:
 
 
 def _route(modes: Iterable[GridPlace]) -> Iterator[tuple[GridPlace, list[GridPlace]]]:
-    """Places row by row, each with the one before it and the one above it, as far as they have modes."""
+    """Places row by row. Each place comes with the previous place of its row and the same place of the previous row,
+    where these have modes.
+    """
     seen: set[GridPlace] = set()
     before: GridPlace | None = None
     for place in sorted(modes):
@@ -128,7 +131,7 @@ def _history(
     index: int,
     frequency_range: tuple[float, float],
 ) -> tuple[float, Beginning]:
-    """Least similarity since the last point of the grid, and how the trajectory came here."""
+    """Least similarity since the last grid point, and the kind of the trajectory's beginning."""
     number, refined, alike = followed.trajectory[place][index], False, 1.0
     while True:
         origin = followed.origin[place][index]
@@ -146,7 +149,9 @@ def _history(
 def _with_names(
     trajectories: list[Trajectory], points: Mapping[GridPlace, PointRecord], names: Sequence[str]
 ) -> list[Trajectory]:
-    """Sorted: those with a name as they first have it, then the others by frequency."""
+    """Trajectories sorted: first those with a name in the order in which they first carry it, then the others by
+    frequency.
+    """
     carriers: dict[str, list[Trajectory]] = {name: [] for name in names}
     for place in sorted(p for p, record in points.items() if record.modes is not None and _on_grid(p)):
         for name, i in points[place].named.items():

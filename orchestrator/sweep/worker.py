@@ -1,4 +1,5 @@
-"""Importing this module does once, for all workers of a sweep, what takes a worker seconds before its first point.
+"""Imports of everything that a worker of a sweep needs. Imported once for all workers, this module saves each worker
+seconds before its first point.
 
 `Processes` imports it in the process that its workers are copied from.
 """

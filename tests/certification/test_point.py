@@ -10,7 +10,7 @@ from orchestrator.points.key import fingerprint
 
 def test_the_frequency_at_bus_2_is_that_of_the_network(tmp_path):
     """The rated frequency that is set counts, and not the one that the machine's FMU declares."""
-    text = BASE.read_text(encoding="utf-8").replace('stop_time = "61 s"', 'stop_time = "0.1 s"')
+    text = BASE.read_text(encoding="utf-8").replace('stop_time = "61 s"', 'stop_time = "1.1 s"')
     path = tmp_path / "case.toml"
     path.write_text(text.replace("[network]", "[network]\nfrequency = 60"), encoding="utf-8")
     result = compute_point(CertificatePointTask(str(path), fingerprint(load_case(path)), "without", 0.1, "key"))

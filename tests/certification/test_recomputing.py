@@ -11,23 +11,9 @@ import xarray as xr
 from orchestrator.certification import case_file
 from orchestrator.certification.point import FREQUENCY, POWER, bus_frequency
 from orchestrator.cli import main
+from tests.support.bindings import GFOR
 
-BOUND = """\
-[rating]
-S_n = "1500 MVA"
-[voltage]
-form = "rectangular"
-variables = ["v_re", "v_im"]
-[current]
-form = "rectangular"
-variables = ["i_re", "i_im"]
-base = "100 MVA"
-[start]
-P_0 = { variable = "P_0" }
-Q_0 = { variable = "Q_0" }
-v_0 = { variable = "v_0" }
-theta_0 = { variable = "theta_0" }
-[parameters]
+BOUND = f"""{GFOR}[parameters]
 "droop.R_f" = 0.03
 "pod_q.enabled" = true
 """

@@ -88,6 +88,16 @@ def test_the_sheet_says_why_a_requirement_is_not_met(design):
     assert "\nmet: the target has 20.6" in out
 
 
+def test_the_gain_can_come_from_the_sensitivity_with_the_lead_lag(design, tmp_path):
+    options = ("--gain-from", "compensated", "--min-damping", "7", "--gain-bounds", "0:10000")
+    d = json.loads(design("--controller", "pod_p", *options, "--json"))
+    assert d["K_compensated"] != pytest.approx(d["K_non_compensated"], rel=0.01)
+    assert d["K"] == d["K_unbounded"] == d["K_compensated"]
+    assert d["requirement"]["least_damping_of_others"] == pytest.approx(0.07)
+    (command,) = re.findall("^# command: (.*)$", (tmp_path / "two_area_pod_p.toml").read_text(), re.MULTILINE)
+    assert "--gain-bounds 0:10000 --gain-from compensated --min-damping 7%" in command
+
+
 def test_no_stages_leave_the_lead_lag_out(design):
     d = json.loads(design("--controller", "pod_q", "--stages", "0", "--json"))
     assert (d["T_S1"], d["T_S2"], d["N_S"]) == (0, 0, 0)

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 from orchestrator.errors import InputError
@@ -25,6 +26,22 @@ def die_once(task):
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return 2 * number
+
+
+def waits(task):
+    """Task (number, folder): holds something until it is left, all but number 0."""
+    number, folder = task
+    mark = Path(folder) / str(number)
+    if not number:
+        while len(list(Path(folder).iterdir())) < 1:
+            time.sleep(0.01)
+        return number
+    try:
+        mark.touch()
+        time.sleep(600)
+    finally:
+        mark.unlink()
+    return number
 
 
 def always_die(number):

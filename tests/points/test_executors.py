@@ -5,12 +5,13 @@ import sys
 import pytest
 
 from fmus.toolchain.extras import MissingLibraryError
+from orchestrator.api.executors import choose_executor
 from orchestrator.errors import InputError
-from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.dask_cluster import TLS_FILES, DaskCluster
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
-from tests.points.small_tasks import always_die, die_once, double, fail
+from tests.points.small_tasks import always_die, die_once, double, fail, waits
 
 NUMBERS = range(8)
 
@@ -48,6 +49,16 @@ def test_leaving_early_stops_the_workers():
     answers.close()
 
 
+def test_workers_that_are_ended_close_what_they_hold(tmp_path):
+    """Else an interrupted study would wait for its points, or leave the folders of their FMUs behind."""
+    executor = Processes(2)
+    outcomes = executor.run(waits, [(n, str(tmp_path)) for n in range(2)])
+    assert next(outcomes) == (0, 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["1"]
+    executor.close()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_without_dask_the_error_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingLibraryError, match=r"pip install 'gfor-cosim\[cluster\]'"):
@@ -64,6 +75,55 @@ def test_a_dask_cluster(tmp_path):
         assert sorted(executor.run(die_once, tasks)) == [(n, 2 * n) for n in NUMBERS]
         with pytest.raises(InputError, match="three cannot be used"):
             list(executor.run(fail, NUMBERS))
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory):
+    """Two folders with certificates, each of an authority of its own."""
+    pytest.importorskip("distributed")
+    from distributed import Security  # noqa: PLC0415 - slow to import
+
+    def folder(name):
+        made, place = Security.temporary(), tmp_path_factory.mktemp(name)
+        for file, text in zip(TLS_FILES, (made.tls_ca_file, made.tls_client_cert, made.tls_client_key), strict=True):
+            (place / file).write_text(text, encoding="utf-8")
+        return place, made
+
+    return folder("ours"), folder("strangers")
+
+
+@pytest.mark.slow
+def test_a_cluster_with_tls_lets_in_who_has_its_certificate(certificates, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 10)
+    (ours, security), (strangers, _) = certificates
+    with distributed.LocalCluster(n_workers=1, protocol="tls", security=security, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        assert address.startswith("tls://")
+        assert sorted(DaskCluster(address, ours).run(double, NUMBERS)) == [(n, 2 * n) for n in NUMBERS]
+        with pytest.raises(InputError, match="no Dask scheduler answers there"):
+            list(DaskCluster(address, strangers).run(double, NUMBERS))
+        with pytest.raises(InputError, match=r"no Dask scheduler answers there.*with --tls"):
+            list(DaskCluster(address).run(double, NUMBERS))
+
+
+def test_certificates_are_complete_and_used(tmp_path):
+    with pytest.raises(InputError, match=r"no ca\.pem and no cert\.pem and no key\.pem; the folder must hold"):
+        choose_executor(None, "tls://host:8786", (), tmp_path)
+    with pytest.raises(InputError, match="needs an address that begins with tls://"):
+        choose_executor(None, "tcp://host:8786", (), tmp_path)
+    with pytest.raises(InputError, match="name its address with --scheduler"):
+        choose_executor(2, None, (), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("address", "warned"), [("tcp://192.0.2.1:9", True), ("tcp://127.0.0.1:9", False)])
+def test_an_open_connection_to_another_machine_is_named(address, warned, monkeypatch, caplog):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 1)
+    with pytest.raises(InputError, match="no Dask scheduler answers there"):
+        list(DaskCluster(address).run(double, NUMBERS))
+    assert ("whoever can reach the scheduler can run programs" in caplog.text) == warned
 
 
 @pytest.mark.slow

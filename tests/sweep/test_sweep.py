@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.cases.case import load_case
+from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep import sweep as sweep_module
-from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.point import compute_point
-from orchestrator.sweep.sweep import plan_sweep, run_sweep
+from orchestrator.sweep.axes import parse_vary, resolve
+from orchestrator.sweep.point import PointRecord, compute_point
+from orchestrator.sweep.sweep import ScenarioSweep, plan_sweep, run_sweep
 from tests.support.interruption import interrupted_after
 from tests.sweep.sweep_case import two_oscillators
 
@@ -152,6 +152,8 @@ def test_text_of_another_form(vary, words):
         ("a1.gain=2:2:3", "--vary a1.gain: the range begins and ends at 2; give two different limits"),
         ("a1.gain=log:-1:2:3", "a logarithmic range from -1 to 2 passes zero"),
         ("a1.gain=1,1.0", "--vary a1.gain: a value stands in the list twice"),
+        ("a1.gain=true:false:3", "gain = True is no limit of a range; list the values"),
+        ("a1.gain=1:inf:3", "gain = inf; a limit of a range must be a finite number"),
     ],
 )
 def test_values_that_cannot_be_used(gfor, case, tmp_path, vary, words):
@@ -161,11 +163,53 @@ def test_values_that_cannot_be_used(gfor, case, tmp_path, vary, words):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("keys", [("a1.gain", "a1.gain"), ("a1.gain", "a?.gain"), ("?1.gain", "b*.gain")])
+def test_one_variable_is_not_varied_twice(gfor, case, tmp_path, keys):
+    arguments = [part for key in keys for part in ("--vary", f"{key}=1,2")]
+    code, _, err = gfor(case, *arguments, "--out", tmp_path / "out")
+    assert code == 2
+    shared = "b1.gain" if keys[1] == "b*.gain" else "a1.gain"
+    assert f"--vary {keys[0]} and --vary {keys[1]}: both vary {shared}, which can have one value only" in err
+    assert plan_sweep(load_case(case), [parse_vary("a1.gain=1,2"), parse_vary("b?.gain=1,2")], ["one"])
+
+
+def test_a_name_that_is_wrong_in_any_scenario_is_refused(case):
+    """The case's second scenario alone has the imperfection."""
+    own = 'imperfections = { bias = { type = "bias", connection = "a1.y -> a2.u", value = 0.0 } }'
+    text = case.read_text(encoding="utf-8")
+    for title, other in (("One", "two"), ("Two", "one")):
+        case.write_text(text.replace(f'title = "{title}"', f'title = "{title}"\n{own}'), encoding="utf-8")
+        words = rf"--vary imperfections\.bias\.value: there is no imperfection 'bias'.* \(scenario {other}\)"
+        with pytest.raises(InputError, match=words):
+            plan_sweep(load_case(case), [parse_vary("imperfections.bias.value=0.1,0.2")])
+
+
+@pytest.mark.parametrize(("varied", "scenario"), [("slow.T=1,2", "two"), ("b1.gain=-1,1", "one")])
+def test_both_scenarios_are_checked_with_what_is_varied(case, monkeypatch, varied, scenario):
+    checked = []
+    prepare = Case.prepare
+
+    def seen(self, scenarios=(), overrides=None, *rest):
+        checked.append((tuple(scenarios), dict(overrides or {})))
+        return prepare(self, scenarios, overrides, *rest)
+
+    monkeypatch.setattr(Case, "prepare", seen)
+    vary = parse_vary(varied)
+    plan_sweep(load_case(case), [vary])
+    assert ((scenario,), {vary.key: vary.values[0]}) in checked
+
+
+def test_a_scenario_is_swept_once(gfor, case):
+    code, _, err = gfor(case, "--vary", "a1.gain=1,2", "--scenario", "one", "--scenario", "one")
+    assert (code, "the scenario 'one' is chosen more than once; name it once" in err) == (2, True)
+
+
 def test_units_logarithms_and_patterns(case):
     plan = plan_sweep(load_case(case), [parse_vary("slow.T=log:10 ms:1:3"), parse_vary("b?.gain=1,2")], ["one"])
     assert [axis.values for axis in plan.axes] == [(0.01, 0.1, 1.0), (1.0, 2.0)]
     assert plan.values((1, 1)) == {"slow.T": 0.1, "b?.gain": 2.0}
     assert plan.values((1, 0.5)) == {"slow.T": 0.1, "b?.gain": 1.5}
+    assert plan.values((0.5, 0)) == {"slow.T": pytest.approx(10**-1.5), "b?.gain": 1.0}
     assert plan.number_of_points == 6
 
 
@@ -191,6 +235,27 @@ def test_points_in_between_resolve_what_one_step_cannot(gfor, case, tmp_path):
     assert code == 0
     assert "between those of the grid served to recognise modes" in err
     assert "0 points computed" in out
+
+
+def test_a_parameter_of_whole_numbers_is_known_as_one():
+    (prepared,) = load_case("two_area").prepare(["pod_p"])
+    assert resolve(parse_vary("gfor.pod_p.N_S=0,1,2,3"), [prepared]).multiple_of == 1.0
+    assert resolve(parse_vary("gfor.pod_p.K=0,1,2,3"), [prepared]).multiple_of is None
+
+
+@pytest.mark.parametrize(
+    ("values", "between"), [((0.0, 1.0, 2.0), set()), ((0.0, 3.0), {1.0, 2.0}), ((1.0, 9.0), {2.0, 3.0, 5.0, 7.0})]
+)
+def test_whole_numbers_have_only_whole_numbers_in_between(case, tmp_path, monkeypatch, values, between):
+    plan = plan_sweep(load_case(case), [parse_vary("a1.gain=3:4:2")], ["one"])
+    plan = replace(plan, axes=(replace(plan.axes[0], values=values, multiple_of=1.0),))
+    fine, seen = compute_point(plan.task(plan.scenarios[0], (0,))), set()
+    monkeypatch.setattr(sweep_module, "is_ambiguous", lambda *_: True)
+    monkeypatch.setattr(sweep_module, "compute_point", lambda task: seen.add(task.overrides["a1.gain"]) or fine)
+    run_sweep(plan, Serial(), PointStore(tmp_path / "p"))
+    assert all(value == int(value) for value in seen)
+    assert between <= seen - set(values)
+    assert bool(between) == bool(seen - set(values))
 
 
 def test_a_mode_beyond_the_range_is_not_followed_there(case, tmp_path):
@@ -238,7 +303,7 @@ def test_a_worker_with_another_case_file_refuses(case):
     plan = plan_sweep(load_case(case), [parse_vary("a1.gain=3:4:2")])
     task = plan.task(plan.scenarios[0], (0,))
     case.write_text(case.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
-    with pytest.raises(InputError, match="a worker sees another text of this file"):
+    with pytest.raises(InputError, match="this file has another text now than when the study loaded it"):
         compute_point(task)
 
 
@@ -271,6 +336,23 @@ def test_a_dask_cluster_computes_what_one_process_does(tmp_path):
         together = sweep("two_area", tmp_path / "together", vary, scenarios=scenarios, executor=executor)
     assert alone.computed == together.computed == 4
     assert numbers(alone) == numbers(together)
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "stable"),
+    [
+        ([True, True], True),
+        ([True, None], None),
+        ([True, False], False),
+        ([None, False], False),
+        ([None, None], None),
+    ],
+)
+def test_a_point_that_failed_leaves_the_stability_open(case, verdicts, stable):
+    """None stands for a point without modes, such as one whose FMU refuses the value."""
+    records = [PointRecord(error="refused") if v is None else PointRecord(stability={"stable": v}) for v in verdicts]
+    (prepared,) = load_case(case).prepare(["one"])
+    assert ScenarioSweep(prepared, {(k,): record for k, record in enumerate(records)}).stable is stable
 
 
 def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, tmp_path, monkeypatch):

@@ -1,0 +1,214 @@
+"""Checkpoints of one scenario's run: when they are written, where a run goes on, and when it cannot."""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from time import perf_counter
+from urllib.parse import quote
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.run_state import RunState, why_not_kept
+from orchestrator.errors import ComponentError, InputError, ResultsError
+from orchestrator.results.checkpoint_file import (
+    DamagedCheckpointError,
+    previous,
+    read_checkpoint,
+    write_checkpoint,
+)
+from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
+from orchestrator.results.taken_back import take_back
+from orchestrator.study.checkpoint_mark import differences, mark_of
+
+EVERY = 60.0
+"""Wall-clock time between two checkpoints [s]."""
+
+_SHARE = 0.02
+"""Most of a run's time that may go into checkpoints: where one takes long, the next waits longer."""
+
+_SHORT = 10.0
+"""A scenario that was done in less wall-clock time [s] is run again: to keep it would cost a part of that."""
+
+
+def not_kept(prepared: PreparedScenario) -> dict[str, str]:
+    """Components whose state cannot be kept, each with the reason."""
+    reasons = {name: why_not_kept(plan.description) for name, plan in prepared.system.components.items()}
+    return {name: reason for name, reason in reasons.items() if reason is not None}
+
+
+class Checkpoints:
+    """Keeps the run of one scenario; given to `Master.run` as its keeper.
+
+    Parameters
+    ----------
+    prepared
+        The scenario.
+    folder
+        Where the checkpoints lie.
+    every
+        Wall-clock time between two of them [s].
+    resume
+        Go on from the newest that is there, instead of beginning anew.
+    say
+        Told, in one line each, what a user should know.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedScenario,
+        folder: Path,
+        every: float,
+        *,
+        resume: bool,
+        say: Callable[[str], None],
+    ) -> None:
+        self._name, self._say, self._every = prepared.name, say, every
+        self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
+        self._path = folder / f"{quote(prepared.name, safe='')}.checkpoint"
+        self._written = False
+        self._kept: RunState | None = None
+        self._unable = bool(not_kept(prepared))
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if resume:
+                self._kept = self._found()
+            else:
+                self.clear()
+        except OSError as error:
+            raise InputError(
+                f"{folder}: checkpoints cannot be kept there: {error.strerror}; choose another folder, or leave them "
+                "out with --checkpoint 0"
+            ) from error
+        self._begun = perf_counter()
+        self._due = self._begun + every
+
+    @property
+    def time(self) -> float | None:
+        """Where the run goes on [s]; None where it begins."""
+        return None if self._kept is None else self._kept.index * self._step_size
+
+    @property
+    def exist(self) -> bool:
+        """Whether a run could go on from here."""
+        return self._written or self._kept is not None
+
+    def recording(self, prepared: PreparedScenario) -> RecordingFolder:
+        """A recording beside the checkpoints, which has what was recorded until the newest."""
+        folder = self._path.with_suffix(".rows")
+        run = hashlib.sha256(json.dumps(self._mark).encode()).hexdigest()[:12]
+        found = RecordingFolder(folder / FOLDER, prepared, {"run": run})
+        self.take_back(found, [folder / TRAJECTORY], run)
+        return found
+
+    def take_back(self, recording: RecordingFolder, whole: Sequence[Path], run: str) -> None:
+        """Have a recording hold the rows that the run has recorded where it goes on; without them, begin anew.
+
+        Parameters
+        ----------
+        recording
+            Of the run.
+        whole
+            Files into which the rows may have been joined, the likeliest first.
+        run
+            Id of the run.
+        """
+        positions = () if self._kept is None else self._kept.observers
+        position = next((p for p in positions if "block" in p and "times" not in p), None)
+        if position is None:
+            return
+        rows, block = int(position["rows"]), int(position["block"])
+        if not take_back(recording, self._recorded, rows, block, whole, run):
+            self.forget("what it has recorded until the checkpoint is not there any more, or is damaged")
+
+    def forget(self, reason: str) -> None:
+        """Begin anew after all, and say why."""
+        self._say(f"scenario {self._name!r} is computed from its start again: {reason}")
+        self._kept = None
+
+    def clear(self) -> None:
+        """Remove what is there."""
+        for path in (self._path, previous(self._path)):
+            path.unlink(missing_ok=True)
+
+    # -- what the master asks --------------------------------------------------------------------
+
+    def latest(self) -> RunState | None:
+        """See `Keeper.latest`."""
+        return self._kept
+
+    def is_due(self) -> bool:
+        """See `Keeper.is_due`."""
+        return perf_counter() >= self._due
+
+    def keep(self, state: Callable[[], RunState]) -> None:
+        """See `Keeper.keep`; a checkpoint that cannot be written is said once and ends no run."""
+        if not self._unable:
+            self._write(state)
+
+    def finish(self, state: Callable[[], RunState]) -> None:
+        """See `Keeper.finish`; it makes a finished scenario of an unfinished study one that is not run again."""
+        if perf_counter() - self._begun >= min(self._every, _SHORT):
+            self._write(state)
+
+    def _write(self, state: Callable[[], RunState]) -> None:
+        begun = perf_counter()
+        try:
+            arrays = state().arrays()
+        except ComponentError as error:
+            self._give_up(str(error))  # an isolated FMU that died says so itself, at its next step
+            return
+        try:
+            write_checkpoint(self._path, {"mark": self._mark}, arrays)
+            self._written = True
+        except ResultsError as error:
+            self._give_up(str(error))
+        now = perf_counter()
+        self._due = now + max(self._every, (now - begun) / _SHARE)
+
+    def _give_up(self, reason: str) -> None:
+        self._unable = True
+        self._say(f"scenario {self._name!r}: no checkpoints are written any more: {reason}")
+
+    # -- what was left ---------------------------------------------------------------------------
+
+    def _found(self) -> RunState | None:
+        """The newest state that is whole.
+
+        Raises
+        ------
+        InputError
+            If all are damaged, or belong to a run that is made of something else.
+        """
+        damaged = []
+        for path in (self._path, previous(self._path)):
+            try:
+                header, arrays = read_checkpoint(path)
+                state = RunState.of_arrays(arrays)
+            except FileNotFoundError:
+                continue
+            except (DamagedCheckpointError, KeyError, ValueError) as error:
+                damaged.append(str(error))
+                continue
+            self._compare(header.get("mark", {}))
+            if damaged:
+                time = state.index * self._step_size
+                self._say(f"{damaged[0]}; the one before it is taken, of t = {time:.6g} s")
+            return state
+        if damaged:
+            raise InputError(
+                f"scenario {self._name!r} cannot be resumed: {'; '.join(damaged)}; start it anew, without --resume"
+            )
+        return None
+
+    def _compare(self, then: dict[str, str]) -> None:
+        said = differences(then, self._mark)
+        if said:
+            raise InputError(
+                f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "
+                "anew, without --resume"
+            )

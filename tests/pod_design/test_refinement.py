@@ -1,0 +1,94 @@
+"""The search on the closed loop, on a plant whose modes move as a formula says."""
+
+import math
+
+import pytest
+
+from orchestrator.pod_design.lead_lag import LeadLag
+from orchestrator.pod_design.refinement import Judgement, refine
+from orchestrator.pod_design.survey import MOST_STATES
+from tests.pod_design.plant import NONE, Plant, gain_for
+
+
+def content(placed):
+    """No other mode is harmed."""
+    return Judgement(placed.damping_ratio, None)
+
+
+def refined(plant, required=0.2, filters=NONE, bounds=(0.0, 100.0), judge=content):
+    return refine(plant, plant.off, filters, required, bounds, judge, plant.modes[1:])
+
+
+def test_the_smallest_gain_that_meets_the_requirement():
+    found = refined(Plant())
+    assert found.met
+    assert found.chosen.setting.gain == pytest.approx(gain_for(-0.4 + 4j, -0.01, 0.2), rel=0.01)
+    assert 0.2 - 1e-9 <= found.chosen.damping_ratio <= 0.2004
+    assert [sweep.why for sweep in found.sweeps] == ["as designed"], "nothing else is tried"
+
+
+def test_a_requirement_that_the_lowest_gain_meets_takes_the_lowest():
+    found = refined(Plant(), required=0.12, bounds=(50.0, 100.0))
+    assert (found.met, found.chosen.setting.gain) == (True, 50.0)
+
+
+def test_a_requirement_out_of_reach_gets_the_best_within_the_bounds():
+    found = refined(Plant(), required=0.9)
+    assert not found.met
+    assert found.chosen.setting.gain == 100.0
+    assert found.score == pytest.approx(1.4 / abs(-1.4 + 4j))
+
+
+def test_the_gain_stops_where_another_mode_is_harmed():
+    def judge(placed):
+        return Judgement(placed.damping_ratio, "another mode grows" if placed.setting.gain > 20 else None)
+
+    found = refined(Plant(), judge=judge)
+    assert not found.met
+    assert 18 <= found.chosen.setting.gain <= 20
+    assert any("another mode grows" in note for note in found.notes)
+
+
+def test_where_every_gain_harms_nothing_is_chosen():
+    found = refined(Plant(), judge=lambda placed: Judgement(placed.damping_ratio, "another mode grows"))
+    assert (found.met, found.chosen) == (False, None)
+    assert found.best.setting.gain > 0
+
+
+def test_a_mode_that_takes_the_targets_name_counts_and_is_said():
+    found = refined(Plant(), judge=lambda placed: Judgement(0.05, None))
+    assert (found.met, found.score) == (False, 0.05)
+    assert any("trades places with another mode" in note and "5.00 %" in note for note in found.notes)
+
+
+def test_a_sensitivity_that_points_aside_is_turned_by_the_lead_lag():
+    """The mode moves upwards only; with the lead/lag centred anew it moves to the left."""
+    plant = Plant(slopes=(-0.01j,))
+    found = refined(plant, filters=LeadLag(0.0, 0.0, 2))
+    assert found.met
+    assert found.sweeps[0].chosen.damping_ratio < 0.2
+    assert found.chosen.setting.filters.T_S1 > 0
+    turned = plant.eigenvalues(found.chosen.setting)[0] - plant.modes[0]
+    assert math.degrees(abs(math.atan2(turned.imag, -turned.real))) < 45
+
+
+def test_where_nothing_near_meets_it_all_settings_are_surveyed():
+    plant = Plant(modes=(-0.4 + 4j, -1.0 + 8j), slopes=(-0.01 + 0j, 0.004 + 0j))
+    found = refined(plant, required=0.9, filters=LeadLag(0.0, 0.0, 2), bounds=(0.0, 10.0))
+    assert not found.met
+    assert any(note.startswith("surveyed ") for note in found.notes)
+    assert any(sweep.why.startswith("surveyed, ") for sweep in found.sweeps)
+
+
+def test_a_large_system_is_not_surveyed_and_that_is_said():
+    count = MOST_STATES // 2
+    plant = Plant(modes=(-0.4 + 4j, *([-5 + 70j] * count)), slopes=(-0.01 + 0j, *([0j] * count)))
+    found = refined(plant, required=0.9, filters=LeadLag(0.0, 0.0, 1), bounds=(0.0, 1.0))
+    assert any(f"more than {MOST_STATES}" in note for note in found.notes)
+
+
+def test_gains_that_leave_the_system_unstable_are_listed():
+    plant = Plant(modes=(-0.4 + 4j, -0.3 + 8j), slopes=(-0.01 + 0j, 0.01 + 0j))
+    found = refined(plant, required=0.9)
+    assert found.sweeps[0].unstable == tuple(p.setting.gain for p in found.sweeps[0].points if p.setting.gain > 30)
+    assert found.sweeps[0].unstable

@@ -1,0 +1,277 @@
+"""A run that was interrupted and resumed gives what an undisturbed one gives, to the last bit."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.api.case import load
+from orchestrator.api.scenario import CheckpointWarning
+from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.coupling import master as master_module
+from orchestrator.errors import InputError
+from orchestrator.results.checkpoint_file import previous
+from orchestrator.study import checkpoint_mark
+from orchestrator.study.checkpoints import Checkpoints
+from orchestrator.study.files import summary_of
+from orchestrator.study.run import run_scenario
+
+STOP = 1.3
+"""After both events of the scenario [s]."""
+
+KINDS = {
+    "python-backed": {},
+    "native": {"gfor.native": True},
+    "isolated": {"isolated": True},
+}
+
+
+class KeptOnce(Checkpoints):
+    """Keeps the run at the first chance from a time on, and is interrupted there."""
+
+    def __init__(self, *arguments, at, times=1, **options):
+        super().__init__(*arguments, 1e9, **options)
+        self._at, self._left = at, times
+
+    def is_due(self):
+        return self._left > 0
+
+    def keep(self, state):
+        if state().index * self._step_size < self._at:
+            return
+        super().keep(state)
+        self._left -= 1
+        if not self._left:
+            raise KeyboardInterrupt
+
+
+def prepared_scenario(kind="python-backed", stop=STOP, values=None):
+    options = dict(KINDS[kind])
+    isolated = options.pop("isolated", None)
+    (prepared,) = load_case("infinite_bus").prepare(["dip"], options | (values or {}), None, stop)
+    prepared.system.components["gfor"].isolated = isolated
+    return prepared
+
+
+def told(result):
+    """All of a run but the figures of its speed."""
+    summary = summary_of(result)
+    del summary["steps_per_second"], summary["share_in_fmus"]
+    values = {str(name): result.dataset[name].values.tobytes() for name in result.dataset.variables}
+    return summary, values, result.findings
+
+
+@pytest.fixture
+def said():
+    return []
+
+
+def interrupted(prepared, folder, said, at, times=1):
+    kept = KeptOnce(prepared, folder, at=at, times=times, resume=False, say=said.append)
+    result = run_scenario(prepared, checkpoints=kept)
+    assert "interrupted at t = " in str(result.failure)
+    return result
+
+
+def resumed(prepared, folder, said):
+    return run_scenario(prepared, checkpoints=Checkpoints(prepared, folder, 1e9, resume=True, say=said.append))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("at", [0.4, 1.0, 1.15])
+def test_an_interrupted_run_goes_on_to_the_last_bit(tmp_path, said, kind, at):
+    prepared = prepared_scenario(kind)
+    part = interrupted(prepared, tmp_path, said, at)
+    assert part.dataset["time"].values[-1] < STOP - 0.1
+    whole = resumed(prepared_scenario(kind), tmp_path, said)
+    assert told(whole) == told(run_scenario(prepared_scenario(kind)))
+    assert said == []
+
+
+DISTURBED = """
+[imperfections.late]
+type = "delay"
+connection = "gfor.omega -> gfor.omega_pod"
+delay = "20 ms"
+
+[[scenarios.dip.events]]
+type = "noise"
+time = "1.05 s"
+end = "1.25 s"
+connection = "grid.v_re -> gfor.v_re"
+deviation = "0.001 pu"
+seed = 7
+bandwidth = "100 Hz"
+
+[scenarios.load_step]"""
+
+
+def disturbed(folder, values=None):
+    """A late POD, and a noisy measurement for a while."""
+    text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
+    text = text.replace('model = "gfor"', 'model = "gfor_pod_input"')
+    text = text.replace(
+        "[[connections]]", '[[connections]]\nfrom = "gfor.omega"\nto = "gfor.omega_pod"\n[[connections]]', 1
+    )
+    (folder / "case.toml").write_text(text.replace("[scenarios.load_step]", DISTURBED, 1), encoding="utf-8")
+    values = {"gfor.pod_q.enabled": True} | (values or {})
+    return load_case(folder / "case.toml").prepare(["dip"], values, None, STOP)[0]
+
+
+@pytest.mark.parametrize("at", [0.5, 1.1, 1.26])
+def test_delay_lines_and_noise_go_on_to_the_last_bit(tmp_path, said, at):
+    prepared = disturbed(tmp_path)
+    assert len(prepared.system.wires) == 2
+    whole = run_scenario(prepared)
+    interrupted(prepared, tmp_path / "kept", said, at)
+    assert told(resumed(prepared, tmp_path / "kept", said)) == told(whole)
+
+
+def test_another_delay_is_named(tmp_path, said):
+    one, other = disturbed(tmp_path), disturbed(tmp_path, {"imperfections.late.delay": "30 ms"})
+    interrupted(one, tmp_path / "kept", said, 0.5)
+    with pytest.raises(InputError, match=r"the connection into gfor\.omega_pod.* has changed"):
+        resumed(other, tmp_path / "kept", said)
+
+
+def test_it_goes_on_from_the_event_and_has_it_once(tmp_path, said):
+    """The checkpoint at an event's time holds whether the event has happened."""
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 1.0)
+    kept = Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
+    assert kept.time == 1.0
+    assert not kept.latest().applied
+
+
+def test_a_finished_run_is_not_run_again(tmp_path, said, monkeypatch):
+    prepared = prepared_scenario(stop=0.3)
+    first = run_scenario(prepared, checkpoints=Checkpoints(prepared, tmp_path, 1e-3, resume=False, say=said.append))
+    monkeypatch.setattr(master_module.Master, "_run_to", lambda *_: iter(()))
+    assert told(resumed(prepared_scenario(stop=0.3), tmp_path, said)) == told(first)
+
+
+# -- what is damaged -----------------------------------------------------------------------------------
+
+
+def spoil(path, place=0.5):
+    content = bytearray(path.read_bytes())
+    content[int(place * len(content))] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("damage", ["a bit", "a cut", "nothing in it"])
+def test_a_damaged_checkpoint_gives_way_to_the_one_before(tmp_path, said, damage):
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 0.4, times=2)
+    newest = tmp_path / "dip.checkpoint"
+    if damage == "a bit":
+        spoil(newest)
+    else:
+        newest.write_bytes(newest.read_bytes()[: 1000 if damage == "a cut" else 0])
+    result = resumed(prepared_scenario(), tmp_path, said)
+    assert len(said) == 1
+    assert "the one before it is taken, of t = 0.40" in said[0]
+    assert told(result) == told(run_scenario(prepared_scenario()))
+
+
+def test_two_damaged_checkpoints_are_refused(tmp_path, said):
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 0.4, times=2)
+    for path in (tmp_path / "dip.checkpoint", previous(tmp_path / "dip.checkpoint")):
+        spoil(path)
+    with pytest.raises(InputError, match=r"'dip' cannot be resumed: .*checksum.*checksum.*start it anew, without"):
+        Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
+
+
+# -- what has changed ----------------------------------------------------------------------------------
+
+
+def test_another_value_is_named(tmp_path, said):
+    interrupted(prepared_scenario(), tmp_path, said, 0.4)
+    with pytest.raises(InputError, match=r"'dip' cannot be resumed: gfor.P_0 was 0.6 and is 0.5; bring that back"):
+        resumed(prepared_scenario(values={"gfor.P_0": 0.5}), tmp_path, said)
+
+
+@pytest.mark.parametrize("library", ["numpy", "scipy", "casadi"])
+def test_another_version_of_a_library_is_named(tmp_path, said, monkeypatch, library):
+    interrupted(prepared_scenario(), tmp_path, said, 0.4)
+    versions = checkpoint_mark.library_versions()
+    monkeypatch.setattr(checkpoint_mark, "library_versions", lambda: versions | {library: "0.0.1"})
+    with pytest.raises(InputError, match=rf"{library} was {versions[library]} and is 0.0.1"):
+        resumed(prepared_scenario(), tmp_path, said)
+
+
+def test_another_fmu_of_the_same_name_is_named(tmp_path, said, monkeypatch):
+    interrupted(prepared_scenario(), tmp_path, said, 0.4)
+    before = checkpoint_mark.component_content
+    monkeypatch.setattr(checkpoint_mark, "component_content", lambda fmu: ["0" * 64, before(fmu)[1]])
+    with pytest.raises(InputError, match=r"the FMU of 'gfor' \(.*\.fmu\) has changed"):
+        resumed(prepared_scenario(), tmp_path, said)
+
+
+def test_another_text_of_the_case_is_named(tmp_path, said):
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 0.4)
+    other = replace(prepared, case=replace(prepared.case, text=prepared.case.text + "\n# remark"))
+    with pytest.raises(InputError, match="the text of the case has changed"):
+        resumed(other, tmp_path, said)
+
+
+# -- FMUs that cannot be kept --------------------------------------------------------------------------
+
+
+def without_state(prepared):
+    for plan in prepared.system.components.values():
+        plan.description = replace(plan.description, can_serialize_state=False)
+    return prepared
+
+
+def test_without_serialised_states_it_begins_anew(tmp_path, said):
+    prepared = without_state(prepared_scenario(stop=0.3))
+    result = run_scenario(prepared, checkpoints=KeptOnce(prepared, tmp_path, at=0.1, resume=False, say=said.append))
+    assert result.failure is not None
+    assert not list(tmp_path.iterdir())
+    kept = Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
+    assert kept.time is None
+
+
+def test_an_fmu_that_does_not_come_back_is_not_believed(tmp_path, said, monkeypatch):
+    """Planted: what was serialised is not restored."""
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 1.15)
+    monkeypatch.setattr(master_module, "set_state", lambda component, content: None)
+    result = resumed(prepared_scenario(), tmp_path, said)
+    assert len(said) == 1
+    assert "'dip' is computed from its start again: component 'gfor' does not go on from its state" in said[0]
+    assert told(result) == told(run_scenario(prepared_scenario()))
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, said):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="checkpoints cannot be kept there"):
+        Checkpoints(prepared_scenario(), tmp_path / "file" / "x", 60.0, resume=False, say=said.append)
+
+
+def test_a_disk_that_is_full_ends_no_run(tmp_path, said, monkeypatch):
+    prepared = prepared_scenario(stop=0.2)
+    kept = Checkpoints(prepared, tmp_path / "x", 1e-9, resume=False, say=said.append)
+    (tmp_path / "x").rmdir()
+    (tmp_path / "x").write_text("")
+    assert run_scenario(prepared, checkpoints=kept).failure is None
+    assert said[0].startswith("scenario 'dip': no checkpoints are written any more: ")
+
+
+# -- in Python -----------------------------------------------------------------------------------------
+
+
+def test_the_same_call_goes_on(tmp_path):
+    scenario = load("infinite_bus").scenario("dip")
+    prepared = scenario._until(STOP)
+    interrupted(prepared, tmp_path, [], 0.4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", CheckpointWarning)
+        run = scenario.run(STOP, checkpoints=tmp_path)
+    assert not list(tmp_path.iterdir())
+    whole = scenario.run(STOP)
+    assert all(np.array_equal(run.dataset[n].values, whole.dataset[n].values) for n in whole.dataset.variables)
