@@ -22,6 +22,8 @@ _HOMES = {
     "built_in_cases": "api.case",
     "check": "api.acceptance",
     "compare": "api.comparison",
+    "identify": "api.identification",
+    "info": "api.fmu",
     "load": "api.case",
     "open_fmu": "api.fmu",
     "read_linear_model": "api.linear",

@@ -3,7 +3,9 @@ from orchestrator.api.case import Case as Case
 from orchestrator.api.case import built_in_cases as built_in_cases
 from orchestrator.api.case import load as load
 from orchestrator.api.comparison import compare as compare
+from orchestrator.api.fmu import info as info
 from orchestrator.api.fmu import open_fmu as open_fmu
+from orchestrator.api.identification import identify as identify
 from orchestrator.api.linear import read_linear_model as read_linear_model
 from orchestrator.api.models import build as build
 from orchestrator.api.results import Modes as Modes

@@ -5,7 +5,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from orchestrator.acceptance.checks.base import Verdict
 from orchestrator.acceptance.runner import AcceptanceReport
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, ResultsError
+from orchestrator.safe_files import write_bytes
 
 
 def write_junit(report: AcceptanceReport, path: Path) -> None:
@@ -40,9 +41,9 @@ def write_junit(report: AcceptanceReport, path: Path) -> None:
             SubElement(case, "system-out").text = text + (f"\nremedy: {result.remedy}" if result.remedy else "")
     indent(suite)
     try:
-        path.write_bytes(b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suite, encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"--junit {path}: cannot be written: {error.strerror}; choose another file") from error
+        write_bytes(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suite, encoding="utf-8"))
+    except ResultsError as error:
+        raise InputError(f"--junit {error}") from error
 
 
 def _printable(text: str) -> str:

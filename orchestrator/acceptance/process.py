@@ -4,19 +4,11 @@ What comes from it lies in memory that the FMU's code can write. So it is taken 
 was asked for, and nothing else in this process is in the FMU's reach.
 """
 
-import contextlib
-import json
-import os
-import signal
-import subprocess
-import sys
-import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from ctypes import c_uint, memmove
 from dataclasses import asdict
 from math import inf
 from pathlib import Path
-from shutil import rmtree
 from time import monotonic
 from typing import Any, NoReturn
 
@@ -24,14 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
-from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
+from orchestrator.errors import ComponentError, InputError
+from orchestrator.fmi import answers
 from orchestrator.fmi.component import Derived, RealBatch
+from orchestrator.fmi.confined import ConfinedProcess
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.limits import TO_BEGIN, Limits
-from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, Mailbox, unlocked_library
+from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
-from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.protection import Protection
 from orchestrator.fmi.refusal import FATAL, check_log, refusal
 from orchestrator.fmi.remote_calls import RemoteCalls
 
@@ -70,47 +64,34 @@ class FmuProcess:
     ----------
     deadline
         `time.monotonic` after which no answer is waited for.
-    unlimited
-        What could not be limited, in words.
+    protections
+        What keeps it from the rest of the machine.
     """
 
     def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
         self.description, self.limits = description, limits
         self.deadline = inf
         self.time = 0.0
+        self.protections: tuple[Protection, ...] = ()
         self._ended: ProcessEndedError | None = None
         self._number, self._patience = 0, TO_BEGIN
-        self._folder = Path(tempfile.mkdtemp(prefix="gfor_check_"))
-        self._process: subprocess.Popen[bytes] | None = None
         self._library = unlocked_library()
+        fmu = description.path.resolve()
+        port = asdict(description.port) if isinstance(description, BoundDescription) else None
+        request = {"fmu": str(fmu), "port": port, "directory": str(directory)}
+        self._process = ConfinedProcess("orchestrator.acceptance.worker", request, [fmu, directory], limits)
         try:
-            self.box = Mailbox(self._folder / "mailbox", create=True)
+            self.box = self._process.box
             self._into, self._out = (self.box.array(which, np.uint32, MOST) for which in (0, 1))
             self._room = self.box.array(2, np.float64, ROOM)
-            self._start(directory)
+            self._begin()
         except BaseException:
             self.close()
             raise
 
-    def _start(self, directory: Path) -> None:
-        described = self.description
-        request = {
-            "fmu": str(self.description.path.resolve()),
-            "port": asdict(described.port) if isinstance(described, BoundDescription) else None,
-            "directory": str(directory),
-            "folder": str(self._folder),
-            "limits": asdict(self.limits),
-            "parent": os.getpid(),
-        }
-        work = self._folder / "work"
-        work.mkdir()
-        with (work / "output").open("wb") as output:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "orchestrator.acceptance.worker", json.dumps(request)],
-                stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True,
-            )  # fmt: skip
+    def _begin(self) -> None:
         try:
-            self.unlimited = tuple(map(str, self.talk("the beginning of its process", -1, "begin")))
+            self.protections = self._typed(answers.protections, self.talk("the beginning of its process", -1, "begin"))
         except ProcessEndedError as error:  # the FMU is not loaded yet
             raise InputError(f"the FMU's process did not start: {error.how}") from error
         self._patience = self.limits.seconds
@@ -139,21 +120,9 @@ class FmuProcess:
         self.box.write_text([instance, command, *arguments])
         self._ask(TALK, call)
         try:
-            answer = self.box.read_text()
-            if not isinstance(answer, dict) or len(answer) != 1:
-                raise ValueError("it is no answer")
-            ((kind, content),) = answer.items()
-            if kind == "component_error":
-                at, how, log = map(str, content)
-        except (ValueError, TypeError, RecursionError) as error:
+            return answers.content_of(self.box.read_text(), "fmu")
+        except ValueError as error:
             raise self._tampered(f"{error}") from error
-        if kind == "component_error":
-            raise ComponentError("fmu", at, how, log)
-        if kind == "unsupported" and isinstance(content, list) and len(content) == 2:
-            raise UnsupportedFmuError(str(content[0]), str(content[1]))
-        if kind == "input_error":
-            raise InputError(str(content))
-        return content
 
     def run(
         self, instance: int, into: NDArray[np.uint32], rows: Numbers, out: NDArray[np.uint32],
@@ -209,47 +178,43 @@ class FmuProcess:
 
     def number(self, call: str, instance: int, command: str, *arguments: Any) -> int:
         """As `talk`, where the answer must be a whole number."""
-        answer = self.talk(call, instance, command, *arguments)
-        if not isinstance(answer, int) or answer < 0:
-            raise self._tampered(f"{str(answer)[:50]!r} in place of a number")
-        return answer
+        found: int = self._typed(answers.number, self.talk(call, instance, command, *arguments))
+        return found
 
     def table(self, answer: Any) -> dict[str, float | bool]:
         """The names and numbers that an answer must be."""
-        if isinstance(answer, dict) and all(isinstance(value, int | float) for value in answer.values()):
-            return answer
-        raise self._tampered("a table that is none")
+        found: dict[str, float | bool] = self._typed(answers.table, answer)
+        return found
 
     def progress(self, answer: Any) -> tuple[bool, float | None]:
         """Whether it ended by itself, and when, as an answer must say it."""
-        if isinstance(answer, list) and len(answer) == 2:
-            ended, reached = answer
-            if isinstance(ended, bool) and (reached is None or isinstance(reached, int | float)):
-                return ended, reached
-        raise self._tampered("an answer that is none")
+        found: tuple[bool, float | None] = self._typed(answers.progress, answer)
+        return found
 
     def names(self, answer: Any) -> list[str]:
         """The list of texts that an answer must be."""
-        if isinstance(answer, list) and all(isinstance(text, str) for text in answer):
-            return answer
-        raise self._tampered("a list that is none")
+        found: list[str] = self._typed(answers.names, answer)
+        return found
 
     def hexadecimal(self, answer: Any) -> bytes:
         """The bytes that an answer must be."""
+        found: bytes = self._typed(answers.hexadecimal, answer)
+        return found
+
+    def _typed(self, form: Callable[[Any], Any], answer: Any) -> Any:
         try:
-            return bytes.fromhex(answer)
-        except (TypeError, ValueError) as error:
-            raise self._tampered("bytes that are none") from error
+            return form(answer)
+        except answers.NotAnAnswerError as error:
+            raise self._tampered(f"{error}") from error
 
     def _ask(self, kind: int, call: str) -> int:
         """Ask and wait; the status, or an error that says how the process ended."""
-        assert self._process is not None
         self._number += 1
         box, wait, begin, steps = self.box, self._library.mailbox_wait, monotonic(), self.box.head.steps
         self._library.mailbox_post(box.address, kind, self._number)
         while not (answered := wait(box.address, self._number, _LOOK)):
             now = monotonic()
-            if self._process.poll() is not None:
+            if not self._process.running:
                 if answered := wait(box.address, self._number, 0.0):
                     break  # with its last breath
                 raise self._died(call)
@@ -271,42 +236,25 @@ class FmuProcess:
     # -- how it ended ----------------------------------------------------------------------------
 
     def _tampered(self, seen: str) -> ProcessEndedError:
-        self._kill()
-        self._ended = ProcessEndedError("tampering", f"it wrote into the memory between the processes: {seen}")
-        return self._ended
+        return self._end("tampering", f"it wrote into the memory between the processes: {seen}")
 
     def _given_up(self, how: str) -> ProcessEndedError:
-        self._kill()
-        self._ended = ProcessEndedError("hang", how)
-        return self._ended
+        return self._end("hang", how)
 
     def _died(self, call: str) -> ProcessEndedError:
-        assert self._process is not None
-        fault, how = fault_of_exit(self._process.wait(), self.limits)
-        said = "" if fault == "output flood" else last_line(self._folder / "work" / "output")
-        tail = f"; it wrote: {said}" if said else ""
-        where = self._where(call)
-        self._kill()
-        self._ended = ProcessEndedError(fault, f"{how} in {where}{tail}")
-        return self._ended
+        fault, how = self._process.fault()
+        said = "" if fault == "output flood" else self._process.last_words()
+        return self._end(fault, f"{how} in {self._where(call)}{f'; it wrote: {said}' if said else ''}")
 
-    def _kill(self) -> None:
-        """End the process and what it started."""
-        process = self._process
-        if process is None:
-            return
-        if process.poll() is None:
-            process.kill()
-        process.wait()
-        if hasattr(os, "killpg"):
-            with contextlib.suppress(ProcessLookupError, PermissionError):  # nothing is left of it
-                os.killpg(process.pid, signal.SIGKILL)
+    def _end(self, fault: str, how: str) -> ProcessEndedError:
+        self._process.end()
+        self._ended = ProcessEndedError(fault, how)
+        return self._ended
 
     def close(self) -> None:
         """End the process and remove what was written for it."""
-        self._kill()
+        self._process.close()
         self._ended = self._ended or ProcessEndedError("exit", "its process was closed")
-        rmtree(self._folder, ignore_errors=True)
 
 
 class HostedComponent(RemoteCalls, Derived):

@@ -6,7 +6,7 @@ measurements come. So it reaches no verdict.
 
 import hashlib
 import traceback
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from shutil import rmtree
@@ -18,6 +18,7 @@ from orchestrator.acceptance.checks.base import (
     Check,
     CheckResult,
     Verdict,
+    Whose,
     failed,
     not_applicable,
     not_supported,
@@ -43,6 +44,7 @@ from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.protection import Protection, missing
 
 _PATIENCE = 10
 """A check may take this many times the limit for one call."""
@@ -54,8 +56,8 @@ class AcceptanceReport:
 
     Attributes
     ----------
-    unlimited
-        What could not be limited in the FMU's process, in words.
+    protections
+        What kept the FMU's process from the rest of the machine; empty where it was not started.
     used_as
         Component, scenario and operating point of the case, in words.
     """
@@ -63,7 +65,7 @@ class AcceptanceReport:
     fmu: Path
     binding: Path | None
     results: list[CheckResult] = field(default_factory=list)
-    unlimited: tuple[str, ...] = ()
+    protections: tuple[Protection, ...] = ()
     used_as: str = ""
 
     @property
@@ -82,6 +84,11 @@ class AcceptanceReport:
         return list(dict.fromkeys(r.fault for r in self.results if r.verdict is Verdict.NOT_SUPPORTED))
 
     @property
+    def binding_fails(self) -> bool:
+        """Whether the binding is what failed, so that nothing is known of the FMU behind it."""
+        return any(r.whose is Whose.BINDING for r in self.failures)
+
+    @property
     def trusted(self) -> bool:
         """Whether it was checked, and nothing failed."""
         return not self.failures and not self.not_supported
@@ -96,7 +103,8 @@ class AcceptanceReport:
             "trusted": self.trusted,
             "faults": self.faults,
             "not_supported": self.not_supported,
-            "not_limited": list(self.unlimited),
+            "not_limited": missing(self.protections),
+            "protections": [asdict(protection) for protection in self.protections],
             "used_as": self.used_as,
             "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
         }
@@ -149,16 +157,21 @@ def check_fmu(
     InputError
         If there is no such file or no such check, or the binding is not TOML, not of its form or not filled in.
     """
-    unknown = [name for name in only if name not in CHECKS]
+    unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:
-        raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {', '.join(CHECKS)}")
+        known = ", ".join([*FILE_CHECKS, *CHECKS])
+        raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
+    if "binding" in only and binding is None:
+        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor bind` drafts one)")
+    if fmu.is_dir():
+        raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():
         raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
     report = AcceptanceReport(fmu, binding, used_as=use.said if use else "")
     try:
-        native = read_description(fmu)
+        described = read_description(fmu)
         directory = extract(fmu)
     except UnsupportedFmuError as error:
         report.results.append(not_supported("archive", error))
@@ -169,13 +182,20 @@ def check_fmu(
         return report
     try:
         report.results.append(_unpacked(fmu))
-        bound = None if binding is None else _bound(report, native, binding)
-        compile_adapters(bound or native)  # here, where nobody waits for the FMU
-        subject = Subject(bound or native, directory, use)
+        bound = None if binding is None else _bound(report, described, binding)
+        wanted = [name for name in only if name in CHECKS] if only else list(CHECKS)
+        if binding is not None and bound is None:
+            # Without its port the FMU is asked in vain; what is wrong stands in a file that the user can mend at once.
+            report.results += [not_applicable(name, "because the binding does not fit") for name in wanted]
+            return report
+        if not wanted:
+            return report
+        compile_adapters(bound or described)  # here, where nobody waits for the FMU
+        subject = Subject(bound or described, directory, use)
         subject.memory["run_for"] = run_for
         runner = _Runner(report, subject, limits or Limits())
         try:
-            runner.run(list(only or CHECKS))
+            runner.run(wanted)
         finally:
             runner.close()
     finally:
@@ -195,13 +215,18 @@ def _unpacked(fmu: Path) -> CheckResult:
     )
 
 
-def _bound(report: AcceptanceReport, native: FmuDescription, binding: Path) -> BoundDescription | None:
+def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -> BoundDescription | None:
     """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
-        bound = bind(native, binding)
+        bound = bind(described, binding)
     except BindingError as error:
-        unit = any("the FMU declares" in p.text or "needs the key 'value'" in p.text for p in error.problems)
-        report.results.append(failed("binding", "wrong units" if unit else "binding does not fit", str(error)))
+        differ = any(", but the FMU declares" in p.text for p in error.problems)
+        says = "; ".join(map(str, error.problems))
+        result = failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
+        remedy = (
+            "give the unit that the FMU declares, or have modelDescription.xml corrected" if differ else result.remedy
+        )
+        report.results.append(replace(result, remedy=remedy, whose=Whose.BINDING))
         return None
     report.results.append(passed("binding", "all variables are there, with the units that it says"))
     return bound
@@ -222,7 +247,7 @@ class _Runner:
             self.close()
             subject = self._subject
             self._process = FmuProcess(subject.description, subject.directory, self._limits)
-            self._report.unlimited = self._process.unlimited
+            self._report.protections = self._process.protections
         self._process.deadline = self._deadline
         return self._process
 

@@ -1,13 +1,11 @@
-"""The process in which a foreign FMU is checked: it does what it is asked; started by `process`.
+"""The process in which a foreign FMU is checked: it does what it is asked; `supervisor` calls it.
 
 No check runs here and no verdict is made here: code of the FMU can change whatever is in its process.
 """
 
 import ctypes
 import gc
-import json
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,7 @@ from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.isolation_worker import Worker
 from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, Served
-from orchestrator.fmi.port import BoundDescription, PortMap
+from orchestrator.fmi.port import BoundDescription, PortMap, without_binding
 
 _MOST = 256
 """Instances at the same time."""
@@ -36,8 +34,8 @@ class Host(Worker):
         self._asked = 0
 
     def _described(self) -> FmuDescription:
-        native, port = super()._described(), self._request["port"]
-        return native if port is None else BoundDescription.of(native, PortMap.of_dict(port))
+        described, port = super()._described(), self._request["port"]
+        return described if port is None else BoundDescription.of(described, PortMap.of_dict(port))
 
     def serve(self) -> None:
         """Answer the mailbox: runs in C, everything else here."""
@@ -60,7 +58,7 @@ class Host(Worker):
 
     def do_absent_functions(self) -> list[list[str]]:
         """Functions that the binary lacks: those that it needs by what it declares, and the others."""
-        described = self._description.native if isinstance(self._description, BoundDescription) else self._description
+        described = without_binding(self._description)
         library = load(described, Path(self._request["directory"]))
         try:
             return list(absent_functions(described, library))
@@ -83,5 +81,6 @@ class Host(Worker):
         return open_files()
 
 
-if __name__ == "__main__":
-    Host(json.loads(sys.argv[1])).serve()
+def main(request: dict[str, Any]) -> None:
+    """Answer for the instances of an FMU that is checked."""
+    Host(request).serve()

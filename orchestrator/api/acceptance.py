@@ -1,15 +1,20 @@
 """Acceptance tests of an FMU."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from orchestrator.acceptance.checks.subject import Use
+from orchestrator.acceptance.junit import write_junit
 from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, question_of
-from orchestrator.api.show import page
-from orchestrator.api.values import Time, in_seconds
+from orchestrator.api.values import Names, Time, binding_path, in_megabytes, in_seconds, names, text_or_none
+from orchestrator.api.values import path as path_of
+from orchestrator.cases.use import use_in_case
+from orchestrator.errors import InputError
+from orchestrator.fmi.limits import LEAST_MEMORY, Limits
+
+DataFrame = Any
+"""``pandas.DataFrame``; importing the class takes 0.3 s, which ``gfor check`` saves."""
 
 
 class Acceptance:
@@ -34,8 +39,15 @@ class Acceptance:
         """Names of what is wrong, each once."""
         return self.report.faults
 
-    def table(self) -> pd.DataFrame:
+    @property
+    def not_supported(self) -> list[str]:
+        """Names of what this program or machine lacks for this FMU, each once."""
+        return self.report.not_supported
+
+    def table(self) -> DataFrame:
         """One row a check: its question, verdict, evidence and remedy."""
+        import pandas as pd  # noqa: PLC0415 - see `DataFrame`
+
         rows = {r.check: (str(r.verdict), question_of(r.check), r.evidence, r.remedy) for r in self.report.results}
         return pd.DataFrame.from_dict(rows, orient="index", columns=["verdict", "question", "evidence", "remedy"])
 
@@ -43,17 +55,32 @@ class Acceptance:
         """The same as ``gfor check --json`` prints, as JSON's types."""
         return self.report.as_dict()
 
+    def save_junit(self, path: str | Path) -> Path:
+        """Write the results as JUnit's XML for a CI server, as ``gfor check --junit``; returns the path.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        write_junit(self.report, Path(path))
+        return Path(path)
+
     def _verdict(self) -> str:
         if self.trusted:
             return "no check failed"
         if not self.report.failures:
             return f"not supported here: {', '.join(self.report.not_supported)}"
+        if self.report.binding_fails:
+            return f"the binding is to be mended: {', '.join(self.faults)}"
         return f"do not use it as it is: {', '.join(self.faults)}"
 
     def __repr__(self) -> str:
         return f"<Acceptance of {self.report.fmu.name}: {self._verdict()}>"
 
     def _repr_html_(self) -> str:
+        from orchestrator.api.show import page  # noqa: PLC0415 - imports pandas
+
         return page(f"{self.report.fmu.name}: {self._verdict()}", table=self.table())
 
 
@@ -62,34 +89,77 @@ def check(
     binding: str | Path | None = None,
     *,
     step: Time | None = None,
-    only: Sequence[str] = (),
+    only: Names = (),
+    case: str | Path | None = None,
+    component: str | None = None,
+    scenario: str | None = None,
+    time_limit: Time | None = None,
+    memory_limit: float | str | None = None,
 ) -> Acceptance:
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
     Parameters
     ----------
     path
-        Of the FMU.
+        Path of the FMU.
     binding
-        File that says what its variables mean at our port (``gfor bind`` drafts one).
+        File that says what the FMU's variables mean at our port (``gfor bind`` drafts one); by default the case's.
     step
-        Communication step of use [s]; what the file declares by default.
+        Communication step of use [s]; by default the case's, and without a case the one that the FMU declares.
     only
         Names of checks; all of them where empty.
+    case
+        Name or path of a case that uses the FMU: its step, operating point, values and binding are taken.
+    component
+        Name of the component of the case that is this FMU; by default the component with this file.
+    scenario
+        Name of the case's scenario; by default the first one with the component.
+    time_limit
+        Wall-clock time that one call of the FMU may take [s]; 30 s by default.
+    memory_limit
+        Memory that the FMU's process may take [MB], or text such as ``"4 GB"``; 4096 MB by default, at least 32 MB.
 
     Raises
     ------
     InputError
-        If there is no such file or no such check, or the binding cannot be used.
+        If there is no such file, check, case, component or scenario, or the binding cannot be used.
 
     Examples
     --------
     >>> import orchestrator as gfor
-    >>> report = gfor.check(gfor.build("infinite_bus"), only=["runs"])
+    >>> fmu = gfor.build("infinite_bus")
+    >>> report = gfor.check(fmu, only=["runs"])
     >>> report.trusted
     True
     >>> report.table()["verdict"].to_dict()
     {'archive': 'pass', 'runs': 'pass'}
+
+    With the step, the operating point and the values of a case:
+
+    >>> report = gfor.check(fmu, case="infinite_bus", component="grid", only=["runs"])
+    >>> report.report.used_as
+    "component 'grid' in scenario 'dip' of case.toml: P_0 = 9, Q_0 = 0.75, v_0 = 1, theta_0 = 0 (default)"
     """
-    use = Use(in_seconds(step, "step"))
-    return Acceptance(check_fmu(Path(path), Path(binding) if binding else None, only=tuple(only), use=use))
+    limits, step_size = _limits(time_limit, memory_limit), in_seconds(step, "step")
+    file, use, bound_by = path_of(path, "path"), Use(step_size), binding_path(binding)
+    for argument, given in (("component", component), ("scenario", scenario)):
+        text_or_none(given, argument, "give one name, or leave it out")
+    if case is not None:
+        use, of_case = use_in_case(str(path_of(case, "case")), component, file, step_size, scenario)
+        bound_by = bound_by or of_case
+    elif component or scenario:
+        kind, name = ("component", component) if component else ("scenario", scenario)
+        raise InputError(f"{kind} = {name!r} names a {kind} of a case; give case as well")
+    return Acceptance(check_fmu(file, bound_by, limits, names(only, "only"), use=use))
+
+
+def _limits(time_limit: Time | None, memory_limit: float | str | None) -> Limits:
+    """The usual limits, with those replaced that are given."""
+    limits = Limits()
+    seconds = in_seconds(time_limit, "time_limit")
+    if seconds is not None:
+        limits = replace(limits, seconds=seconds)
+    if memory_limit is not None:
+        megabytes = in_megabytes(memory_limit, "memory_limit", LEAST_MEMORY)
+        limits = replace(limits, memory=int(megabytes * 1024**2))
+    return limits

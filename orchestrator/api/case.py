@@ -1,6 +1,6 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -8,10 +8,13 @@ import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
+from orchestrator.api.executors import choose_executor
+from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.show import page
-from orchestrator.api.sweep import ParameterSweep, sweep_parameters
-from orchestrator.api.values import Time, in_seconds, parameter_files, plain
+from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
+from orchestrator.api.values import Names, Paths, Time, case_values, flag, in_seconds, parameter_files, text_or_none
+from orchestrator.api.values import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
@@ -30,8 +33,14 @@ def built_in_cases() -> tuple[str, ...]:
     return names_of_cases()
 
 
-def load(case: str | Path) -> "Case":
+def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
     """Load a built-in case by name, or a case file or an SSP archive by path.
+
+    Parameters
+    ----------
+    trust_fmus
+        Whether FMUs of others may run in this process, where the file says ``isolated = false``; they can do there
+        whatever you can. Without it such a file is refused.
 
     Raises
     ------
@@ -46,7 +55,10 @@ def load(case: str | Path) -> "Case":
     >>> gfor.load("infinite_bus").scenarios
     ('dip', 'load_step')
     """
-    return Case(load_case(case))
+    if not isinstance(case, str | Path) or not str(case):
+        raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")
+    path_of(case, "case")
+    return Case(load_case(case, trust_fmus=flag(trust_fmus, "trust_fmus")))
 
 
 class Case:
@@ -86,7 +98,7 @@ class Case:
         values: Mapping[str, Any] | None = None,
         *,
         step: Time | None = None,
-        parameters: Iterable[str | Path] = (),
+        parameters: Paths = (),
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
@@ -98,6 +110,7 @@ class Case:
             Of the scenario; may be left out where the case has one only.
         values
             Values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as ``"1350 MW"``.
+            ``{"grid": {"X_L": 0.3}}`` means the same as ``{"grid.X_L": 0.3}``.
         step
             Communication step [s]; the case's by default.
         parameters
@@ -115,22 +128,23 @@ class Case:
         >>> case.scenario("pod_p", {"grid.X_L": 0.3}).values["grid.X_L"]
         0.3
         """
+        text_or_none(name, "name", f"give the name of one scenario: {', '.join(self.scenarios)}")
         if name is None and len(self.scenarios) != 1:
             raise InputError(
                 f"{self.name}: the case has {len(self.scenarios)} scenarios; choose one of: {', '.join(self.scenarios)}"
             )
         (chosen,) = choose(self.file, [name] if name else [], values, step=step, parameters=parameters)
-        question([chosen])
+        question([chosen.prepared])
         return chosen
 
     def choose(
         self,
-        names: Sequence[str] = (),
+        names: Names = (),
         values: Mapping[str, Any] | None = None,
         *,
         step: Time | None = None,
         stop: Time | None = None,
-        parameters: Iterable[str | Path] = (),
+        parameters: Paths = (),
     ) -> list[Scenario]:
         """Several scenarios, or all; the mistakes of all are reported together.
 
@@ -155,18 +169,21 @@ class Case:
         ['SG + GFOR', 'SG + GFOR POD-P']
         """
         chosen = choose(self.file, names, values, step=step, stop=stop, parameters=parameters)
-        question(chosen)
+        question(scenario.prepared for scenario in chosen)
         return chosen
 
     def sweep(
         self,
         vary: Mapping[str, Iterable[Any]] | Iterable[str],
-        scenarios: Sequence[str] = (),
+        scenarios: Names = (),
         values: Mapping[str, Any] | None = None,
         *,
         step: Time | None = None,
+        parameters: Paths = (),
         frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        workers: int = 1,
+        workers: int | None = 1,
+        scheduler: str | None = None,
+        tls: str | Path | None = None,
         folder: str | Path | None = None,
         progress: bool = False,
     ) -> ParameterSweep:
@@ -179,16 +196,26 @@ class Case:
             followed along the last one.
         scenarios
             Names; all of them where empty.
-        values, step
+        values, step, parameters
             As for `scenario`.
         frequencies
             Modes from the first to the second are followed [Hz].
         workers
-            Processes to compute in.
+            Processes to compute in; one for each core where None.
+        scheduler
+            Address of a Dask cluster to compute on instead, such as ``tcp://host:8786``.
+        tls
+            Folder with ``ca.pem``, ``cert.pem`` and ``key.pem``, for a scheduler at ``tls://host:8786``.
         folder
-            Keeps the points, so that none is computed twice; they are forgotten where None.
+            Keeps the points: a later sweep with this folder reads them instead of computing them again. Without a
+            folder the points are forgotten.
         progress
             Show a bar.
+
+        Raises
+        ------
+        InputError
+            If a parameter, value, scenario, file or number of workers cannot be used.
 
         Examples
         --------
@@ -200,10 +227,14 @@ class Case:
         0       0.1          0.58            10.59
         1       0.2          0.43            18.01
         """
-        return sweep_parameters(
-            self.file, vary, scenarios, plain(values), in_seconds(step, "step"), frequencies, workers, folder,
-            progress=progress,
-        )  # fmt: skip
+        if scheduler is not None and workers not in (None, 1):
+            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
+        kept = None if folder is None else _folder(folder)
+        executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
+        planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
+        question(planned.scenarios)
+        with shown_progress("Points", shown=progress) as report:
+            return compute(planned, executor, kept, report)
 
     def design(
         self,
@@ -212,7 +243,8 @@ class Case:
         values: Mapping[str, Any] | None = None,
         *,
         step: Time | None = None,
-        parameters: Iterable[str | Path] = (),
+        parameters: Paths = (),
+        progress: bool = False,
         **wanted: Unpack[Wanted],
     ) -> ControllerDesign:
         """Design a POD controller by eigenvalue sensitivity, and check it on the closed loop.
@@ -225,6 +257,8 @@ class Case:
             Its name; by default the one without this controller.
         values, step, parameters
             As for `scenario`.
+        progress
+            Show a line with the stage that the design has come to.
         wanted
             Any of: ``damping`` or ``damping_increment`` (ratios: 0.2 is 20 %), ``component``, ``mode``,
             ``gain_bounds`` and ``delta_gain`` [pu], ``stages``, ``compensated_gain``, ``least_damping``, ``refine``,
@@ -246,7 +280,12 @@ class Case:
         """
         files = parameter_files(parameters)
         step_size = in_seconds(step, "step")
-        return design_controller(self.file, controller, scenario, plain(values), step_size, files, wanted)
+        with shown_stages(shown=progress) as report:
+            design = design_controller(
+                self.file, controller, scenario, case_values(values), step_size, files, wanted, report=report
+            )
+        question([design.result.prepared])
+        return design
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
@@ -255,3 +294,15 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+def _folder(given: str | Path) -> Path:
+    """The folder that keeps a sweep's points, made where missing."""
+    place = path_of(given, "folder", "folder")
+    try:
+        (place / "points").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"
+        ) from error
+    return place

@@ -1,16 +1,26 @@
 """Two runs side by side."""
 
+import warnings
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import xarray as xr
 
+from orchestrator.api.identification import identified_mode_json, opened
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
+from orchestrator.api.values import Names, Time, moment, names
 from orchestrator.errors import InputError
-from orchestrator.study.comparison import Comparison, most_different, open_trajectory
+from orchestrator.results.manifest import ResultsWarning
+from orchestrator.study.common_times import common_times
+from orchestrator.study.comparison import Comparison, most_different
 from orchestrator.study.comparison import compare as compare_signal
+
+RINGS_FROM = 2.0
+"""Oscillations are looked for from this time on [s], if nothing else is asked for."""
 
 
 class RunComparison:
@@ -22,10 +32,12 @@ class RunComparison:
         Of the two runs.
     signals
         One comparison a signal, those first that differ most.
+    remarks
+        Sentences on different record intervals, and on runs too short for their oscillations to be read.
     """
 
-    def __init__(self, labels: tuple[str, str], signals: Sequence[Comparison]) -> None:
-        self.labels, self.signals = labels, list(signals)
+    def __init__(self, labels: tuple[str, str], signals: Sequence[Comparison], remarks: Sequence[str] = ()) -> None:
+        self.labels, self.signals, self.remarks = labels, list(signals), list(remarks)
 
     def __iter__(self) -> Iterator[Comparison]:
         return iter(self.signals)
@@ -50,18 +62,22 @@ class RunComparison:
         ]
         return pd.DataFrame(rows).set_index("signal")
 
+    def as_json(self) -> list[dict[str, Any]]:
+        """The same as ``gfor compare --json`` prints, as JSON's types."""
+        return [asdict(c) | {"modes": [m and identified_mode_json(m) for m in c.modes]} for c in self.signals]
+
     def __repr__(self) -> str:
         return f"<RunComparison of {self.labels[0]} and {self.labels[1]}: {len(self.signals)} signals>"
 
     def _repr_html_(self) -> str:
-        return page(f"a: {self.labels[0]}; b: {self.labels[1]}", table=self.table())
+        return page(f"a: {self.labels[0]}; b: {self.labels[1]}", self.remarks, self.table())
 
 
 def compare(
     a: Run | xr.Dataset | str | Path,
     b: Run | xr.Dataset | str | Path,
-    signals: Sequence[str] = (),
-    start: float = 2.0,
+    signals: Names = (),
+    start: Time | None = None,
 ) -> RunComparison:
     """Compare two runs: how far signals differ, and what each rings with.
 
@@ -72,12 +88,12 @@ def compare(
     signals
         ``"a.b"`` or ``"a.b - c.d"``; by default those that differ most.
     start
-        Oscillations are looked for from this time on [s].
+        Oscillations are looked for from this time on [s]; from 2 s where None.
 
     Raises
     ------
     InputError
-        If a run does not have a signal, or they have no time in common.
+        If a run does not have a signal, they have no time in common, or one ends before ``start``.
 
     Examples
     --------
@@ -87,17 +103,36 @@ def compare(
     >>> print(f"{difference['grid.v']:.3f} pu")
     0.096 pu
     """
-    (first, label_a), (second, label_b) = _opened(a, "a"), _opened(b, "b")
-    chosen = signals or most_different(first, second)
+    (first, label_a), (second, label_b) = opened(a, "a"), opened(b, "b")
+    labels = (label_a, label_b) if label_a != label_b else (f"a ({label_a})", f"b ({label_b})")
+    _warn_of_different_ends(first, second, labels)
+    begin = RINGS_FROM if start is None else moment(start, "start")
+    ends = [(label, float(run["time"][-1])) for run, label in zip((first, second), labels, strict=True)]
+    short = [(label, end) for label, end in ends if end <= begin]
+    if short and start is not None:
+        raise InputError(f"start = {start!r}: {short[0][0]} ends at t = {short[0][1]:g} s; give an earlier start")
+    remarks = [
+        f"{label} ends at t = {end:g} s: its oscillations, which are read from t = {begin:g} s on, are not shown; give "
+        "an earlier start."
+        for label, end in short
+    ]
+    chosen = names(signals, "signals") or most_different(first, second, labels=labels)
     if not chosen:
-        raise InputError(f"{label_a} and {label_b} have no signal in common")
-    labels = (label_a, label_b)
-    return RunComparison(labels, [compare_signal(first, second, one, start, labels) for one in chosen])
+        raise InputError(f"{labels[0]} and {labels[1]} have no signal in common")
+    times = common_times(first["time"].values, second["time"].values, labels)
+    signals_compared = [compare_signal(first, second, one, begin, labels) for one in chosen]
+    return RunComparison(labels, signals_compared, [*([times.remark] if times.remark else []), *remarks])
 
 
-def _opened(run: Run | xr.Dataset | str | Path, letter: str) -> tuple[xr.Dataset, str]:
-    """A run's dataset, and its name."""
-    if isinstance(run, str | Path):
-        return open_trajectory(Path(run)), str(run)
-    dataset = run.dataset if isinstance(run, Run) else run
-    return dataset, str(dataset.attrs.get("scenario", letter))
+def _warn_of_different_ends(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:
+    """Warn where one run ends before the other: the rest of the longer one is not compared."""
+    times = [run["time"].values for run in (first, second)]
+    if min(map(len, times)) < 2:
+        return
+    (end_a, end_b), interval = (float(t[-1]) for t in times), max(float(t[-1] - t[-2]) for t in times)
+    if abs(end_a - end_b) > interval * (1 + 1e-6):
+        text = (
+            f"{labels[0]} ends at t = {end_a:.6g} s, and {labels[1]} at t = {end_b:.6g} s: differences are those until "
+            f"t = {min(end_a, end_b):.6g} s, and each oscillation is read until its own run's end"
+        )
+        warnings.warn(text, ResultsWarning, stacklevel=3)

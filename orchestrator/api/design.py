@@ -1,19 +1,25 @@
 """The design of a POD controller."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
 import pandas as pd
 
+from orchestrator.api.design_wishes import check_wishes
 from orchestrator.api.show import page
+from orchestrator.api.values import path as path_of
+from orchestrator.api.values import text_or_none
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.parameter_files import ParameterFile, parameter_file_text
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
-from orchestrator.pod_design.design import DesignRequest, PodDesign, design_pod
+from orchestrator.pod_design.design import DesignRequest, PodDesign, StageReport, design_pod
 from orchestrator.pod_design.files import design_json, parameters_of, provenance
 from orchestrator.pod_design.target import CONTROLLERS
+from orchestrator.points.store import PointStore
+from orchestrator.safe_files import write_text
 
 
 class Wanted(TypedDict, total=False):
@@ -76,16 +82,50 @@ class ControllerDesign:
             }
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor design --json`` prints, as JSON's types, without the parameter file."""
-        return design_json(self.result)
+    def as_json(self, parameter_file: str | Path | None = None) -> dict[str, Any]:
+        """The same as ``gfor design --json`` prints, as JSON's types.
 
-    def save(self, path: str | Path) -> Path:
-        """Write a parameter file, which ``--parameters`` and `Case.scenario` take."""
-        command = f"gfor.load({self.result.case!r}).design({self.result.request.controller!r}, …) in Python"
+        Parameters
+        ----------
+        parameter_file
+            Path of the parameter file, which the command names at the end; left out where None.
+        """
+        named = {} if parameter_file is None else {"parameter_file": str(parameter_file)}
+        return design_json(self.result) | named
+
+    def save(self, path: str | Path, command: str | None = None) -> Path:
+        """Write the parameter file, which ``--parameters`` and `Case.scenario` take, and its JSON for ``gfor report``.
+
+        Parameters
+        ----------
+        path
+            Path of the parameter file; the JSON gets the same path with the suffix ``.json``.
+        command
+            The command that the file names as its origin; by default the call in Python.
+
+        Raises
+        ------
+        InputError
+            If the path is none, or ends in ``.json``: the JSON would take the parameter file's place.
+        ResultsError
+            If a file cannot be written.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> case = gfor.load("two_area")
+        >>> file = case.design("pod_p", margins=False).save("pod_p.toml")
+        >>> case.scenario("gfor", parameters=[file]).values["gfor.pod_p.K"]
+        200.0
+        """
+        if command is None:
+            command = f"gfor.load({self.result.case!r}).design({self.result.request.controller!r}, …) in Python"
+        file = parameter_file_path(path)
         text = parameter_file_text(self.parameters, provenance(self.result, command))
-        Path(path).write_text(text, encoding="utf-8")
-        return Path(path)
+        content = json.dumps(self.as_json(file), indent=1, ensure_ascii=False)
+        write_text(file, text)
+        write_text(file.with_suffix(".json"), content + "\n")
+        return file
 
     def __repr__(self) -> str:
         said = "met" if self.met else "not met"
@@ -105,6 +145,9 @@ def design_controller(
     step_size: float | None,
     parameters: Sequence[ParameterFile],
     wanted: Wanted,
+    *,
+    report: StageReport = lambda text: None,
+    store: PointStore | None = None,
 ) -> ControllerDesign:
     """Design a controller, as `Case.design` offers it.
 
@@ -124,6 +167,10 @@ def design_controller(
         Parameter files.
     wanted
         As `Case.design`; a name that it does not have is refused.
+    report
+        Called with the name of each stage when the stage begins.
+    store
+        Keeps figures on the way, as `design_pod` takes it.
     """
     if controller not in CONTROLLERS:
         raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
@@ -133,11 +180,26 @@ def design_controller(
         raise InputError(f"a design cannot be asked for {', '.join(map(repr, unknown))}; it can for {known}")
     if "damping" in wanted and "damping_increment" in wanted:
         raise InputError("damping and damping_increment both say what is required; give one of them")
+    text_or_none(scenario, "scenario", "a design is made for one scenario: give its name, or leave it out")
+    wishes = check_wishes(wanted)
     request = DesignRequest(
-        controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wanted
+        controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wishes
     )
-    for name in ("damping", "damping_increment", "least_damping"):
-        ratio = getattr(request, name)
-        if ratio is not None and not 0 < ratio < 1:
-            raise InputError(f"{name} = {ratio:g}; it is a damping ratio between 0 and 1, such as 0.2 for 20 %")
-    return ControllerDesign(design_pod(file, request))
+    return ControllerDesign(design_pod(file, request, report, store))
+
+
+def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
+    """The path of a parameter file, beside which the design's JSON finds a place of its own.
+
+    Raises
+    ------
+    InputError
+        If it is none, or ends in ``.json``.
+    """
+    path = path_of(given, argument)
+    if path.suffix.lower() == ".json":
+        raise InputError(
+            f"{argument} = {str(path)!r}; the parameter file is TOML, and the design's JSON is written beside it: "
+            f"name it {path.with_suffix('.toml').name}"
+        )
+    return path

@@ -1,6 +1,6 @@
-"""One FMU by itself: opened, set, stepped and read."""
+"""One FMU by itself: what it declares; opened, set, stepped and read."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -8,13 +8,16 @@ from typing import Any, Self
 import pandas as pd
 
 from orchestrator.api.show import page
-from orchestrator.api.values import plain
+from orchestrator.api.values import Names, Time, binding_path, in_seconds, plain
+from orchestrator.api.values import names as names_given
+from orchestrator.api.values import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
-from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
 
 
 class Fmu:
@@ -32,15 +35,16 @@ class Fmu:
         self.description = description
         self.time = 0.0
         start = self._converted(values)
-        self._component: Component = open_component(description.model_name, description)
+        component: Component = open_component(description.model_name, description)
         try:
-            self._component.set(start)
-            self._component.setup(0.0, stop)
-            self._component.enter_initialization_mode()
-            self._component.exit_initialization_mode()
+            component.set(start)
+            component.setup(0.0, stop)
+            component.enter_initialization_mode()
+            component.exit_initialization_mode()
         except BaseException:
-            self._component.close()
+            component.close()
             raise
+        self._component: Component | None = component
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set inputs and tunable parameters: numbers, truth values, or text with a unit such as ``"30 MW"``.
@@ -48,11 +52,11 @@ class Fmu:
         Raises
         ------
         InputError
-            If there is no such variable, or a value does not fit its type, unit or range.
+            If there is no such variable, a value does not fit its type, unit or range, or the FMU was closed.
         ComponentError
             If the FMU refuses.
         """
-        self._component.set(self._converted(values))
+        self._open().set(self._converted(values))
 
     def get(self, name: str) -> float | bool:
         """The value of one variable.
@@ -60,45 +64,63 @@ class Fmu:
         Raises
         ------
         InputError
-            If there is no such variable.
+            If there is no such variable, or the FMU was closed.
         """
+        self._variable(name)
         return self.values([name])[name]
 
-    def values(self, names: Iterable[str] | None = None) -> dict[str, float | bool]:
-        """The values of several variables; of all outputs by default."""
-        chosen = list(self.description.outputs if names is None else names)
-        for name in chosen:
-            self._variable(name)
-        return self._component.values(chosen)
-
-    def step(self, step_size: float) -> None:
-        """One communication step [s].
+    def values(self, names: Names | None = None) -> dict[str, float | bool]:
+        """The values of several variables; of all outputs by default.
 
         Raises
         ------
+        InputError
+            If there is no such variable, or the FMU was closed.
+        """
+        component = self._open()
+        chosen = self.description.outputs if names is None else names_given(names, "names")
+        for name in chosen:
+            self._variable(name)
+        return component.values(list(chosen))
+
+    def step(self, step_size: Time) -> None:
+        """One communication step [s], or text with a unit such as ``"1 ms"``.
+
+        Raises
+        ------
+        InputError
+            If the step is no time above 0, or the FMU was closed.
         ComponentError
             If the FMU refuses.
         """
-        if not 0 < step_size < float("inf"):
-            raise InputError(f"step_size = {step_size!r}; a communication step must be above 0 s and finite")
-        self._component.step(self.time, step_size)
-        self.time += step_size
+        component = self._open()
+        seconds = in_seconds(step_size, "step_size")
+        if seconds is None:
+            raise InputError("step_size = None; give a communication step above 0 s, such as 1e-4 or '100 us'")
+        component.step(self.time, seconds)
+        self.time += seconds
 
     def close(self) -> None:
-        """End it, and remove what was extracted for it."""
-        self._component.close()
+        """End it, and remove what was extracted for it; a second call does nothing."""
+        component, self._component = self._component, None
+        if component is not None:
+            component.close()
+
+    def _open(self) -> Component:
+        """The running FMU. A call into one that was closed would end the whole interpreter."""
+        if self._component is None:
+            raise InputError(
+                f"{self.description.model_name}: this FMU was closed; open it again with open_fmu, and use it within "
+                "its 'with' block"
+            )
+        return self._component
 
     def table(self) -> pd.DataFrame:
         """The variables that it declares: causality, type, unit, start value, range, description."""
-        rows = {
-            v.name: (v.causality, v.variability, v.type, v.unit, v.start, v.minimum, v.maximum, v.description)
-            for v in self.description.variables.values()
-        }
-        columns = ["causality", "variability", "type", "unit", "start", "minimum", "maximum", "description"]
-        return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+        return _variables(self.description)
 
     def _variable(self, name: str) -> VariableInfo:
-        if name not in self.description.variables:
+        if not isinstance(name, str) or name not in self.description.variables:
             raise InputError(f"{self.description.model_name}: there is no variable {name!r}; table() lists them")
         return self.description.variables[name]
 
@@ -110,6 +132,7 @@ class Fmu:
             raise InputError(f"{self.description.model_name}: {error}") from error
 
     def __enter__(self) -> Self:
+        self._open()
         return self
 
     def __exit__(
@@ -131,7 +154,7 @@ def open_fmu(
     values: Mapping[str, Any] | None = None,
     *,
     binding: str | Path | None = None,
-    stop: float | None = None,
+    stop: Time | None = None,
 ) -> Fmu:
     """Open and initialise an FMU; use it in a ``with`` block. Foreign ones run in a process of their own.
 
@@ -163,4 +186,79 @@ def open_fmu(
     ...     print(f"{fmu.get('v'):.1f} pu after {fmu.time:.1f} s")
     0.8 pu after 0.1 s
     """
-    return Fmu(bound_fmu(path, binding), values or {}, stop)
+    return Fmu(bound_fmu(path_of(path, "path"), binding_path(binding)), values or {}, in_seconds(stop, "stop"))
+
+
+class FmuInfo:
+    """What an FMU declares. `info` makes it.
+
+    Attributes
+    ----------
+    description
+        The FMU's own description: names, platforms, abilities, variables.
+    linear_model
+        The linear model that the file carries; None where it carries no model.
+    """
+
+    def __init__(self, description: FmuDescription, linear_model: EmbeddedModel | None) -> None:
+        self.description, self.linear_model = description, linear_model
+
+    def table(self) -> pd.DataFrame:
+        """One row for every variable: causality, type, unit, start value, range, description."""
+        return _variables(self.description)
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor info --json`` prints, as JSON's types."""
+        d = self.description
+        keys = ("name", "type", "causality", "variability", "unit", "start", "minimum", "maximum", "description")
+        return {
+            "model_name": d.model_name,
+            "title": d.title,
+            "guid": d.guid,
+            "generation_tool": d.generation_tool,
+            "fmi_version": d.fmi_version,
+            "platforms": list(d.platforms),
+            "continuous_states": list(d.states),
+            "states_are_settable": d.states_are_settable,
+            "can_save_state": d.can_save_state,
+            "has_linear_model": self.linear_model is not None,
+            "variables": [{key: getattr(v, key) for key in keys} for v in d.variables.values()],
+        }
+
+    def __repr__(self) -> str:
+        d = self.description
+        return f"<FmuInfo of {d.model_name}: FMI {d.fmi_version}, {len(d.variables)} variables>"
+
+    def _repr_html_(self) -> str:
+        return page(f"{self.description.model_name}: {self.description.title}", table=self.table())
+
+
+def info(path: str | Path) -> FmuInfo:
+    """Read what an FMU declares; nothing in the file is executed.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> found = gfor.info(gfor.build("infinite_bus"))
+    >>> found.description.fmi_version
+    '2.0'
+    >>> found.table().loc["v", ["causality", "unit"]].to_list()
+    ['output', 'pu']
+    """
+    file = path_of(path, "path")
+    return FmuInfo(read_description(file), read_embedded_model(file))
+
+
+def _variables(description: FmuDescription) -> pd.DataFrame:
+    """The variables that an FMU declares, one row for each."""
+    rows = {
+        v.name: (v.causality, v.variability, v.type, v.unit, v.start, v.minimum, v.maximum, v.description)
+        for v in description.variables.values()
+    }
+    columns = ["causality", "variability", "type", "unit", "start", "minimum", "maximum", "description"]
+    return pd.DataFrame.from_dict(rows, orient="index", columns=columns)

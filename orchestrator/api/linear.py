@@ -11,6 +11,7 @@ from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.state_space import read_linear_model as read_state_space
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.api.show import page
+from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
 
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
@@ -54,7 +55,7 @@ class LinearSystem(StateSpace):
             "C": (self.outputs, self.states),
             "D": (self.outputs, self.inputs),
         }
-        if matrix not in rows_and_columns:
+        if not isinstance(matrix, str) or matrix not in rows_and_columns:
             raise InputError(f"there is no matrix {matrix!r}; there are A, B, C and D")
         rows, columns = rows_and_columns[matrix]
         return pd.DataFrame(getattr(self, matrix), index=list(rows), columns=list(columns))
@@ -87,4 +88,4 @@ def read_linear_model(fmu: str | Path) -> LinearSystem:
     ...     print("no model:", type(error).__name__)
     no model: FmuFileError
     """
-    return LinearSystem(**vars(read_state_space(Path(fmu))))
+    return LinearSystem(**vars(read_state_space(path_of(fmu, "fmu"))))

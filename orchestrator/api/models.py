@@ -1,11 +1,14 @@
 """FMUs of the catalogue's models."""
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.extras import require
 from fmus.toolchain.model import FmiVersion, Model
+from orchestrator.api.values import flag, names
+from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
 
 
@@ -15,7 +18,7 @@ def catalogue_model(name: str) -> Model:
     Raises
     ------
     InputError
-        If there is none of that name, or it needs a network.
+        If there is none of that name, it needs a network, or its equations break a rule of the model builder.
     """
     if name not in model_names():
         raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
@@ -23,7 +26,10 @@ def catalogue_model(name: str) -> Model:
         raise InputError(
             f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
         )
-    return build_model(name)
+    try:
+        return build_model(name)
+    except ValueError as error:
+        raise InputError(f"model {name!r} cannot be built: {error}") from error
 
 
 def build(
@@ -50,7 +56,7 @@ def build(
     platforms
         Compile for these; by default for this machine's, native ones for all.
     extra
-        Members for the FMU's ``extra/`` folder, by path.
+        Members for the FMU's ``extra/`` folder, by path, such as ``{"extra/notes.txt": b"..."}``.
 
     Raises
     ------
@@ -65,15 +71,58 @@ def build(
     >>> gfor.build("infinite_bus").name
     'infinite_bus.fmu'
     """
+    if not isinstance(model, str | Model):
+        raise InputError(f"model = {model!r}; give the name of a model of the catalogue, or a model of your own")
+    flag(native, "native")
     if fmi not in ("2.0", "3.0"):
         raise InputError(f"fmi = {fmi!r}; choose from '2.0' and '3.0'")
     if fmi != "2.0" and not native:
         raise InputError("FMI 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; build a native one")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
+    from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     made = catalogue_model(model) if isinstance(model, str) else model
+    chosen = None if platforms is None else _platforms(platforms, TARGETS)
+    members, place = _members(extra), _folder(folder)
     recipe = NativeFmu(made, fmi) if native else PythonFmu(made)
-    return export(recipe, Path(folder), tuple(platforms) if platforms else None, extra)
+    return export(recipe, place, chosen or None, members)
+
+
+def _platforms(given: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
+    listed = names(given, "platforms")
+    wrong = [name for name in listed if name not in known]
+    if wrong:
+        raise InputError(f"platforms: there is no platform {wrong[0]!r}; choose from {', '.join(sorted(known))}")
+    return listed
+
+
+def _members(extra: Mapping[str, bytes] | None) -> dict[str, bytes]:
+    """Members of the archive, none of which leads out of the folder or replaces a part of the FMU."""
+    if extra is not None and not isinstance(extra, Mapping):
+        raise InputError(f"extra = {extra!r}; give bytes by path, such as {{'extra/notes.txt': b'...'}}")
+    for name, content in (extra or {}).items():
+        parts = name.split("/") if isinstance(name, str) else []
+        outside = len(parts) < 2 or parts[0] != "extra" or any(part in ("", ".", "..") for part in parts)
+        if outside or any(letter in name for letter in "\\:\0"):
+            raise InputError(
+                f"extra: {name!r} is not a path in the FMU's folder extra/; write it with /, such as 'extra/notes.txt'"
+            )
+        if not isinstance(content, bytes):
+            raise InputError(f"extra: the content of {name!r} is of type {type(content).__name__}; give bytes")
+    return dict(extra or {})
+
+
+def _folder(given: str | Path) -> Path:
+    """The folder for the FMU, which can be written to."""
+    place = path_of(given, "folder", "folder")
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"folder = {str(place)!r}: an FMU cannot be written there: {reason}") from error
+    if not os.access(place, os.W_OK):
+        raise InputError(f"folder = {str(place)!r}: an FMU cannot be written there: it is closed to you")
+    return place

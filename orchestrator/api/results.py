@@ -9,7 +9,7 @@ import xarray as xr
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Stability
-from orchestrator.api.show import Axes, curves_on, new_axes, page
+from orchestrator.api.show import Axes, axes_or_new, curves_on, page
 from orchestrator.errors import CosimError, InputError
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
@@ -63,6 +63,9 @@ class Modes:
 
     def __len__(self) -> int:
         return len(self.result.modes)
+
+    def __getitem__(self, index: int) -> Mode:
+        return self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
         """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping ratio, name, states.
@@ -125,9 +128,9 @@ class Modes:
         """
         from orchestrator.study.mode_plots import draw_eigenvalues  # noqa: PLC0415 - a second to import
 
-        axes = new_axes(7.2, 5.0) if ax is None else ax
+        axes = axes_or_new(ax, 7.2, 5.0)
         draw_eigenvalues(axes, [self.result], curves_on(axes))
-        axes.legend(loc="upper left", fontsize="small")
+        axes.legend(loc="best", fontsize="small")
         return axes
 
     def __repr__(self) -> str:
@@ -249,9 +252,11 @@ class Run:
         """
         from orchestrator.study.signal_plots import draw_signal  # noqa: PLC0415 - a second to import
 
+        if signal is not None and not isinstance(signal, str):
+            raise InputError(f"signal = {signal!r}; give one signal, 'a.b' or 'a.b - c.d', and plot each with its ax")
         expression = signal or self._first_plotted()
         unit = self.signal(expression).attrs.get("units") or self.dataset[expression.split(" - ")[0].strip()].units
-        axes = new_axes(7.2, 3.2) if ax is None else ax
+        axes = axes_or_new(ax, 7.2, 3.2)
         draw_signal(axes, [self.result], expression, first=curves_on(axes))
         axes.set_xlabel("Time [s]")
         axes.set_ylabel(f"{expression} [{unit}]")

@@ -1,7 +1,7 @@
 """One scenario of a case: its modes, its response in time, its linear model."""
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,17 @@ from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.api.show import page
-from orchestrator.api.values import Time, in_seconds, parameter_files, plain
+from orchestrator.api.values import (
+    Names,
+    Paths,
+    Time,
+    case_values,
+    damping_ratio,
+    frequency_range,
+    in_seconds,
+    parameter_files,
+)
+from orchestrator.api.values import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
@@ -20,10 +30,18 @@ from orchestrator.cases.schema import Value
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import InputError
+from orchestrator.federation.choice import Federates
+from orchestrator.results.recording import IN_MEMORY, RecordingFolder, temporary_recording
+from orchestrator.results.room import recorded_size
+from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 
 
 class RunEndedWarning(UserWarning):
     """A run ended before its time; what was recorded until then is in the result."""
+
+
+class CheckpointWarning(UserWarning):
+    """A run cannot be kept, or does not go on from where it was kept."""
 
 
 class UnusualDataWarning(UserWarning):
@@ -86,6 +104,7 @@ class Scenario:
         *,
         directional: bool = False,
         black_box: bool = False,
+        report: Callable[[str], None] | None = None,
     ) -> Modes:
         """Steady state and modes.
 
@@ -100,6 +119,8 @@ class Scenario:
             Linearise with the FMUs' own directional derivatives instead of by perturbation.
         black_box
             Identify the components that hide their states from their inputs and outputs.
+        report
+            Called with a sentence before each run of an identification, which may take minutes; such as ``print``.
 
         Raises
         ------
@@ -118,12 +139,8 @@ class Scenario:
         """
         from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
 
-        low, high = frequencies
-        if not 0 <= low < high:
-            raise InputError(f"frequencies = {frequencies}; give two in Hz, the lower one first, such as (0.1, 2.0)")
-        if critical is not None and not 0 < critical < 1:
-            raise InputError(f"critical = {critical:g}; it is a damping ratio between 0 and 1, such as 0.2 for 20 %")
-        if critical is not None and not low > 0:
+        frequencies, critical = frequency_range(frequencies), damping_ratio(critical, "critical")
+        if critical is not None and not frequencies[0] > 0:
             raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
         if not black_box:
             return Modes(compute_modes(self.prepared, frequencies, critical, directional=directional))
@@ -132,7 +149,7 @@ class Scenario:
         from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
 
         with running(self.prepared) as master:
-            return Modes(modes_with_boxes(self.prepared, master, frequencies, critical))
+            return Modes(modes_with_boxes(self.prepared, master, frequencies, critical, report=report))
 
     def run(
         self,
@@ -141,11 +158,18 @@ class Scenario:
         linear: bool = False,
         progress: bool = False,
         observers: Sequence[Observer] = (),
+        recording: RecordingFolder | None = None,
+        checkpoints: str | Path | Checkpoints | None = None,
+        checkpoint_every: Time = EVERY,
+        federates: Federates | None = None,
     ) -> Run:
         """Modes, and the response to the scenario's events.
 
         A component that fails in the middle ends the run, and so does Ctrl-C: a `RunEndedWarning` says it, and what
         was recorded until then is in the result.
+
+        With a folder for checkpoints, the same call goes on where an interrupted or killed one was left, and gives the
+        same values as an undisturbed one. What should be known of that is a `CheckpointWarning`.
 
         Parameters
         ----------
@@ -157,6 +181,23 @@ class Scenario:
             Show a bar.
         observers
             What else looks on at every communication step.
+        recording
+            A folder on the disk that takes the rows while the run goes on. By default they stay in memory; those of a
+            run that would need more than 256 MB go to a temporary folder, which is removed when Python ends.
+        checkpoints
+            Folder in which the run is kept while it goes on; by default none. It is empty again at the end, but for the
+            recording of a run that would need more than 256 MB.
+        checkpoint_every
+            Wall-clock time between two checkpoints [s].
+        federates
+            Components that run as federates at HELICS, such as ``Federates(("gfor",))`` of
+            `orchestrator.federation.choice`; by default everything runs here.
+
+        Raises
+        ------
+        InputError
+            If both checkpoints and federates are asked for, if what was left in the folder is damaged, or if the run is
+            made of something else now: another case, FMU or library.
 
         Examples
         --------
@@ -168,9 +209,26 @@ class Scenario:
         from orchestrator.study.run import run_scenario  # noqa: PLC0415 - only runs need it
 
         prepared = self._until(in_seconds(stop, "stop"))
+        _check_observers(observers)
+        if checkpoints is not None and federates is not None:
+            raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
+        kept = checkpoints if isinstance(checkpoints, Checkpoints) else None
+        if isinstance(checkpoints, str | Path):
+            kept = _checkpoints(prepared, Path(checkpoints), in_seconds(checkpoint_every, "checkpoint_every") or EVERY)
+        if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
+            recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
         with shown_progress(self.title, shown=progress) as report:
             bars = [Progress(report)] if progress else []
-            result = run_scenario(prepared, observers=[*bars, *observers], linear=linear)
+            result = run_scenario(
+                prepared,
+                observers=[*bars, *observers],
+                linear=linear,
+                recording=recording,
+                checkpoints=kept,
+                federates=federates,
+            )
+        if kept is not None and kept is not checkpoints and result.failure is None:
+            kept.clear()
         if result.failure is not None:
             warnings.warn(f"scenario {self.name!r}: {result.failure}", RunEndedWarning, stacklevel=2)
         return Run(result)
@@ -180,11 +238,14 @@ class Scenario:
         if stop_time is None or stop_time == self.prepared.stop_time:
             return self.prepared
         (prepared,) = self._file.prepare([self.name], self._values, self._step_size, stop_time, self._parameters)
+        if changed := _differences(self.prepared, prepared):
+            raise InputError(
+                f"{self._file.path}: files of the case were changed since the scenario was made, which changes "
+                f"{', '.join(changed[:3])}; load the case again"
+            )
         return prepared
 
-    def linearize(
-        self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *, continuous: bool = False
-    ) -> LinearSystem:
+    def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
 
         Parameters
@@ -211,7 +272,8 @@ class Scenario:
         """
         from orchestrator.study.linear import default_inputs, default_outputs, linear_model  # noqa: PLC0415 - as above
 
-        inputs, outputs = inputs or default_inputs(self.prepared), outputs or default_outputs(self.prepared)
+        inputs = names_given(inputs, "inputs") or default_inputs(self.prepared)
+        outputs = names_given(outputs, "outputs") or default_outputs(self.prepared)
         model, point, examined = linear_model(self.prepared, inputs, outputs, as_continuous=continuous)
         return LinearSystem(
             **vars(model), operating_point=point, stability=examined.stability, warnings=examined.warnings
@@ -225,14 +287,37 @@ class Scenario:
         return page(f"{self.prepared.case.name}, {self.name}: {self.title}", self.questions, table)
 
 
+def _check_observers(given: Sequence[Observer]) -> None:
+    parts = ("every", "begin", "observe", "end")
+    if not isinstance(given, Sequence) or not all(hasattr(one, part) for one in given for part in parts):
+        raise InputError(f"observers = {given!r}; give a list of observers, or leave it out")
+
+
+def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:
+    """Values and FMUs, by name, in which two preparations of a scenario differ."""
+    names = [name for name in {**one.values, **other.values} if one.values.get(name) != other.values.get(name)]
+    fmus = [{n: plan.description for n, plan in ready.system.components.items()} for ready in (one, other)]
+    made, found = ({n: (fmu.path, fmu.guid) for n, fmu in of.items()} for of in fmus)
+    return [*names, *(f"the FMU of {name}" for name in {**made, **found} if made.get(name) != found.get(name))]
+
+
+def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Checkpoints:
+    def say(text: str) -> None:
+        warnings.warn(text, CheckpointWarning, stacklevel=4)
+
+    for name, reason in not_kept(prepared).items():
+        say(f"scenario {prepared.name!r} cannot be resumed within its run, because of component {name!r}: {reason}")
+    return Checkpoints(prepared, folder, every, resume=True, say=say)
+
+
 def choose(
     file: CaseFile,
-    names: Sequence[str] = (),
+    names: Names = (),
     values: Mapping[str, Any] | None = None,
     *,
     step: Time | None = None,
     stop: Time | None = None,
-    parameters: Iterable[str | Path] = (),
+    parameters: Paths = (),
 ) -> list[Scenario]:
     """Scenarios of a case, as `Case.choose` offers them.
 
@@ -255,12 +340,12 @@ def choose(
         With every problem of the case and of the values.
     """
     files = parameter_files(parameters)
-    chosen, step_size, stop_time = plain(values), in_seconds(step, "step"), in_seconds(stop, "stop")
-    prepared = file.prepare(names, chosen, step_size, stop_time, files)
+    chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
+    prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
     return [Scenario(one, file, chosen, step_size, files) for one in prepared]
 
 
-def question(scenarios: Iterable[Scenario]) -> None:
+def question(scenarios: Iterable[PreparedScenario]) -> None:
     """Warn about data that are most unusual, each once, where the caller of the caller stands."""
-    for text in dict.fromkeys(text for scenario in scenarios for text in scenario.questions):
+    for text in dict.fromkeys(str(one) for prepared in scenarios for one in prepared.questions):
         warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3)

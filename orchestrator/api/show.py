@@ -6,6 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from orchestrator.errors import InputError
+
 Axes = Any
 """``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth."""
 
@@ -20,13 +22,31 @@ def new_axes(width: float = 7.2, height: float = 4.4) -> Axes:
     width, height
         Of the figure [inches].
     """
-    import matplotlib.pyplot as plt  # noqa: PLC0415 - a second to import
+    import matplotlib as mpl  # noqa: PLC0415 - a second to import
+    import matplotlib.pyplot as plt  # noqa: PLC0415 - as above
 
     from orchestrator.report.plot_style import STYLE  # noqa: PLC0415 - as above
 
-    with plt.rc_context(STYLE):
-        _, axes = plt.subplots(figsize=(width, height), layout="constrained")
-    return axes
+    # The figure comes before the style: a notebook's backend sets itself up with the first figure, and a context
+    # around that would take its settings back, so that no later figure is shown.
+    figure = plt.figure(figsize=(width, height), layout="constrained")
+    with mpl.rc_context(STYLE):
+        return figure.subplots()
+
+
+def axes_or_new(given: Axes, width: float, height: float) -> Axes:
+    """The Axes that a caller gave, or those of a new figure.
+
+    Raises
+    ------
+    InputError
+        If what was given is no Axes.
+    """
+    if given is None:
+        return new_axes(width, height)
+    if not hasattr(given, "get_legend_handles_labels"):
+        raise InputError(f"ax = {given!r}; give Matplotlib Axes, such as those that another plot returned")
+    return given
 
 
 def curves_on(axes: Axes) -> int:

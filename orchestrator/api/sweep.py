@@ -1,6 +1,6 @@
 """Sweeps: modes over a grid of parameters."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,19 +9,33 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from orchestrator.api.progress import shown_progress
-from orchestrator.api.show import Axes, new_axes, page
-from orchestrator.api.values import plain_value
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.show import Axes, axes_or_new, page
+from orchestrator.api.values import (
+    Names,
+    Paths,
+    Time,
+    case_values,
+    check_case_name,
+    frequency_range,
+    in_seconds,
+    names,
+    parameter_files,
+    plain_value,
+)
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
-from orchestrator.points.processes import Processes
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport
 from orchestrator.points.store import PointStore
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.sweep.axes import Vary, parse_vary
-from orchestrator.sweep.dataset import Samples, sweep_dataset, sweep_json
-from orchestrator.sweep.sweep import SweepResult, plan_sweep, run_sweep
+from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
+from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
+
+WORKERS_IMPORT = ("orchestrator.sweep.worker",)
+"""Modules that a process of a sweep imports once, before its first point."""
 
 
 class ParameterSweep:
@@ -31,16 +45,25 @@ class ParameterSweep:
     ----------
     result
         All points, and the modes followed over them.
+    samples
+        The modes' figures at every point, for tables and plots.
     """
 
     def __init__(self, result: SweepResult) -> None:
         self.result = result
-        self._samples = Samples(result)
+        self.samples = Samples(result)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What failed, was refined or was not recognised, one sentence each."""
+        from orchestrator.sweep import tables  # noqa: PLC0415 - imports Matplotlib, a second
+
+        return tables.remarks(self.samples)
 
     @property
     def dataset(self) -> xr.Dataset:
         """Everything over scenario, varied parameters and trajectory, as in ``sweep.nc``."""
-        return sweep_dataset(self._samples)
+        return sweep_dataset(self.samples)
 
     def table(self) -> pd.DataFrame:
         """One row for every mode at every point: eigenvalue [1/s, rad/s], frequency, damping ratio, the mode's name.
@@ -48,28 +71,67 @@ class ParameterSweep:
         ``named`` says whether the case's name falls on the mode there.
         """
         rows = [
-            {"scenario": sweep.prepared.name, **self._samples.setting(place), "mode": trajectory.name}
+            {"scenario": sweep.prepared.name, **self.samples.setting(place), "mode": trajectory.name}
             | eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"])
             | {"named": bool(sample["named"])}
             for sweep in self.result.scenarios
             for trajectory in sweep.trajectories
-            for place, sample in self._samples.of(sweep, trajectory)
+            for place, sample in self.samples.of(sweep, trajectory)
         ]
-        axes = [axis.key for axis in self._samples.axes]
+        axes = [axis.key for axis in self.samples.axes]
         figures = ["real", "imag", "frequency_hz", "damping_percent", "named"]
         return pd.DataFrame(rows, columns=["scenario", *axes, "mode", *figures])
 
     def failures(self) -> pd.DataFrame:
         """The points that have no modes, and why."""
         rows = [
-            {"scenario": sweep.prepared.name, **self._samples.setting(place), "error": error}
+            {"scenario": sweep.prepared.name, **self.samples.setting(place), "error": error}
             for sweep, place, error in self.result.failures()
         ]
-        return pd.DataFrame(rows, columns=["scenario", *(axis.key for axis in self._samples.axes), "error"])
+        return pd.DataFrame(rows, columns=["scenario", *(axis.key for axis in self.samples.axes), "error"])
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor sweep --json`` prints, as JSON's types."""
-        return sweep_json(self._samples)
+        return sweep_json(self.samples)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``sweep.nc``, ``sweep.csv`` and the plots, as ``gfor sweep`` does.
+
+        Parameters
+        ----------
+        folder
+            Folder for the files; it is made where it is missing.
+
+        Returns
+        -------
+        list of Path
+            Paths of the files.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> sweep = gfor.load("infinite_bus").sweep(["gfor.P_0=0.4,0.6"], ["dip"], frequencies=(0, 100))
+        >>> [path.name for path in sweep.save("results")][:2]
+        ['sweep.nc', 'sweep.csv']
+        """
+        from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
+
+        place = Path(folder)
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{place}: results cannot be written there: {error.strerror}; choose another folder"
+            ) from error
+        with staged(place, new_run_id()) as staging:
+            save_sweep(self.samples, staging)
+            plots = save_sweep_plots(self.samples, staging)
+        return [place / name for name in ("sweep.nc", "sweep.csv", *(path.name for path in plots))]
 
     def plot(self, ax: Axes = None) -> Axes:
         """The modes in the complex plane; a circle where each begins.
@@ -85,14 +147,14 @@ class ParameterSweep:
         """
         from orchestrator.sweep.plots import draw_trajectories  # noqa: PLC0415 - a second to import
 
-        axes = new_axes(8.0, 6.2) if ax is None else ax
-        if not draw_trajectories(axes, self._samples):
+        axes = axes_or_new(ax, 8.0, 6.2)
+        if not draw_trajectories(axes, self.samples):
             raise InputError("no point of the sweep has a mode that could be drawn; see its failures()")
         axes.legend(loc="best", fontsize="small")
         return axes
 
     def __repr__(self) -> str:
-        names = ", ".join(axis.key for axis in self._samples.axes)
+        names = ", ".join(axis.key for axis in self.samples.axes)
         return f"<ParameterSweep of {self.result.plan.case.name} over {names}: {self._points()}>"
 
     def _points(self) -> str:
@@ -105,19 +167,17 @@ class ParameterSweep:
         return page(repr(self).strip("<>").partition(":")[0], lines, self.table())
 
 
-def sweep_parameters(
+def plan(
     file: CaseFile,
-    vary: Mapping[str, Iterable[Any]] | Iterable[str],
-    scenarios: Sequence[str],
-    values: Mapping[str, Value],
-    step_size: float | None,
-    frequencies: tuple[float, float],
-    workers: int,
-    folder: str | Path | None,
+    vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary],
+    scenarios: Names = (),
+    values: Mapping[str, Any] | None = None,
     *,
-    progress: bool,
-) -> ParameterSweep:
-    """Plan and compute a sweep, as `Case.sweep` offers it.
+    step: Time | None = None,
+    parameters: Paths = (),
+    frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+) -> SweepPlan:
+    """Check a sweep, and build the FMUs that it needs, as `Case.sweep` does first.
 
     Parameters
     ----------
@@ -126,38 +186,73 @@ def sweep_parameters(
     vary
         Values by ``component.parameter``, or texts as with ``--vary``.
     scenarios
-        Names; all of them where empty.
+        Names of the scenarios; all of them where empty.
     values
-        Values by ``component.variable`` that hold at every point.
-    step_size
+        Values by ``component.variable`` that hold at every point. They have priority over the parameter files.
+    step
         Communication step [s]; the case's where None.
+    parameters
+        Paths of parameter files.
     frequencies
         Modes from the first to the second are followed [Hz].
-    workers
-        Processes to compute in, at least 1.
-    folder
-        Keeps the points; they are forgotten where None.
-    progress
-        Show a bar.
+
+    Raises
+    ------
+    InputError
+        If a value, a name or a file cannot be used.
     """
-    if workers < 1:
-        raise InputError(f"workers = {workers}; it must be a whole number of at least 1")
-    plan = plan_sweep(file, _varied(vary), scenarios, values, step_size, frequencies)
-    executor = Processes(workers, ["orchestrator.sweep.worker"]) if workers > 1 else Serial()
-    with TemporaryDirectory() as passing, closing(executor), shown_progress("Points", shown=progress) as report:
-        store = PointStore(Path(folder or passing) / "points")
-        return ParameterSweep(run_sweep(plan, executor, store, report))
+    files, fixed = parameter_files(parameters), case_values(values)
+    chosen, seen = names(scenarios, "scenarios"), frequency_range(frequencies)
+    return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)
 
 
-def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str]) -> list[Vary]:
-    """What is varied, from values by name or from texts."""
+def compute(
+    planned: SweepPlan,
+    executor: Executor,
+    folder: str | Path | None = None,
+    report: CountReport = lambda done, total: None,
+) -> ParameterSweep:
+    """Compute a planned sweep, as `Case.sweep` does; the executor is closed afterwards.
+
+    Parameters
+    ----------
+    planned
+        A checked sweep, as `plan` gives it.
+    executor
+        Computes the points.
+    folder
+        Folder whose subfolder ``points`` keeps the points. Without a folder the points are forgotten.
+    report
+        Called with the number of points done and their total.
+    """
+    with TemporaryDirectory() as passing, closing(executor):
+        return ParameterSweep(run_sweep(planned, executor, PointStore(Path(folder or passing) / "points"), report))
+
+
+def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:
+    """What is varied, from values by name, from texts, or as it was read already."""
+    how = "such as {'grid.X_L': [0.1, 0.3]} or 'grid.X_L=0.1:0.5:9'"
     if isinstance(vary, Mapping):
+        if wrong := [key for key in vary if not isinstance(key, str)]:
+            raise InputError(f"vary: {wrong[0]!r} is not a name; give values by name, {how}")
+        for key, values in vary.items():
+            check_case_name(key, "vary")
+            if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
+                raise InputError(f"vary: {key} = {values!r}; a sweep needs a list of values, {how}")
         lists = {key: tuple(map(plain_value, values)) for key, values in vary.items()}
         empty = [key for key, values in lists.items() if not values]
         if empty:
             raise InputError(f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}")
-        return [Vary(key, None, len(values), False, values) for key, values in lists.items()]
+        found = [Vary(key, None, len(values), False, values) for key, values in lists.items()]
+        if not found:
+            raise InputError(f"vary = {vary!r} varies nothing; give what is varied, {how}")
+        return found
     try:
-        return [parse_vary(text) for text in ([vary] if isinstance(vary, str) else vary)]
+        given = [vary] if isinstance(vary, str) else list(vary)
+        if not given or not all(isinstance(one, str | Vary) for one in given):
+            raise InputError(f"vary = {vary!r}; give what is varied, {how}")
+        return [one if isinstance(one, Vary) else parse_vary(one) for one in given]
+    except TypeError as error:
+        raise InputError(f"vary = {vary!r}; give what is varied, {how}") from error
     except ValueError as error:
         raise InputError(str(error)) from error

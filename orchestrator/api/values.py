@@ -1,30 +1,154 @@
-"""Values as they are given in Python, as the rest of the program takes them."""
+"""Arguments as they are given in Python, as the rest of the program takes them; one clear error where they do not fit.
 
-from collections.abc import Iterable, Mapping
+A caller gives a list where one name would do, a text where a number is meant, ``None`` from a table that was empty.
+Each reader here says which argument it was, the value seen, and how to write it.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import Value
+from orchestrator.cases.values import flatten, given_twice
 from orchestrator.errors import InputError
 from orchestrator.units import to_unit
 
 Time = float | str
 """A time: a number of seconds, or text with a unit such as ``"200 us"``."""
 
+Names = str | Sequence[str]
+"""One name, or several."""
 
-def plain(values: Mapping[str, Any] | None) -> dict[str, Value]:
-    """Values by name, with NumPy's numbers as Python's own."""
-    return {name: plain_value(value) for name, value in (values or {}).items()}
+Paths = str | Path | Iterable[str | Path]
+"""One path, or several."""
+
+_LARGEST = 10**308
+"""Of a whole number that a floating-point number can hold."""
+
+_SHOWN = 60
+"""Characters of an overlong path that an error shows."""
+
+_CASE_VALUE = re.compile(r"[^.\s]+\.\S+")
+
+
+def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
+    """Values by name, with NumPy's numbers as Python's own; a mapping in a mapping is read as a name with a point.
+
+    Parameters
+    ----------
+    values
+        ``{"grid.X_L": 0.3}``, or the same nested: ``{"grid": {"X_L": 0.3}}``.
+    argument
+        Name of the caller's argument, for the error.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping from names to values.
+    """
+    if values is None:
+        return {}
+    if not isinstance(values, Mapping):
+        raise InputError(f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}")
+    wrong = [key for key in _keys(values) if not isinstance(key, str)]
+    if wrong:
+        raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, such as {{'grid.X_L': 0.3}}")
+    flat = flatten(values)
+    if twice := given_twice(flat):
+        raise InputError(f"{argument}: {twice[0]!r} is given twice, flat and nested; give it once")
+    return {".".join(path): plain_value(value) for path, value in flat}
+
+
+def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
+    """Values by ``component.variable``; otherwise as `plain`.
+
+    Raises
+    ------
+    InputError
+        If it is no mapping, or a name has no component or no variable.
+    """
+    read = plain(values, argument)
+    for name in read:
+        check_case_name(name, argument)
+    return read
+
+
+def check_case_name(name: str, argument: str) -> None:
+    """Refuse a name that is not of the form ``component.variable``."""
+    if not _CASE_VALUE.fullmatch(name) and name != ALPHA:
+        raise InputError(f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'")
+
+
+def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
+    for key, value in values.items():
+        yield key
+        if isinstance(value, dict):
+            yield from _keys(value)
 
 
 def plain_value(value: Any) -> Value:
     """A value, as Python's own number where it is one of NumPy."""
-    own: Value = value.item() if hasattr(value, "item") else value
+    own: Value = value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
+    if isinstance(own, int) and abs(own) > _LARGEST:
+        raise InputError("a whole number beyond 1e308 was given as a value; give a number that a float can hold")
     return own
 
 
-def in_seconds(time: Time | None, name: str) -> float | None:
+def names(given: Names, argument: str) -> tuple[str, ...]:
+    """One name or several, as a tuple.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if isinstance(given, str):
+        return (given,)
+    listed: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
+    if isinstance(given, bytes) or not all(isinstance(name, str) for name in listed):
+        raise InputError(f"{argument} = {given!r}; give a name, or a list of names")
+    return listed
+
+
+def path(given: Any, argument: str, kind: str = "file") -> Path:
+    """A path of a file, or of another ``kind`` of place.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if not isinstance(given, str | Path) or not str(given):
+        raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
+    _check_length(Path(given), argument)
+    return Path(given)
+
+
+def _check_length(path: Path, argument: str) -> None:
+    """Refuse what no file system can hold, before it says so itself."""
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
+        raise InputError(f"{argument} = {shown!r} is no path that a file can have: {reason}") from error
+
+
+def binding_path(given: Any) -> Path | None:
+    """The path of a binding; None for None.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    return None if given is None else path(given, "binding")
+
+
+def in_seconds(time: Time | None, argument: str) -> float | None:
     """A time [s]; None for None.
 
     Raises
@@ -34,21 +158,155 @@ def in_seconds(time: Time | None, name: str) -> float | None:
     """
     if time is None:
         return None
-    try:
-        number = to_unit(time, "s")
-    except ValueError as error:
-        raise InputError(f"{name}: {error}") from error
+    number = _number(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
     if not 0 < number < float("inf"):
-        raise InputError(f"{name} = {time!r}; it must be a time above 0 and finite, such as 5.0 or '200 us'")
+        raise InputError(f"{argument} = {time!r}; it must be a time above 0 and finite, such as 5.0 or '200 us'")
     return number
 
 
-def parameter_files(paths: Iterable[str | Path]) -> list[ParameterFile]:
-    """The parameter files of some paths.
+def moment(time: Any, argument: str) -> float:
+    """A time on the axis of a run [s], which begins at 0.
+
+    Raises
+    ------
+    InputError
+        If it is no time, or lies before 0.
+    """
+    rule = "a time of 0 or later and finite, such as 2.0 or '500 ms'"
+    number = _number(time, "s", argument, rule)
+    if not 0 <= number < float("inf"):
+        raise InputError(f"{argument} = {time!r}; it must be {rule}")
+    return number
+
+
+def in_megabytes(given: Any, argument: str, least: float) -> float:
+    """An amount of memory [MB], as a number or as text such as ``"4 GB"``.
+
+    Parameters
+    ----------
+    given, argument
+        What the caller gave, and the name of the argument.
+    least
+        The least that is of use [MB].
+
+    Raises
+    ------
+    InputError
+        If it is none, or less.
+    """
+    rule = "an amount of memory in MB, such as 4096, or '4 GB'"
+    number = _number(given, "MB", argument, rule)
+    if not number < float("inf") or not number > 0:
+        raise InputError(f"{argument} = {given!r}; it must be above 0 MB and finite, such as 4096 or '4 GB'")
+    if number < least:
+        raise InputError(
+            f"{argument} = {given!r} is {number:g} MB, too little to load any FMU; give at least {least:g} MB, such as "
+            "4096 or '4 GB'"
+        )
+    return number
+
+
+def frequency_range(given: Any) -> tuple[float, float]:
+    """Two frequencies [Hz], the lower one first.
+
+    Raises
+    ------
+    InputError
+        If they are not that.
+    """
+    rule = "give two in Hz, the lower one first, such as (0.1, 2.0)"
+    if isinstance(given, str) or not isinstance(given, Sequence | tuple) or len(given) != 2:
+        raise InputError(f"frequencies = {given!r}; {rule}")
+    low, high = (_number(one, "Hz", "frequencies", rule) for one in given)
+    if not 0 <= low < high:
+        raise InputError(f"frequencies = {given!r}; {rule}")
+    return low, high
+
+
+def damping_ratio(given: Any, argument: str) -> float | None:
+    """A damping ratio between 0 and 1; None for None.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or lies outside.
+    """
+    if given is None:
+        return None
+    rule = "it is a damping ratio between 0 and 1, such as 0.2 for 20 %"
+    own = plain_value(given)
+    if isinstance(own, bool | str) or not isinstance(own, int | float) or not 0 < own < 1:
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    return float(own)
+
+
+def text_or_none(given: Any, argument: str, rule: str) -> str | None:
+    """One text; None for None.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or empty.
+    """
+    if given is not None and (not isinstance(given, str) or not given):
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    return given
+
+
+def whole_number(given: Any, argument: str, least: int, most: int) -> int:
+    """A whole number from ``least`` to ``most``.
+
+    Parameters
+    ----------
+    given, argument
+        What the caller gave, and the name of the argument.
+    least, most
+        The range, both ends included.
+
+    Raises
+    ------
+    InputError
+        If it is none, or outside.
+    """
+    own = plain_value(given)
+    if isinstance(own, bool) or not isinstance(own, int) or not least <= own <= most:
+        raise InputError(f"{argument} = {given!r}; give a whole number from {least} to {most}")
+    return own
+
+
+def flag(given: Any, argument: str) -> bool:
+    """A truth value.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    own = plain_value(given)
+    if not isinstance(own, bool):
+        raise InputError(f"{argument} = {given!r}; give True or False")
+    return own
+
+
+def _number(given: Any, unit: str, argument: str, rule: str) -> float:
+    own = plain_value(given)
+    if isinstance(own, bool) or not isinstance(own, int | float | str):
+        raise InputError(f"{argument} = {given!r}; give {rule.removeprefix('give ')}")
+    try:
+        return to_unit(own, unit)
+    except ValueError as error:
+        raise InputError(f"{argument}: {error}") from error
+    except OverflowError as error:
+        raise InputError(f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}") from error
+
+
+def parameter_files(paths: Paths) -> list[ParameterFile]:
+    """The parameter files of one path or several.
 
     Raises
     ------
     InputError
         If one cannot be read.
     """
-    return [read_parameter_file(Path(path)) for path in paths]
+    listed = [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
+    return [read_parameter_file(path(one, "parameters")) for one in listed]

@@ -31,7 +31,7 @@ _FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RE
           "abc": Form.ABC, "power": Form.POWER}  # fmt: skip
 _FREQUENCY = ("omega", "frequency")
 _SWITCH = ".enabled"
-"""Ends our names of Boolean variables, such as ``pod_p.enabled``."""
+"""End of our names of Boolean variables, such as ``pod_p.enabled``."""
 
 
 def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescription:
@@ -51,7 +51,7 @@ def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescript
     return description if binding is None else bind(description, binding)
 
 
-def bind(native: FmuDescription, binding: Path | str) -> BoundDescription:
+def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
     """Describe an FMU through a binding file.
 
     Raises
@@ -60,7 +60,7 @@ def bind(native: FmuDescription, binding: Path | str) -> BoundDescription:
         With every problem of the file.
     """
     path = Path(binding)
-    return BoundDescription.of(native, _Reader(native, read_table(path), str(path)).port_map())
+    return BoundDescription.of(fmu, _Reader(fmu, read_table(path), str(path)).port_map())
 
 
 def read_table(path: Path) -> BindingTable:
@@ -86,18 +86,18 @@ def _problem(detail: Any) -> Problem:
 
 
 class _Reader:
-    """Works one table out for one FMU, and collects what is wrong."""
+    """Works out one table for one FMU, and collects its mistakes."""
 
-    def __init__(self, native: FmuDescription, table: BindingTable, source: str) -> None:
-        self._native, self._table, self._source = native, table, source
+    def __init__(self, fmu: FmuDescription, table: BindingTable, source: str) -> None:
+        self._fmu, self._table, self._source = fmu, table, source
         self._problems: list[Problem] = []
 
     def port_map(self) -> PortMap:
         table = self._table
         with self._at("fmu.guid"):
-            if table.fmu.guid is not None and table.fmu.guid != self._native.guid:
+            if table.fmu.guid is not None and table.fmu.guid != self._fmu.guid:
                 raise ValueError(
-                    f"the binding is for the FMU {table.fmu.guid}, this one is {self._native.guid}; draft it anew"
+                    f"the binding is for the FMU {table.fmu.guid}, this one is {self._fmu.guid}; draft it anew"
                 )
         bases = self._bases()
         port = None
@@ -118,16 +118,16 @@ class _Reader:
 
     @contextmanager
     def _at(self, place: str) -> Iterator[None]:
-        """What is wrong inside is noted at that place."""
+        """Inside, mistakes are noted with this place."""
         try:
             yield
         except ValueError as error:
             self._problems.append(Problem(place, str(error)))
 
     def _variable(self, name: str, *causalities: str, kind: str = "Real") -> VariableInfo:
-        info = self._native.variables.get(name)
+        info = self._fmu.variables.get(name)
         if info is None:
-            raise ValueError(f"the FMU has no variable {name!r}; `gfor info {self._native.path.name}` lists them")
+            raise ValueError(f"the FMU has no variable {name!r}; `gfor info {self._fmu.path.name}` lists them")
         if causalities and info.causality not in causalities:
             raise ValueError(f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here")
         if info.type != kind:
@@ -300,14 +300,14 @@ class _Reader:
         for group, causality in (("parameters", "parameter"), ("inputs", "input")):
             for name, value in getattr(self._table, group).items():
                 with self._at(f"{group}.{name}"):
-                    info = self._native.variables.get(name)
+                    info = self._fmu.variables.get(name)
                     if info is None or info.causality != causality or info.type == "String":
                         raise ValueError(f"the FMU has no {causality} of that name that takes a number")
                     found[name] = value if isinstance(value, bool) else to_unit(value, info.unit)
         return found
 
     def _check_once(self, port: PortMap) -> None:
-        """A variable has one meaning, and what starts the FMU leaves a number that is finite."""
+        """Each variable may be bound once, and the start values must give finite numbers."""
         used = [*port.voltage.variables, *port.current.variables, *port.settings]
         used += [m.variable for maps in port.start.values() for m in maps]
         twice = sorted({name for name in used if used.count(name) > 1})
@@ -318,7 +318,9 @@ class _Reader:
 
 
 def _phase(table: PhasorTable) -> str | None:
-    """What the amplitude of three phases is: their variables are the phases' instantaneous values."""
+    """Kind of the phasor's amplitude. For three phases it is the phase peak, because their variables are instantaneous
+    values.
+    """
     return "phase peak" if table.form == "abc" else table.value
 
 

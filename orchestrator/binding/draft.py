@@ -1,10 +1,21 @@
-"""The first draft of a binding, from what an FMU declares: guesses are marked, and so is what it cannot know."""
+"""The first draft of a binding, from the variables that an FMU declares. Guesses and missing values are marked."""
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.binding.hints import (
+    AMPERES,
+    START_TEXTS,
+    VOLTS,
+    WATTS,
+    is_drawn,
+    kind_of_current,
+    kind_of_voltage,
+    likely_unit,
+    undeclared,
+)
 from orchestrator.binding.tables import REQUIRED
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import START
@@ -12,8 +23,6 @@ from orchestrator.fmi.port import START
 _VOLTAGE = re.compile(r"^(v|u|volt|voltage|vbus|vt|vpcc|vg|ug|upcc)(?![a-z])|volt|spannung", re.IGNORECASE)
 _CURRENT = re.compile(r"^(i|cur|current|iinj|ig|it|ipcc|inj)(?![a-z])|current|strom", re.IGNORECASE)
 _POWER = re.compile(r"^(p|q)(?![a-z])|power|leistung", re.IGNORECASE)
-_VOLTS, _AMPERES = ("V", "kV", "mV", "MV"), ("A", "kA", "mA")
-_WATTS = ("W", "kW", "MW", "GW", "var", "kvar", "Mvar", "VA", "kVA", "MVA", "VAr", "MVAr")
 
 _PARTS = {
     "rectangular": (r"re|real|r|x", r"im|imag|imaginary|i|y"),
@@ -22,7 +31,7 @@ _PARTS = {
     "abc": (r"a|1|u|l1|r", r"b|2|v|l2|s", r"c|3|w|l3|t"),
     "power": (r"p|active", r"q|reactive"),
 }
-"""How the members of a pair or of three phases are told apart at the end of their names."""
+"""Endings by which the names of a pair or of three phases differ."""
 
 _START_NAMES = {
     "S_n": r"^s_?(n|nom|r|rated|base|b)\b|rat(ed|ing)|^mva(base)?\b|mbase",
@@ -38,19 +47,19 @@ _RATED_VOLTAGE = re.compile(r"^[vu]_?(n|nom|rated|base)$|rated_?volt|nominal_?vo
 
 @dataclass(frozen=True)
 class Guess:
-    """A port's form and variables, and how sure that is."""
+    """The form and the variables of a port, and how certain the guess is."""
 
     form: str
     variables: tuple[VariableInfo, ...]
 
 
-def draft_binding(native: FmuDescription, beside: Path | None = None) -> str:
+def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
     """Write the text of a binding file.
 
     Parameters
     ----------
     beside
-        Folder of the binding file, from which the FMU's path is written; its name alone where None.
+        Folder of the binding file. The FMU's path is written relative to it; None writes the file's name alone.
 
     Returns
     -------
@@ -58,29 +67,30 @@ def draft_binding(native: FmuDescription, beside: Path | None = None) -> str:
         TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
         `bind` accepts none of them.
     """
-    voltage = _find(native, "input", _VOLTAGE, _VOLTS, ("rectangular", "dq", "polar", "abc"))
-    current = _find(native, "output", _CURRENT, _AMPERES, ("rectangular", "dq", "polar", "abc"))
-    current = current or _find(native, "output", _POWER, _WATTS, ("power",))
-    starts = {name: _start(native, name, taken=()) for name in START}
+    voltage = _find(fmu, "input", _VOLTAGE, VOLTS, ("rectangular", "dq", "polar", "abc"))
+    current = _find(fmu, "output", _CURRENT, AMPERES, ("rectangular", "dq", "polar", "abc"))
+    current = current or _find(fmu, "output", _POWER, WATTS, ("power",))
+    starts = {name: _start(fmu, name, taken=()) for name in START}
     taken = {v.name for guess in (voltage, current) if guess for v in guess.variables}
-    file = native.path.name if beside is None else _relative(native.path, beside)
+    file = fmu.path.name if beside is None else _relative(fmu.path, beside)
     lines = [
-        f"# Binding of {native.model_name}, drafted from its model description by `gfor bind`.",
+        f"# Binding of {fmu.model_name}, drafted from its model description by `gfor bind`.",
         "# GUESS marks what the names suggest: confirm it. REQUIRED marks what the FMU does not say: fill it in.",
+        "# What is in V, kV, A or kA needs the key 'value' besides its unit: rms or peak, phase or line to line.",
         "# Then: gfor check FILE.fmu --binding THIS_FILE finds wrong signs and bases by their power balance.",
         "",
         "[fmu]",
         f"file = {_quoted(file)}",
-        f"guid = {_quoted(native.guid)}",
+        f"guid = {_quoted(fmu.guid)}",
         "",
-        *_rating(starts["S_n"], native, voltage, current),
+        *_rating(starts["S_n"], fmu, voltage, current),
         "",
-        *_phasor("voltage", voltage, native.inputs),
+        *_phasor("voltage", voltage, fmu.inputs),
         "",
-        *_phasor("current", current, native.outputs),
+        *_phasor("current", current, fmu.outputs),
         "",
         *_starts({name: info for name, info in starts.items() if info is None or info.name not in taken}),
-        *_signals(native, taken),
+        *_signals(fmu, taken),
     ]
     return "\n".join(lines) + "\n"
 
@@ -105,19 +115,19 @@ def _relative(path: Path, beside: Path) -> str:
 
 
 def _find(
-    native: FmuDescription, causality: str, names: re.Pattern[str], units: Sequence[str], forms: Sequence[str]
+    fmu: FmuDescription, causality: str, names: re.Pattern[str], units: Sequence[str], forms: Sequence[str]
 ) -> Guess | None:
-    """Two variables, or three, that are named alike but for their last part."""
+    """Two or three variables whose names differ only in their last part."""
     candidates = [
         v
-        for v in native.variables.values()
+        for v in fmu.variables.values()
         if v.causality == causality and v.type == "Real" and (names.search(_last(v.name)) or names.search(v.description)
-                                                             or v.unit in units)
+                                                             or likely_unit(v) in units)
     ]  # fmt: skip
     best: tuple[int, Guess] | None = None
     for form in forms:
         for found in _matches(candidates, _PARTS[form], loose=form == "power"):
-            score = sum(2 * bool(names.search(_last(v.name))) + (v.unit in units) for v in found) + len(found)
+            score = sum(2 * bool(names.search(_last(v.name))) + (likely_unit(v) in units) for v in found) + len(found)
             if best is None or score > best[0]:
                 best = score, Guess(form, found)
     return None if best is None else best[1]
@@ -138,7 +148,7 @@ def _matches(
 
 
 def _stem(name: str, part: str) -> str | None:
-    """The name without its last part; None where it does not end so."""
+    """The name without its last part; None if the name has another ending."""
     match = re.fullmatch(rf"(?P<stem>.*?)[._\[(]?(?:{part})[\])]?", name, re.IGNORECASE)
     return match["stem"].lower() if match else None
 
@@ -147,41 +157,45 @@ def _last(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def _start(native: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo | None:
+def _start(fmu: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo | None:
     pattern = re.compile(_START_NAMES[name], re.IGNORECASE)
-    known = [v for v in native.variables.values() if v.type == "Real" and v.name not in taken]
+    known = [v for v in fmu.variables.values() if v.type == "Real" and v.name not in taken]
     for causality in ("parameter", "input"):
         exact = [v for v in known if v.causality == causality and v.name == name]
         close = [v for v in known if v.causality == causality and pattern.search(_last(v.name))]
         if exact or close:
             return (exact or close)[0]
-    return None
+    text = START_TEXTS.get(name)
+    told = [v for v in known if v.causality == "parameter" and text is not None and text.search(v.description)]
+    return told[0] if told else None
 
 
 # -- text ----------------------------------------------------------------------------------------
 
 
-def _rating(S_n: VariableInfo | None, native: FmuDescription, *ports: Guess | None) -> list[str]:
+def _rating(S_n: VariableInfo | None, fmu: FmuDescription, *ports: Guess | None) -> list[str]:
     lines = ["[rating]"]
     if S_n is not None and S_n.start is not None:
         unit = S_n.unit if S_n.unit in ("MVA", "kVA", "VA", "GVA") else "MVA"
         lines.append(f'S_n = "{S_n.start_number:g} {unit}"  # GUESS: start value of {S_n.name}')
     else:
         lines.append(f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"')
-    lines.append(_rated_voltage(native, ports))
-    f_n = native.variables.get("f_n")
+    lines.append(_rated_voltage(fmu, ports))
+    f_n = fmu.variables.get("f_n")
     lines.append(f'f_n = "{50 if f_n is None or f_n.start is None else f_n.start_number:g} Hz"  # GUESS')
     return lines
 
 
-def _rated_voltage(native: FmuDescription, ports: Iterable[Guess | None]) -> str:
-    """V_n from a parameter of that name; to be filled in where the port is in volts or amperes."""
-    known = [v for v in native.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
-    named = next((v for v in known if v.unit in _VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
+def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
+    """V_n from a parameter of that name. Without such a parameter the user must fill it in if the port is in volts or
+    amperes.
+    """
+    known = [v for v in fmu.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
+    named = next((v for v in known if v.unit in VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
     if named is not None:
         return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
-    units = {v.unit for guess in ports if guess is not None for v in guess.variables}
-    if units & {*_VOLTS, *_AMPERES}:
+    units = {likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
+    if units & {*VOLTS, *AMPERES}:
         return f'V_n = "{REQUIRED}: rated line-to-line voltage at the port, such as 690 V"'
     return '# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A'
 
@@ -201,31 +215,52 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
         lines += [f"# {v.name} [{v.unit or 'no unit'}]: {_comment(v.description)}" for v in guess.variables]
     lines += _units(table, guess)
     if table == "current":
-        lines.append('direction = "into the grid"  # GUESS; or "into the converter"')
+        drawn = guess is not None and any(map(is_drawn, guess.variables))
+        way, other = ("into the converter", "into the grid") if drawn else ("into the grid", "into the converter")
+        lines.append(f'direction = "{way}"  # GUESS{": from the description" * drawn}; or "{other}"')
     lines.append("# frame_angle = \"-90 deg\"  # by which the FMU's frame leads the network's")
     return lines
 
 
 def _units(table: str, guess: Guess | None) -> list[str]:
-    units = {v.unit for v in guess.variables} if guess else {""}
-    first = guess.variables[0].unit if guess else ""
-    lines = []
-    if first in ("", "1", "-"):
-        lines.append(f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"')
-    elif first in _VOLTS and guess and guess.form != "abc":
-        lines.append(f'value = "{REQUIRED}: line-to-line rms, phase rms or phase peak"')
-    elif first in _AMPERES and guess and guess.form != "abc":
-        lines.append(f'value = "{REQUIRED}: rms or peak"')
-    if table == "current" and (first in ("pu", "p.u.", "", "1", "-") or not units):
-        text = _comment(" ".join(v.description for v in guess.variables)) if guess else ""
+    if guess is None:
+        kinds = "line-to-line rms, phase rms or phase peak" if table == "voltage" else "rms or peak"
+        asked = [f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"', f'# value = "…"  # of what is in V or A: {kinds}']
+        return [*asked, 'base = "S_n"  # GUESS; or such as "100 MVA"'] if table == "current" else asked
+    first = likely_unit(guess.variables[0])
+    lines = _unit(guess.variables[0], "pu, V, kV, A, kA, MW…")
+    if first in (*VOLTS, *AMPERES) and guess.form != "abc":
+        lines += _value(guess.variables, first)
+    elif not first and guess.form != "abc":
+        lines.append('# value = "…"  # of what is in V: line-to-line rms, phase rms or phase peak; in A: rms or peak')
+    if table == "current" and first in ("pu", "p.u.", ""):
+        text = _comment(" ".join(v.description for v in guess.variables))
         base = re.search(r"(\d+(?:\.\d+)?)\s*([kMG]?VA)\b", text)
         known = (
             f'"{base[1]} {base[2]}"  # GUESS: from the description' if base else '"S_n"  # GUESS; or such as "100 MVA"'
         )
         lines.append(f"base = {known}")
-    if guess and guess.form == "polar" and guess.variables[1].unit not in ("rad", "deg"):
+    if guess.form == "polar" and guess.variables[1].unit not in ("rad", "deg"):
         lines.append(f'angle_unit = "{REQUIRED}: rad or deg"')
     return lines
+
+
+def _unit(info: VariableInfo, such_as: str) -> list[str]:
+    """The unit of a variable that declares no unit: from its description, or to be filled in."""
+    if not undeclared(info):
+        return []
+    unit = likely_unit(info)
+    return [f'unit = "{unit}"  # GUESS: from the description' if unit else f'unit = "{REQUIRED}: {such_as}"']
+
+
+def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
+    """Which value of an alternating quantity in V or A is meant."""
+    text = " ".join(v.description for v in variables)
+    kind = kind_of_voltage(text) if unit in VOLTS else kind_of_current(text)
+    if kind:
+        return [f'value = "{kind}"  # GUESS: from the description']
+    kinds = "line-to-line rms, phase rms or phase peak" if unit in VOLTS else "rms or peak"
+    return [f'value = "{REQUIRED}: {kinds}"']
 
 
 def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
@@ -235,21 +270,21 @@ def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
             lines.append(f'# [start.{name}]\n# variable = "…"  # nothing was found that looks like it')
             continue
         lines += [f"[start.{name}]", f"variable = {_quoted(info.name)}  # GUESS: {_comment(info.description)}"]
-        if info.unit in ("", "1", "-"):
-            lines.append(f'unit = "{REQUIRED}: the FMU declares none"')
-        if info.unit in _VOLTS:
-            lines.append(f'value = "{REQUIRED}: line-to-line rms, phase rms or phase peak"')
+        lines += _unit(info, "the FMU declares none")
+        if name == "v_0" and likely_unit(info) in VOLTS:
+            lines += _value([info], likely_unit(info))
+        if name in ("P_0", "Q_0") and is_drawn(info):
+            lines.append("sign = -1  # GUESS: from the description")
     return lines
 
 
-def _signals(native: FmuDescription, taken: Iterable[str]) -> list[str]:
-    found = next(
-        (n for n in native.outputs if re.fullmatch(r"(omega|w|speed|freq\w*|f)", _last(n), re.IGNORECASE)), None
-    )
+def _signals(fmu: FmuDescription, taken: Iterable[str]) -> list[str]:
+    found = next((n for n in fmu.outputs if re.fullmatch(r"(omega|w|speed|freq\w*|f)", _last(n), re.IGNORECASE)), None)
     if found is None or found in taken:
         return []
     return [
         "",
         "[signals.omega]",
-        f"variable = {_quoted(found)}  # GUESS: {_comment(native.variables[found].description)}",
+        f"variable = {_quoted(found)}  # GUESS: {_comment(fmu.variables[found].description)}",
+        *_unit(fmu.variables[found], "pu, Hz or rad/s"),
     ]

@@ -1,4 +1,4 @@
-"""Units and bases: how many of an FMU's units one of ours is."""
+"""Units and bases: the factors from our units to those of an FMU."""
 
 from math import sqrt
 
@@ -13,16 +13,16 @@ _VALUES = {
     "phase rms": 1 / sqrt(3),
     "phase peak": sqrt(2 / 3),
 }
-"""How many times the line-to-line rms voltage each is."""
+"""Factor of each kind of voltage to the line-to-line rms voltage."""
 
 
 def unit_of(info: VariableInfo, given: str | None) -> str:
-    """The unit of an FMU's variable: as bound, as declared, and equal where both are said.
+    """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one.
 
     Raises
     ------
     ValueError
-        If neither is said, or they differ.
+        If neither gives a unit, or they differ.
     """
     declared = info.unit
     if given is None:
@@ -41,7 +41,7 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
 
 
 def factor(unit: str, target: str, name: str) -> float:
-    """How many ``target`` one ``unit`` is.
+    """The number of ``target`` in one ``unit``.
 
     Raises
     ------
@@ -55,12 +55,12 @@ def factor(unit: str, target: str, name: str) -> float:
 
 
 def amount(text: str | float, unit: str, what: str) -> float:
-    """A number with a unit that must be said.
+    """A number from text with a unit, which is required.
 
     Raises
     ------
     ValueError
-        If it is no such quantity, or does not exceed 0.
+        If the text is not a quantity of this kind, or the number does not exceed 0.
     """
     try:
         value = to_unit(text, unit)
@@ -72,14 +72,14 @@ def amount(text: str | float, unit: str, what: str) -> float:
 
 
 class Bases:
-    """Rating and rated voltage of an FMU, and what its units are worth in per unit of them.
+    """Rating and rated voltage of an FMU, and the factors from its units to per unit.
 
     Parameters
     ----------
     rating
         S_n [MVA].
     voltage
-        V_n, line to line [kV]; None where the binding does not say.
+        V_n, line to line [kV]; None if the binding does not give it.
     frequency
         f_n [Hz].
     """
@@ -100,9 +100,9 @@ class Bases:
         unit
             Of the variable: pu, or a unit of voltage.
         base
-            What 1 pu is, such as ``"220 kV"``; V_n where None. Only pu has one.
+            Voltage of 1 pu, such as ``"220 kV"``; V_n where None. Only the unit pu has a base.
         value
-            Which value of the voltage it is, such as ``"phase peak"``; only pu needs none.
+            Kind of value, such as ``"phase peak"``; required for every unit except pu.
         name
             Of the variable, for errors.
         """
@@ -122,9 +122,9 @@ class Bases:
         unit
             Of the variable: pu, or a unit of current.
         base
-            Power that belongs to 1 pu, such as ``"100 MVA"``; S_n where None. Only pu has one.
+            Power of the base, such as ``"100 MVA"``; S_n where None. Only the unit pu has a base.
         value
-            ``"rms"`` or ``"peak"``; only pu needs none.
+            ``"rms"`` or ``"peak"``; required for every unit except pu.
         name
             Of the variable, for errors.
         """

@@ -1,4 +1,4 @@
-"""The form of a binding file. What it means is worked out in `binding`."""
+"""The form of a binding file. The module `binding` works out its meaning."""
 
 from typing import Any, Literal
 
@@ -7,11 +7,11 @@ from pydantic import Field, field_validator, model_validator
 from orchestrator.toml_files import Table
 
 REQUIRED = "REQUIRED"
-"""What `gfor bind` writes where it cannot know; nothing with it is accepted."""
+"""Word that `gfor bind` writes for an unknown value. A binding that still contains it is refused."""
 
 
 class DraftedTable(Table):
-    """A table of a draft, of which nothing may be left to fill in."""
+    """A table of a binding; it is refused as long as a value is left to fill in."""
 
     @model_validator(mode="before")
     @classmethod
@@ -27,7 +27,7 @@ class DraftedTable(Table):
 
 
 class FileTable(DraftedTable):
-    """Which FMU the binding is for."""
+    """The FMU that the binding is for."""
 
     file: str | None = None
     guid: str | None = None

@@ -1,16 +1,22 @@
 """The command ``gfor``. Each subcommand is a module of this package, imported only where it is called."""
 
 import argparse
+import codecs
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from typing import Any
 
-from fmus.toolchain.extras import MissingLibraryError
-from orchestrator.errors import INTERRUPTED, CosimError, InputError
+from fmus.toolchain.extras import SetupError
+from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
+from orchestrator.fmi.interrupts import calls
+
+_ESCAPE = "gfor_escape"
 
 COMMANDS = {
     "run": "steady state, modes and time response of a case's scenarios",
+    "federate": "one component of a case as a federate at HELICS, for a run elsewhere",
     "modes": "steady state and eigenvalues of a case's scenarios",
     "linearize": "write a scenario's linear model A, B, C, D for other tools",
     "export-ssp": "write a case's scenarios as SSP archives for other tools",
@@ -44,6 +50,8 @@ examples:
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
   gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
+  gfor run two_area --engine helics --federate gfor   the converter in a process of its own, over HELICS
+  gfor federate two_area --component gfor --broker tcp://host:23405
   gfor which-master --build probes               two FMUs that tell which schedule a tool runs
   gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
   gfor black-box two_area --scenario gfor --component gfor
@@ -59,20 +67,51 @@ examples:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
     words = sys.argv[1:] if arguments is None else list(arguments)
-    options = _parser(next((word for word in words if not word.startswith("-")), None)).parse_args(words)
+    _print_anything()
+    with calls.terminable(ending=arguments is None):
+        code = _run(words)
+    return TERMINATED if calls.terminated and code == INTERRUPTED else code
+
+
+def _run(words: Sequence[str]) -> int:
     try:
+        options = _parser(next((word for word in words if not word.startswith("-")), None)).parse_args(words)
         return int(options.command(options))
     except CosimError as error:
         _print_error(str(error))
         return error.exit_code
-    except MissingLibraryError as error:
+    except SetupError as error:
         _print_error(str(error))
         return InputError.exit_code
     except BrokenPipeError:
         return 0
+    except OSError as error:  # of a file that no command expected to fail with
+        _print_error(_os_error(error))
+        return CosimError.exit_code
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print(calls.how, file=sys.stderr)
         return INTERRUPTED
+
+
+def _print_anything() -> None:
+    """Have characters that a terminal's encoding lacks replaced; an error would come after all was computed."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
+            codecs.register_error(_ESCAPE, _escaped)
+            stream.reconfigure(errors=_ESCAPE)
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    r"""Characters that an encoding lacks, as ``\uXXXX``, which JSON reads."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[k]:02x}{units[k + 1]:02x}" for k in range(0, len(units), 2)), error.end
+
+
+def _os_error(error: OSError) -> str:
+    where = f"{error.filename}: " if error.filename is not None else ""
+    return f"{where}{error.strerror or error}; make sure that the disk has room and that you may read and write there"
 
 
 def _print_error(text: str) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from rich.console import Group
 from rich.markup import escape
-from rich.table import Table
 
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.binding.binding import bound_fmu
@@ -23,9 +22,11 @@ from orchestrator.black_box.passivity import passivity
 from orchestrator.cases.values import check_system_base, convert
 from orchestrator.cli.arguments import seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.terminal import made_folder, make_console, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.report.tables import PlainTable
+from orchestrator.results.staging import new_run_id, staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,11 +54,12 @@ def run(options: argparse.Namespace) -> int:
         restore=False if options.no_state else None,
     )  # fmt: skip
     _check_port(description, bench)
-    with console.status("measuring"):
-        response = measure(bench, excitation_of(options))
+    with said_stages() as report:
+        response = measure(bench, excitation_of(options), report)
         model, passive = fit(response), passivity(response)
     folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}")
-    files = save_identification(response, model, passive, folder)
+    with staged(folder, new_run_id()) as staging:
+        files = save_identification(response, model, passive, staging)
     content = identification_json(response, model, passive)
     if options.json:
         print(json.dumps(content, indent=1))
@@ -65,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     console.print(_summary(content))
     active = ", ".join(f"{low:g}–{high:g} Hz" for low, high in passive.ranges()) or "nowhere in the measured range"
     console.print(f"Not passive: {active}; least relative index {passive.relative.min():.3f}", highlight=False)
-    console.print(f"Results in {folder}: {', '.join(f.name for f in files)}", soft_wrap=True, highlight=False)
+    console.print(escape(f"Results in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True, highlight=False)
     return 0
 
 
@@ -101,7 +103,7 @@ def _summary(content: dict[str, Any]) -> Group:
     heading = (f"Admittance by {content['method']}: {content['lines']} lines from {content['range_hz'][0]:g} to "
              f"{content['range_hz'][1]:g} Hz, largest bound {content['largest_relative_bound']:.1e}; model of order "
              f"{content['model']['order']}, error {content['model']['error']:.1e}")  # fmt: skip
-    table = Table(title="Poles of the fitted model", title_justify="left", header_style="bold")
+    table = PlainTable(title="Poles of the fitted model", title_justify="left", header_style="bold")
     for column in ("Pole [rad/s]", "f [Hz]", "Damping [%]"):
         table.add_column(escape(column), justify="right")
     for pole in content["model"]["poles"]:

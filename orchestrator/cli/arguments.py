@@ -24,13 +24,29 @@ def setting(text: str) -> tuple[str, bool | float | str]:
 
 def seconds(text: str) -> float:
     """A time above 0 [s], as a number or with a unit."""
-    try:
-        time = to_unit(read_value(text), "s")
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    time = _time(text)
     if not (time > 0 and math.isfinite(time)):
         raise argparse.ArgumentTypeError(f"{text!r} must exceed 0 and be finite")
     return time
+
+
+def seconds_or_none(text: str) -> float:
+    """A time [s], as `seconds`, or 0."""
+    time = _time(text)
+    if not (time >= 0 and math.isfinite(time)):
+        raise argparse.ArgumentTypeError(f"{text!r} must be 0 or above and finite")
+    return time
+
+
+def _time(text: str) -> float:
+    """Any time [s], as a number or with a unit."""
+    value = read_value(text)
+    if isinstance(value, bool):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time; write it like 0.5 or '500 ms'")
+    try:
+        return to_unit(value, "s")
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def positive(text: str) -> float:

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from orchestrator.binding.draft import draft_binding
 from orchestrator.binding.tables import REQUIRED
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.description import read_description
+from orchestrator.safe_files import write_text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,9 +25,9 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force")
     text = draft_binding(description, out.parent)
     try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--out {out}: cannot be written: {error.strerror}; choose another file") from error
+        write_text(out, text)
+    except ResultsError as error:
+        raise InputError(f"--out {error}") from error
     marked = [line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")]
     print(f"{out}: confirm what is marked GUESS")
     for line in marked:

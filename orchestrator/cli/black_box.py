@@ -20,10 +20,12 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import made_folder, make_console, make_errors
+from orchestrator.cli.terminal import made_folder, make_console, make_errors, said_stages
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
+from orchestrator.report.tables import PlainTable
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.study.modes import modes_of, running
 
 
@@ -42,24 +44,27 @@ def run(options: argparse.Namespace) -> int:
     scenarios = prepare(options)
     console = make_console(stderr=options.json)
     folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_black_box")
-    output = []
+    output, run_id = [], new_run_id()
     verdicts: dict[str, Stability] = {}
     for prepared in scenarios:
-        with running(prepared) as master, console.status(f"{prepared.name}: measuring {options.component}"):
+        with running(prepared) as master, said_stages() as report:
             if options.component not in master.components:
                 known = ", ".join(master.components)
                 raise InputError(
                     f"--component: scenario {prepared.name!r} has no {options.component!r}; it has: {known}"
                 )
             restore = False if options.no_state else None
-            system = linearize_with_box(master, options.component, excitation_of(options), restore=restore)
+            system = linearize_with_box(
+                master, options.component, excitation_of(options), restore=restore, report=report
+            )
             box = is_black_box(master.components[options.component])
             white = [] if box else modes_of(prepared, master, ELECTROMECHANICAL_HZ).modes
         verdicts[prepared.title] = judge(system.model)
         passive = passivity(system.response)
-        save_identification(system.response, system.identified, passive, folder / prepared.name)
+        with staged(folder / prepared.name, run_id) as staging:
+            save_identification(system.response, system.identified, passive, staging)
         for text in system.warnings:
-            make_errors().print(f"[bold yellow]warning:[/bold yellow] scenario {prepared.name!r}: {escape(text)}")
+            make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(f'scenario {prepared.name!r}: {text}')}")
         if options.json:
             output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
         else:
@@ -68,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(output, indent=1))
     else:
-        console.print(f"Admittances and models in {folder}", soft_wrap=True, highlight=False)
+        console.print(escape(f"Admittances and models in {folder}"), soft_wrap=True, highlight=False)
     return exit_code(options, list(verdicts.values()))
 
 
@@ -79,7 +84,7 @@ def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
 def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     fitted = f"order {len(system.identified.A)}, fit {system.identified.error:.1e}"
     name = f"{title}: {system.component} as a black box, {fitted}"
-    table = Table(title=name, title_justify="left", header_style="bold")
+    table = PlainTable(title=escape(name), title_justify="left", header_style="bold")
     columns = ["f [Hz]", "Damping [%]", "the box takes part [%]"]
     columns += ["with its states: f [Hz]", "Damping [%]", "takes part [%]"] if white else []
     for column in columns:

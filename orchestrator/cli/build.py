@@ -8,6 +8,7 @@ from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.extras import require
 from orchestrator.api.models import build, catalogue_model
 from orchestrator.cli import linear_model
+from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 
 
@@ -34,9 +35,12 @@ def run(options: argparse.Namespace) -> int:
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     models = [catalogue_model(name) for name in names]
     extra = linear_model.extra_members(options, [model.name for model in models])
-    for model in models:
-        built = build(
-            model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra
-        )
-        print(built)
+    kind = "native" if options.native else "Python-backed"
+    with said_stages() as report:
+        for number, model in enumerate(models, start=1):
+            report(f"{model.name}: compiling, {kind} ({number} of {len(models)}); minutes where it was never compiled")
+            built = build(
+                model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra
+            )
+            print(built)
     return 0

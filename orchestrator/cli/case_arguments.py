@@ -7,14 +7,18 @@ from orchestrator.api.scenario import Scenario, choose
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
 from orchestrator.cli.arguments import assignment, seconds
 from orchestrator.cli.terminal import print_questions
 
 
-def add_case_arguments(parser: argparse.ArgumentParser) -> None:
-    """The case and what is changed of it."""
+def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+    """The case, which may be left out where ``optional``, and what is changed of it."""
     parser.add_argument(
-        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+        "case",
+        metavar="CASE",
+        nargs="?" if optional else None,
+        help="a built-in case (two_area), or the path of a case file or an .ssp",
     )
     parser.add_argument(
         "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
@@ -35,6 +39,7 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="values from a parameter file, as `gfor design` writes it (repeatable; --set overrides it)",
     )
+    add_trust_argument(parser)
     parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
     parser.add_argument(
         "--native",
@@ -45,14 +50,36 @@ def add_case_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_trust_argument(parser: argparse.ArgumentParser) -> None:
+    """The user's own word on foreign FMUs."""
+    parser.add_argument(
+        "--trust-fmus",
+        action="store_true",
+        help="let FMUs of others run in gfor's own process where the case says isolated = false; they can do there "
+        "whatever you can",
+    )
+
+
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     """The scenarios of a case, as the options have them."""
-    file, stop = load_case(options.case), getattr(options, "stop", None)
+    file, stop = load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "stop", None)
     scenarios = choose(
-        file, options.scenario, dict(options.set), step=options.step, stop=stop, parameters=options.parameters
+        file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters
     )
     print_questions([scenario.prepared for scenario in scenarios])
     return scenarios
+
+
+def values_set(options: argparse.Namespace) -> dict[str, Value]:
+    """The values of ``--set`` and ``--native``; of a name that is given twice, the last value, at its last place.
+
+    Patterns make the order matter: a value overrides those before it.
+    """
+    values: dict[str, Value] = {}
+    for key, value in options.set:
+        values.pop(key, None)
+        values[key] = value
+    return values
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:

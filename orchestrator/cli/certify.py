@@ -19,6 +19,7 @@ from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import INTERRUPTED, InputError
+from orchestrator.report.tables import PlainTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,7 +88,7 @@ def run(options: argparse.Namespace) -> int:
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
     console = make_console(stderr=options.json)
-    executor = choose_executor(options.workers, options.scheduler, ["orchestrator.certification.point"])
+    executor = choose_executor(options, ["orchestrator.certification.point"])
     result = compute_points(lambda report: certify(request, executor, folder, report), executor, folder, console)
     if result is None:
         return INTERRUPTED
@@ -104,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         console.print(_table(result), "")
         for v in result.verdicts:
             if said := v.of_base_critical():
-                console.print(f"X_L = {v.X_L:g} pu: {said}", soft_wrap=True, highlight=False)
+                console.print(f"X_L = {v.X_L:g} pu: {escape(said)}", soft_wrap=True, highlight=False)
         console.print("")
         good = result.passed and not result.refused
         console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
@@ -125,7 +126,9 @@ def _request(options: argparse.Namespace) -> CertificationRequest:
 
 
 def _table(result: Certification) -> Table:
-    table = Table(title=f"Damping test, {result.signal} watched", title_justify="left", header_style="bold")
+    table = PlainTable(
+        title=escape(f"Damping test, {result.signal} watched"), title_justify="left", header_style="bold"
+    )
     for column in (
         "X_L [pu]",
         "least damped [Hz]",

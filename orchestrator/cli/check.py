@@ -9,13 +9,12 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.acceptance.checks.base import CheckResult, Verdict
-from orchestrator.acceptance.checks.subject import Use
-from orchestrator.acceptance.junit import write_junit
-from orchestrator.acceptance.runner import AcceptanceReport, check_fmu
-from orchestrator.cases.use import use_in_case
+from orchestrator.acceptance.runner import AcceptanceReport
+from orchestrator.api.acceptance import check
 from orchestrator.cli.arguments import positive
 from orchestrator.errors import InputError
-from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.protection import missing
+from orchestrator.units import read_value
 
 _COLOURS = {
     Verdict.PASS: "green",
@@ -41,29 +40,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
     parser.add_argument("--time-limit", type=positive, default=30.0, metavar="S", help="for one call [s] (default: 30)")
     parser.add_argument(
-        "--memory-limit", type=positive, default=4096.0, metavar="MB", help="of the FMU's process [MB] (default: 4096)"
+        "--memory-limit",
+        type=read_value,
+        default=4096.0,
+        metavar="MB",
+        help="of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
     )
 
 
 def run(options: argparse.Namespace) -> int:
     """Check, print, and write what is asked for; 1 if a check failed, 2 if the FMU is not supported here."""
-    limits = Limits(seconds=options.time_limit, memory=int(options.memory_limit * 1024**2))
-    use, binding = Use(options.step), options.binding
-    if options.case:
-        use, of_case = use_in_case(options.case, options.component, options.file, options.step, options.scenario)
-        binding = binding or of_case
-    elif options.component:
+    if options.component and not options.case:
         raise InputError("--component names a component of a case; give --case as well")
-    elif options.scenario:
+    if options.scenario and not options.case:
         raise InputError("--scenario names a scenario of a case; give --case as well")
-    report = check_fmu(options.file, binding, limits, tuple(options.only), use=use)
+    found = check(
+        options.file,
+        options.binding,
+        step=options.step,
+        only=options.only,
+        case=options.case or None,
+        component=options.component,
+        scenario=options.scenario,
+        time_limit=options.time_limit,
+        memory_limit=options.memory_limit,
+    )
     if options.junit:
-        write_junit(report, options.junit)
+        found.save_junit(options.junit)
     if options.json:
-        print(json.dumps(report.as_dict(), indent=1, ensure_ascii=False))
+        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
     else:
-        _print(report)
-    return 1 if report.failures else NOT_SUPPORTED if report.not_supported else 0
+        _print(found.report)
+    return 1 if found.faults else NOT_SUPPORTED if found.not_supported else 0
 
 
 def _each_once(results: list[CheckResult]) -> list[CheckResult]:
@@ -88,17 +96,23 @@ def _print(report: AcceptanceReport) -> None:
         if result.remedy:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
     console.print("")
-    if report.unlimited:
-        console.print(f"This system could not limit: {', '.join(report.unlimited)}.")
+    if report.protections:
+        in_force = [protection.name for protection in report.protections if protection.in_force]
+        console.print(f"In force around the FMU's process: {', '.join(in_force)}.")
+    if lacking := missing(report.protections):
+        console.print(f"Not in force on this system: {', '.join(lacking)}.")
     if report.trusted:
-        console.print(f"{report.fmu.name}: no check failed.")
+        console.print(f"{escape(report.fmu.name)}: no check failed.")
     elif not report.failures:
         console.print(
-            f"[bold yellow]{report.fmu.name}: not supported here: {', '.join(report.not_supported)}; that says nothing "
-            "about the FMU[/]"
+            f"[bold yellow]{escape(report.fmu.name)}: not supported here: {', '.join(report.not_supported)}; "
+            "that says nothing about the FMU[/]"
         )
+    elif report.binding_fails and report.binding is not None:
+        words = f"{report.binding.name}: mend it and check again; nothing is known yet of {report.fmu.name} behind it"
+        console.print(f"[bold red]{escape(words)}[/]")
     else:
-        console.print(f"[bold red]{report.fmu.name}: do not use it as it is: {', '.join(report.faults)}[/]")
+        console.print(f"[bold red]{escape(report.fmu.name)}: do not use it as it is: {', '.join(report.faults)}[/]")
 
 
 def _in_one_line(text: str) -> str:

@@ -2,16 +2,15 @@
 
 import argparse
 import json
-from dataclasses import asdict
 from pathlib import Path
 
-from rich.table import Table
+from rich.markup import escape
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.cli.identify import mode_json
-from orchestrator.cli.terminal import make_console
-from orchestrator.errors import InputError
-from orchestrator.study.comparison import compare, most_different, open_trajectory
+from orchestrator.api.comparison import compare
+from orchestrator.cli.arguments import seconds_or_none
+from orchestrator.cli.terminal import make_console, make_errors, saying_warnings
+from orchestrator.report.tables import PlainTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,27 +19,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
     parser.add_argument("--signal", action="append", metavar="SIGNAL",
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip
-    parser.add_argument("--start", type=float, default=2.0, metavar="T", help="oscillations are read from here [s] (2)")
+    parser.add_argument("--start", type=seconds_or_none, metavar="T", help="oscillations are read from here [s] (2)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
     """Compare two runs signal by signal."""
-    a, b = open_trajectory(options.first), open_trajectory(options.second)
-    signals = options.signal or most_different(a, b)
-    if not signals:
-        raise InputError(f"{options.first} and {options.second} have no signal in common")
-    found = [compare(a, b, s, options.start, (str(options.first), str(options.second))) for s in signals]
+    with saying_warnings():
+        found = compare(options.first, options.second, options.signal or (), options.start)
     if options.json:
-        print(json.dumps([asdict(c) | {"modes": [mode_json(m) for m in c.modes]} for c in found], indent=1))
+        print(json.dumps(found.as_json(), indent=1))
+        for text in found.remarks:
+            make_errors().print(text, markup=False, soft_wrap=True, highlight=False)
         return 0
-    table = Table(title=f"A: {options.first}\nB: {options.second}", title_justify="left", header_style="bold")
+    title = escape(f"A: {options.first}\nB: {options.second}")
+    table = PlainTable(title=title, title_justify="left", header_style="bold")
     for column in ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings"):
         table.add_column(column, justify="left" if column == "Signal" else "right")
     for c in found:
         table.add_row(f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}",
                       f"{c.largest:.4g}", f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))  # fmt: skip
-    make_console().print(table)
+    console = make_console()
+    console.print(table)
+    for text in found.remarks:
+        console.print(escape(text), soft_wrap=True, highlight=False)
     return 0
 
 

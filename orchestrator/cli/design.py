@@ -5,18 +5,21 @@ import json
 import math
 import shlex
 from pathlib import Path
+from shutil import rmtree
 
+from rich.markup import escape
+
+from orchestrator.api.design import Wanted, design_controller, parameter_file_path
 from orchestrator.cases.case import load_case
-from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.cli.arguments import percent, positive
-from orchestrator.cli.case_arguments import add_case_arguments, parameters
-from orchestrator.cli.terminal import make_console, print_questions, warn
+from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
+from orchestrator.cli.terminal import make_console, make_errors, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
-from orchestrator.errors import InputError
-from orchestrator.pod_design.design import DesignRequest, design_pod
-from orchestrator.pod_design.files import design_json, parameters_of, provenance
+from orchestrator.errors import INTERRUPTED, CosimError, InputError
+from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import sheet
 from orchestrator.pod_design.target import CONTROLLERS
+from orchestrator.points.store import PointStore
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,41 +79,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Design, print, and write the parameter file."""
-    files, case, console = parameters(options), load_case(options.case), make_console(stderr=options.json)
+    files, case, console = (
+        parameters(options),
+        load_case(options.case, trust_fmus=options.trust_fmus),
+        make_console(stderr=options.json),
+    )
     if len(options.scenario) > 1:
         raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
     if options.damping is not None and options.damping_increment is not None:
         raise InputError("--damping and --damping-increment both say what is required; give one of them")
-    path = _writable(options.out or Path(f"{case.name}_{options.controller}.toml"))
-    wanted = {} if options.damping_increment is None else {"damping_increment": options.damping_increment}
-    request = DesignRequest(
-        controller=options.controller,
-        component=options.component,
-        scenario=next(iter(options.scenario), None),
-        mode=options.mode,
-        damping=options.damping,
-        delta_gain=options.delta_gain,
-        gain_bounds=options.gain_bounds,
-        stages=options.stages,
-        compensated_gain=options.gain_from == "compensated",
-        least_damping=options.min_damping,
-        refine=options.refine,
-        margins=not options.no_margins,
-        overrides=dict(options.set),
-        parameters=files,
-        step_size=options.step,
-        **wanted,
+    path = _writable(
+        parameter_file_path(options.out, "--out") if options.out else Path(f"{case.name}_{options.controller}.toml")
     )
-    with console.status("starting") as status:
-        design = design_pod(case, request, status.update)
+    scenario = next(iter(options.scenario), None)
+    folder = path.with_suffix(".points")
+    try:
+        with console.status("starting") as status:
+            controller = design_controller(
+                case,
+                options.controller,
+                scenario,
+                values_set(options),
+                options.step,
+                files,
+                _wanted(options),
+                report=status.update,
+                store=PointStore(folder),
+            )
+    except KeyboardInterrupt:
+        make_errors().print(
+            f"interrupted: what was computed is in {escape(str(folder))}; the same command continues from there"
+        )
+        return INTERRUPTED
+    except CosimError:
+        rmtree(folder, ignore_errors=True)  # the same would come out again
+        raise
+    rmtree(folder, ignore_errors=True)
+    design = controller.result
     print_questions([design.prepared])
     warn(design.prepared.name, design.warnings)
-    text = parameter_file_text(parameters_of(design), provenance(design, _command_line(options)))
-    path.write_text(text, encoding="utf-8")
-    content = json.dumps(design_json(design) | {"parameter_file": str(path)}, indent=1, ensure_ascii=False)
-    path.with_suffix(".json").write_text(content + "\n", encoding="utf-8")  # for `gfor report`
+    controller.save(path, _command_line(options))
     if options.json:
-        print(content)
+        print(json.dumps(controller.as_json(path), indent=1, ensure_ascii=False))
         return exit_code(options, [design.stability])
     print_stability(
         console, {"without the controller": design.stability_before, "with the final setting": design.stability}
@@ -118,9 +128,32 @@ def run(options: argparse.Namespace) -> int:
     for part in sheet(design):
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)
     warned = "" if design.met else " (the requirement is not met)"
-    console.print(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
-                  f"{design.target.scenario} --parameters {path}", soft_wrap=True, highlight=False)  # fmt: skip
+    console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
+                  f"{design.target.scenario} --parameters {path}"), soft_wrap=True, highlight=False)  # fmt: skip
     return exit_code(options, [design.stability])
+
+
+def _wanted(options: argparse.Namespace) -> Wanted:
+    """What the options ask of the design."""
+    wanted = Wanted(
+        delta_gain=options.delta_gain,
+        gain_bounds=options.gain_bounds,
+        compensated_gain=options.gain_from == "compensated",
+        least_damping=options.min_damping,
+        refine=options.refine,
+        margins=not options.no_margins,
+    )
+    if options.component is not None:
+        wanted["component"] = options.component
+    if options.mode is not None:
+        wanted["mode"] = options.mode
+    if options.damping is not None:
+        wanted["damping"] = options.damping
+    if options.damping_increment is not None:
+        wanted["damping_increment"] = options.damping_increment
+    if options.stages is not None:
+        wanted["stages"] = options.stages
+    return wanted
 
 
 def _command_line(options: argparse.Namespace) -> str:

@@ -1,38 +1,36 @@
-"""Where points are computed: the options ``--workers`` and ``--scheduler``."""
+"""Where points are computed: the options ``--workers``, ``--scheduler`` and ``--tls``."""
 
 import argparse
 from collections.abc import Sequence
 
+from orchestrator.api import executors
 from orchestrator.cli.arguments import count
 from orchestrator.errors import InputError
-from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.executor import Executor
-from orchestrator.points.processes import Processes, number_of_cores
-from orchestrator.points.serial import Serial
 
 
 def add_executor_arguments(parser: argparse.ArgumentParser) -> None:
-    """Both options."""
+    """The three options."""
     parser.add_argument("--workers", type=count, metavar="N", help="processes to compute in (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
+    parser.add_argument("--tls", metavar="DIR", help="folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
 
 
-def choose_executor(workers: int | None, scheduler: str | None, imports: Sequence[str]) -> Executor:
-    """Where the points are computed.
+def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
+    """Where the points are computed, as `executors.choose_executor` chooses it.
 
     Parameters
     ----------
+    options
+        With those of `add_executor_arguments`.
     imports
-        As `Processes` takes them.
+        Modules that a worker imports once.
 
     Raises
     ------
     InputError
         If both a number of workers and a scheduler are given.
     """
-    if scheduler is not None:
-        if workers is not None:
-            raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
-        return DaskCluster(scheduler)
-    workers = workers or number_of_cores()
-    return Processes(workers, imports) if workers > 1 else Serial()
+    if options.scheduler is not None and options.workers is not None:
+        raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
+    return executors.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -17,7 +17,7 @@ _TABLES: dict[str, Any] = {
     "analysis": True,
     "plots": True,
     "reference": True,
-    "solver": {"record_interval", "record"},
+    "solver": {"record_interval", "record", "record_filter"},
 }
 """What of a case file SSP has no place for and no structure of our annotation holds."""
 

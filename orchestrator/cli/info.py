@@ -1,24 +1,30 @@
 """``gfor info``: what an FMU declares."""
 
 import argparse
+import json
 from pathlib import Path
 
 from rich.markup import escape
 
+from orchestrator.api.fmu import info
 from orchestrator.cli.terminal import make_console
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
+from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.report.tables import fmu_variables
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor info``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print what the FMU is, what it can do, and its variables."""
-    description = read_description(options.file)
+    found = info(options.file)
+    if options.json:
+        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
+        return 0
+    description = found.description
     console = make_console()
     console.print(f"[bold]{escape(description.model_name)}[/bold]: {escape(description.title)}")
     console.print(
@@ -32,9 +38,8 @@ def run(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
-    embedded = read_embedded_model(options.file)
-    if embedded is not None:
-        console.print(escape(_in_words(embedded)), highlight=False)
+    if found.linear_model is not None:
+        console.print(escape(_in_words(found.linear_model)), highlight=False)
     for table in fmu_variables(description):
         console.print("", table)
     return 0

@@ -8,6 +8,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.rules import MasterRules
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_dataset
 from orchestrator.study.like import run_like
 
@@ -33,13 +34,26 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
     return master_rules(options.like) if options.like else None
 
 
-def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, options: argparse.Namespace) -> int:
-    """Run scenarios as another master would; their trajectories are all that is written."""
-    order = options.order.split(",") if options.order else None
-    folder = options.out or Path("results") / f"{scenarios[0].case.name}_like_{rules.name}"
+def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None) -> int:
+    """Run scenarios as another master would; their trajectories are all that is written.
+
+    Parameters
+    ----------
+    scenarios
+        All of them.
+    rules
+        Of the master.
+    folder
+        For the results.
+    turns
+        Components with commas between them, in the order in which they step; the master's own where None.
+    """
+    order = turns.split(",") if turns else None
+    run_id = new_run_id()
     for prepared in scenarios:
         dataset = run_like(prepared, rules, order)
         path = folder / prepared.name / "trajectory"
-        save_dataset(dataset, path)
+        with staged(folder / prepared.name, run_id) as staging:
+            save_dataset(dataset, staging / "trajectory")
         print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
     return 0

@@ -8,6 +8,7 @@ from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import made_folder, make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linearised import exceptions_in_words
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.study.linear_model_files import save_linear_model
 
 
@@ -36,14 +37,15 @@ def run(options: argparse.Namespace) -> int:
     scenarios = chosen(options)
     folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear")
     verdicts: dict[str, Stability] = {}
-    lines = []
+    lines, run_id = [], new_run_id()
     for scenario in scenarios:
         model = scenario.linearize(options.input or (), options.output or (), continuous=options.continuous)
         verdicts[scenario.title] = model.stability
         warn(scenario.name, model.warnings)
-        paths = save_linear_model(
-            model, model.operating_point, model.stability, scenario.prepared, folder / scenario.name
-        )
+        place = folder / scenario.name
+        with staged(place, run_id) as staging:
+            saved = save_linear_model(model, model.operating_point, model.stability, scenario.prepared, staging)
+        paths = [place / path.name for path in saved]
         size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         lines.append(f"{scenario.name}: {kind}, {size}: {', '.join(map(str, paths))}")

@@ -2,12 +2,22 @@
 
 import argparse
 import json
+from contextlib import nullcontext
 from pathlib import Path
+
+from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import made_folder, make_console, print_named_modes, print_sources, print_warnings
+from orchestrator.cli.terminal import (
+    made_folder,
+    make_console,
+    print_named_modes,
+    print_sources,
+    print_warnings,
+    said_stages,
+)
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.study import tables
@@ -55,18 +65,25 @@ def run(options: argparse.Namespace) -> int:
     folder = made_folder(options.out) if options.out else None
     if options.black_box and options.directional:
         raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
-    results = [
-        scenario.modes(
-            options.range, options.critical, directional=options.directional, black_box=options.black_box
-        ).result
-        for scenario in scenarios
-    ]
+    with said_stages() if options.black_box else nullcontext() as report:
+        results = [
+            scenario.modes(
+                options.range,
+                options.critical,
+                directional=options.directional,
+                black_box=options.black_box,
+                report=report,
+            ).result
+            for scenario in scenarios
+        ]
     written = []
     if folder:
+        from orchestrator.results.staging import new_run_id, staged  # noqa: PLC0415 - only here
         from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
 
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
-        written += [path.name for path in save_modes(results, folder)]
+        with staged(folder, new_run_id()) as staging:
+            written += [path.name for path in save_modes(results, staging)]
     if options.json:
         print(json.dumps(modes_json(results), indent=1, ensure_ascii=False))
         return exit_code(options, [r.stability for r in results])
@@ -78,5 +95,5 @@ def run(options: argparse.Namespace) -> int:
     print_named_modes(console, results)
     print_sources(console, results)
     if folder:
-        console.print(f"Modes in {folder}: {', '.join(written)}", soft_wrap=True)
+        console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
     return exit_code(options, [r.stability for r in results])

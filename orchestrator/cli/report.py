@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.cli.terminal import saying_warnings
 from orchestrator.report.html.page import write_report
 
 
@@ -15,5 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the page and print its path."""
-    print(write_report(options.folder, options.others, options.out))
+    with saying_warnings():
+        page = write_report(options.folder, options.others, options.out)
+    print(page)
     return 0

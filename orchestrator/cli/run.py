@@ -4,14 +4,15 @@ import argparse
 import json
 import warnings
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.api.scenario import RunEndedWarning
-from orchestrator.cli import like
+from orchestrator.api.scenario import RunEndedWarning, Scenario
+from orchestrator.cli import checkpoints, federates, like
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
@@ -20,13 +21,21 @@ from orchestrator.cli.terminal import (
     make_errors,
     print_findings,
     print_named_modes,
+    print_recording_questions,
     print_sources,
     print_warnings,
 )
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.coupling.progress import Progress
-from orchestrator.errors import INTERRUPTED, CosimError, RunInterruptedError
+from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
+from orchestrator.federation.choice import Federates
+from orchestrator.fmi.interrupts import calls
 from orchestrator.report.progress import progress_bar
+from orchestrator.results.lock import held
+from orchestrator.results.recording import FOLDER, RecordingFolder
+from orchestrator.results.room import require_room
+from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
+from orchestrator.safe_files import PARTIAL
 from orchestrator.study import tables
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult
@@ -34,23 +43,59 @@ from orchestrator.study.run import RunResult
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor run``."""
-    add_case_arguments(parser)
+    add_case_arguments(parser, optional=True)
     parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     add_verdict_argument(parser)
+    checkpoints.add_arguments(parser)
     like.add_arguments(parser)
+    federates.add_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the scenarios one after the other; each is written as soon as it is done."""
-    rules = like.rules_of(options)
-    scenarios = chosen(options)
-    if rules is not None:
-        return like.run([scenario.prepared for scenario in scenarios], rules, options)
-    folder = made_folder(options.out or Path("results") / scenarios[0].prepared.case.name)
+    """Run the scenarios while no other command works in the folder of the results."""
+    with ExitStack() as stack:
+        if options.resume is not None and options.resume.is_dir():
+            stack.enter_context(held(options.resume))  # before the request in it is read
+        options = checkpoints.with_request(options)
+        rules = like.rules_of(options)
+        scenarios = chosen(options)
+        print_recording_questions([scenario.prepared for scenario in scenarios])
+        engine = federates.choice(options, len(scenarios))
+        options.checkpoint = checkpoints.interval(options)
+        name = scenarios[0].prepared.case.name
+        folder = made_folder(options.out or Path("results") / (f"{name}_like_{rules.name}" if rules else name))
+        if options.resume is None:
+            stack.enter_context(held(folder))
+        if rules is not None:
+            return like.run([scenario.prepared for scenario in scenarios], rules, folder, options.order)
+        return _run_all(scenarios, folder, options, engine)
+
+
+def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Namespace, engine: Federates | None) -> int:
+    """Run the scenarios one after the other; each is written as soon as it is done.
+
+    Parameters
+    ----------
+    scenarios
+        All of them.
+    folder
+        For the results.
+    options
+        Of the command.
+    engine
+        Components that are federates.
+    """
+    require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
+    mend(folder)
+    if options.resume is None:
+        _say_unfinished(folder)
     console = make_console(stderr=options.json)
+    kept = checkpoints.StudyCheckpoints([scenario.prepared for scenario in scenarios], folder, options)
+    run_id = kept.run
     results: list[RunResult] = []
     stopped: tuple[str, BaseException] | None = None
     with progress_bar(console) as bar:
@@ -60,41 +105,128 @@ def run(options: argparse.Namespace) -> int:
             def report(done: int, total: int, task: Any = task) -> None:
                 bar.update(task, completed=done, total=total)
 
+            place = ScenarioFolder(folder, scenario.name, run_id)
             try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
-                    result = scenario.run(linear=options.linear, observers=[Progress(report)]).result
+                result = _run_into(place, scenario, Progress(report), kept, options, engine)
+                results.append(result)
+                if isinstance(result.failure, ResultsError):
+                    place.discard()
+                else:
+                    save_run(result, place, csv=options.csv)
             except (CosimError, KeyboardInterrupt) as error:
+                place.discard()
                 if not results:
+                    kept.end(whole=False)
                     raise
                 stopped = (scenario.name, error)
                 break
-            results.append(result)
-            save_run(result, folder)
             print_warnings([result.modes])
             print_findings([result])
             if result.failure:
                 stopped = (scenario.name, result.failure)
                 break
-    plots = save_study(results, folder)
+    plots = _save_together(results, folder, run_id, stopped)
     if options.json:
         print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
     else:
         _print(console, results)
-        console.print(f"Results in {folder}: trajectories (.nc, .csv), modes.csv, participation.csv, mode_shapes.csv, "
-                      f"step_size.csv, summary.json, "
-                      f"{', '.join(p.name for p in plots)}", soft_wrap=True)  # fmt: skip
+        written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
+        words = (
+            f"Results in {folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "
+            f"step_size.csv, summary.json, {', '.join(p.name for p in plots)}"
+        )
+        console.print(escape(words), soft_wrap=True)
     if stopped:
-        return _end(*stopped, folder)
+        code = _end(*stopped, folder)
+        kept.end(whole=False)
+        return code
+    kept.end(whole=True)
     gone_bad = options.fail_unstable and any(r.went_unstable for r in results)
     return int(gone_bad) or exit_code(options, [r.modes.stability for r in results])
+
+
+def _say_unfinished(folder: Path) -> None:
+    begun = [path.name for path in unfinished(folder)]
+    if begun:
+        text = (
+            f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; `gfor identify` "
+            "and `gfor compare` read them, and you may delete those that you do not need"
+        )
+        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
+
+
+def _run_into(
+    place: ScenarioFolder,
+    scenario: Scenario,
+    bar: Progress,
+    kept: checkpoints.StudyCheckpoints,
+    options: argparse.Namespace,
+    engine: Federates | None,
+) -> RunResult:
+    """Run a scenario; its recording grows in its folder.
+
+    Parameters
+    ----------
+    place
+        The scenario's folder.
+    scenario
+        The scenario.
+    bar
+        Shows how far it is.
+    kept
+        Checkpoints of all scenarios.
+    options
+        Of the command.
+    engine
+        Components that are federates.
+    """
+    recording = RecordingFolder(place.path / FOLDER, scenario.prepared, {"run": place.run})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
+        return scenario.run(
+            linear=options.linear,
+            observers=[bar],
+            recording=recording,
+            checkpoints=kept.of(scenario.name, recording, place),
+            federates=engine,
+        ).result
+
+
+def _save_together(
+    results: Sequence[RunResult], folder: Path, run_id: str, stopped: tuple[str, BaseException] | None
+) -> list[Path]:
+    """Write what concerns all scenarios; return the plots.
+
+    Parameters
+    ----------
+    results
+        Of the scenarios that ran.
+    folder
+        For them all.
+    run_id
+        The run's id.
+    stopped
+        The scenario and the error that ended the run before its time; if nothing could be written any more, nobody
+        needs to be told a second time.
+    """
+    whole = [r for r in results if not isinstance(r.failure, ResultsError)]
+    names = [r.modes.prepared.name for r in whole]
+    try:
+        with staged(folder, run_id, [name for name in names if (folder / name).is_dir()]) as staging:
+            return save_study(results, staging)
+    except ResultsError:
+        if stopped is None or not isinstance(stopped[1], ResultsError):
+            raise
+        return []
 
 
 def _end(scenario: str, error: BaseException, folder: Path) -> int:
     """Say where a study ended before its time, and what is left of it."""
     interrupted = isinstance(error, KeyboardInterrupt | RunInterruptedError)
     head = "" if interrupted else "[bold red]error:[/bold red] "
-    text = f"scenario {scenario!r}: {str(error) or 'interrupted'}\nWhat was computed until then is in {folder}"
+    begun = [path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)]
+    where = f" ({', '.join(begun)})" if begun and isinstance(error, ResultsError) else ""
+    text = f"scenario {scenario!r}: {str(error) or calls.how}\nWhat was computed until then is in {folder}{where}"
     make_errors().print(f"{head}{escape(text)}")
     return INTERRUPTED if interrupted else 1
 

@@ -8,20 +8,17 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import frequency_range
-from orchestrator.cli.case_arguments import add_case_arguments, parameters
+from orchestrator.cli.case_arguments import add_case_arguments, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.errors import INTERRUPTED
-from orchestrator.points.store import PointStore
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
-from orchestrator.sweep.dataset import Samples, save_sweep, sweep_json
-from orchestrator.sweep.plots import save_sweep_plots
-from orchestrator.sweep.sweep import SweepResult, plan_sweep, run_sweep
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,37 +49,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if no point has modes."""
-    executor = choose_executor(options.workers, options.scheduler, ["orchestrator.sweep.worker"])
-    case = load_case(options.case)
-    values = {key: value for file in parameters(options) for key, value in file.values.items()} | dict(options.set)
-    plan = plan_sweep(case, options.vary, options.scenario, values, options.step, options.range)
-    print_questions(plan.scenarios)
+    executor = choose_executor(options, WORKERS_IMPORT)
+    case = load_case(options.case, trust_fmus=options.trust_fmus)
+    planned = plan(
+        case,
+        options.vary,
+        options.scenario,
+        values_set(options),
+        step=options.step,
+        parameters=options.parameters,
+        frequencies=options.range,
+    )
+    print_questions(planned.scenarios)
     folder = made_folder(options.out or Path("results") / f"{case.name}_sweep")
     console = make_console(stderr=options.json)
-    store = PointStore(folder / "points")
-    result = compute_points(lambda report: run_sweep(plan, executor, store, report), executor, folder, console)
-    if result is None:
+    sweep = compute_points(lambda report: compute(planned, executor, folder, report), executor, folder, console)
+    if sweep is None:
         return INTERRUPTED
-    failed = _present(result, folder, console, as_json=options.json)
-    return failed or int(options.fail_unstable and not all(s.stable for s in result.scenarios))
+    failed = _present(sweep, folder, console, as_json=options.json)
+    return failed or int(options.fail_unstable and not all(s.stable for s in sweep.result.scenarios))
 
 
-def _present(result: SweepResult, folder: Path, console: Console, *, as_json: bool) -> int:
+def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: bool) -> int:
     """Write a sweep's files and print its summary; returns 1 if no point has modes."""
-    samples = Samples(result)
-    save_sweep(samples, folder)
-    plots = save_sweep_plots(samples, folder)
+    written, result = sweep.save(folder), sweep.result
     if as_json:
-        print(json.dumps(sweep_json(samples), indent=1, ensure_ascii=False))
+        print(json.dumps(sweep.as_json(), indent=1, ensure_ascii=False))
     else:
-        for line in tables.stability(samples):
+        for line in tables.stability(sweep.samples):
             console.print(line, soft_wrap=True, highlight=False)
-        console.print("", tables.trajectories(samples), "")
-    for text in tables.remarks(samples):
+        console.print("", tables.trajectories(sweep.samples), "")
+    for text in sweep.remarks:
         make_errors().print(escape(text))
     if not as_json:
         stored = f", {result.stored} were there already" if result.stored else ""
-        files = ", ".join(["sweep.nc", "sweep.csv", *(path.name for path in plots)])
+        files = ", ".join(path.name for path in written)
         words = f"{result.computed} points computed{stored}. Results in {folder}: {files}"
         console.print(escape(words), soft_wrap=True)
     return 0 if any(s.trajectories for s in result.scenarios) else 1

@@ -1,14 +1,17 @@
 """What all commands print, and where to."""
 
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
 from orchestrator.report.linearised import exceptions_in_words
+from orchestrator.results.manifest import ResultsWarning
 from orchestrator.study import tables
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -32,7 +35,7 @@ def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
         title = reference.title if reference else None
         console.print(tables.named_modes(results, title))
         if reference and any(r.references for r in results):
-            console.print(f"{title}: {reference.source}", style="dim", soft_wrap=True)
+            console.print(escape(f"{title}: {reference.source}"), style="dim", soft_wrap=True)
     if any(r.swing and (r.named or r.modes) for r in results):
         console.print("", tables.mode_shapes(results), "")
 
@@ -48,15 +51,24 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
 
 def print_questions(scenarios: Iterable[PreparedScenario]) -> None:
     """Ask on standard error, once and before anything is computed, about data that are most unusual."""
+    _ask(q for prepared in scenarios for q in prepared.questions)
+
+
+def print_recording_questions(scenarios: Iterable[PreparedScenario]) -> None:
+    """Ask on standard error, before a run, about intervals of recordings that are not kept."""
+    _ask(q for prepared in scenarios for q in prepared.about_rows)
+
+
+def _ask(questions: Iterable[Problem]) -> None:
     console = make_errors()
-    for question in dict.fromkeys(q for prepared in scenarios for q in prepared.questions):
+    for question in dict.fromkeys(questions):
         console.print(f"[bold yellow]question:[/bold yellow] {escape(str(question))}")
 
 
 def print_warnings(results: Sequence[ModesResult]) -> None:
     """Say on standard error what is to be borne in mind of results."""
     for result in results:
-        asked = {str(question) for question in result.prepared.questions}
+        asked = {str(question) for question in (*result.prepared.questions, *result.prepared.about_rows)}
         warn(result.prepared.name, [text for text in result.warnings if text not in asked])
 
 
@@ -64,7 +76,7 @@ def warn(scenario: str, texts: Iterable[str]) -> None:
     """Say on standard error what is to be borne in mind of a scenario."""
     console = make_errors()
     for text in texts:
-        console.print(f"[bold yellow]warning:[/bold yellow] scenario {scenario!r}: {escape(text)}")
+        console.print(f"[bold yellow]warning:[/bold yellow] {escape(f'scenario {scenario!r}: {text}')}")
 
 
 def print_findings(results: Sequence[RunResult]) -> None:
@@ -74,7 +86,31 @@ def print_findings(results: Sequence[RunResult]) -> None:
         for finding in result.findings:
             if finding.message != str(result.failure):
                 name = result.modes.prepared.name
-                console.print(f"[bold yellow]found:[/bold yellow] scenario {name!r}: {escape(finding.message)}")
+                console.print(f"[bold yellow]found:[/bold yellow] {escape(f'scenario {name!r}: {finding.message}')}")
+
+
+@contextmanager
+def said_stages() -> Iterator[Callable[[str], None]]:
+    """Inside, a callback for what is being done: a status on a terminal, else lines, both on standard error."""
+    console = make_errors()
+    if not console.is_terminal:
+        yield lambda text: console.print(text, markup=False)
+        return
+    with console.status("starting") as status:
+        yield lambda text: status.update(escape(text))
+
+
+@contextmanager
+def saying_warnings() -> Iterator[None]:
+    """Say on standard error what is to be borne in mind of results that are read."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", ResultsWarning)
+        yield
+    for text in dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)):
+        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
+    for other in found:
+        if not issubclass(other.category, ResultsWarning):
+            warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)
 
 
 def made_folder(path: Path, option: str = "--out") -> Path:

@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     if computed:
         with progress_bar(console) as bar:
             task = bar.add_task("Points", total=2 * len(points))
-            executor = choose_executor(options.workers, options.scheduler, ["orchestrator.certification.point"])
+            executor = choose_executor(options, ["orchestrator.certification.point"])
             try:
                 again = verify_points(
                     folder, content, points, executor, lambda done, _: bar.update(task, completed=done)

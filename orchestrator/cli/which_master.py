@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
@@ -18,6 +17,8 @@ from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
 from orchestrator.interop.probe_result import read_probe_result
 from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Identified, identify
+from orchestrator.report.tables import PlainTable
+from orchestrator.safe_files import write_text
 
 _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
     # property: what it is called, what its values mean
@@ -75,7 +76,7 @@ def _build(options: argparse.Namespace) -> int:
     for name in ("probe_a", "probe_b"):
         print(export(NativeFmu(build_model(name)), folder, platforms))
     path = folder / "INSTRUCTIONS.md"
-    path.write_text(instructions(options.step, options.stop, platforms), encoding="utf-8")
+    write_text(path, instructions(options.step, options.stop, platforms))
     print(path)
     return 0
 
@@ -94,7 +95,7 @@ def _print(verdict: Identified, console: Console) -> None:
                       f"{_in_words(verdict.nearest)}.\nCheck connections, start values, --step and --stop; a master "
                       "that repeats steps or solves for its inputs is not among them.", soft_wrap=True)  # fmt: skip
         return
-    table = Table(title=f"Schedule ({compared})", title_justify="left", show_header=False)
+    table = PlainTable(title=f"Schedule ({compared})", title_justify="left", show_header=False)
     for name, (title, words) in _WORDS.items():
         told = [words[value] for value in verdict.answers(name)]
         table.add_row(title, told[0] if len(told) == 1 else "not told: " + " or ".join(told))

@@ -1,1 +1,3 @@
-"""Other people's masters: their schedules, run by ours, and how to tell which one a tool has."""
+"""The masters of other tools: our master runs their schedules, and a pair of probe FMUs shows which schedule a tool
+has.
+"""

@@ -1,4 +1,4 @@
-"""A system run as another master would run it, by our own."""
+"""Our master runs a system by the rules of another master."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import Event
+from orchestrator.coupling.events import Event, faults_among
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.recorder import Recorder
@@ -23,7 +23,7 @@ class Emulation:
     Attributes
     ----------
     times
-        Its labels [s], shape (n,).
+        Times of the rows, as the other master labels them [s], shape (n,).
     values
         Shape (n, number of names).
     names
@@ -51,9 +51,9 @@ def emulate(
     Parameters
     ----------
     system
-        Its components start with the values that they are given there.
+        Components, connections and start values.
     rules
-        The other master's.
+        The rules of the other master.
     step_size, stop_time
         [s]
     record
@@ -61,19 +61,28 @@ def emulate(
     every
         Steps between two rows; the first row is that with label 0.
     events
-        They happen before the step that starts at their time, as with our own schedules; most masters have none.
+        Each event happens before the step that starts at the event's time, as with our own schedules. Most other
+        masters do not support events.
     order
-        In which the components step, for a master that takes them in turn; by default the system's own.
+        Order in which the components step, for a master that steps them one after the other; by default the order of
+        the system.
     observers
-        Look at the run beside the recorder.
+        Further observers of the run, besides the recorder.
 
     Raises
     ------
     InputError
-        If the stop time is no communication point, or the order does not fit the master or the system.
+        If the stop time is no communication point, the order does not fit the master or the system, or a connection is
+        disturbed.
     ComponentError
         If an FMU fails.
     """
+    disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
+    if disturbed:
+        raise InputError(
+            f"{rules.title} knows no imperfections of connections and no faults, but the case has some "
+            f"({'; '.join(disturbed[:3])}); leave them out to see what it would record"
+        )
     clock = Clock(step_size)
     last = min(clock.index(stop_time, "the stop"), rules.rows(step_size, stop_time) - 1)
     if last < 0:

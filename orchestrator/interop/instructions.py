@@ -1,4 +1,4 @@
-"""The page that goes with the probe pair."""
+"""The page of instructions that is written beside the two probe FMUs."""
 
 from orchestrator.interop.candidates import SIGNALS
 from orchestrator.interop.which_master import STEP_SIZE, STOP_TIME

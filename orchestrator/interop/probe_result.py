@@ -18,7 +18,7 @@ _NEEDED = ("a.y", "b.y")
 
 @dataclass(frozen=True)
 class ProbeResult:
-    """What was recorded.
+    """The recorded signals of the probe pair.
 
     Attributes
     ----------
@@ -36,19 +36,20 @@ class ProbeResult:
 
 
 def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> ProbeResult:
-    """Read a CSV file; columns are told by how their headings end (``a.y``, ``probe_a::y``, ``system/a/y [1]``).
+    """Read a CSV file. The end of a heading says which signal the column holds (``a.y``, ``probe_a::y``, ``system/a/y
+    [1]``).
 
     Parameters
     ----------
     path
         Separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
     named
-        Heading of the column for ``time`` or a signal, where it is not told by its ending.
+        Heading of the column for ``time`` or a signal, where the end of the heading does not show it.
 
     Raises
     ------
     InputError
-        If the file cannot be read, the time or both of a.y and b.y are missing, or an entry is no number.
+        If the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is not a number.
     """
     heads, lines = _table(path)
     columns = _columns(path, heads, dict(named or {}))
@@ -56,7 +57,7 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
         [[_number(path, line, heads, columns[s], row) for s in columns] for row, line in enumerate(lines)]
     )
     picked = picked[np.argsort(picked[:, 0], kind="stable")]
-    last = np.append(np.diff(picked[:, 0]) > 0, True)  # of rows with one time, before and after an event, the last
+    last = np.append(np.diff(picked[:, 0]) > 0, True)  # the last of several rows with one time
     times, picked = picked[last, 0], picked[last, 1:]
     values = np.full((len(times), len(SIGNALS)), np.nan)
     for index, signal in enumerate(list(columns)[1:]):

@@ -1,4 +1,4 @@
-"""What tells one master from another: every choice that changes a result to its last digits."""
+"""The choices by which masters differ: each of them changes the digits of a result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ Steps = Literal["side by side", "in turn"]
 LastLabel = Literal["stop", "before stop", "sum below stop", "sum up to stop"]
 """The label of the last row.
 
-The stop time; a step before it; or, where the time is summed up step by step, so that rounding decides: the last label
-below the stop time, or the last that a step reaches without going beyond it.
+Either the stop time, or one step before it. A master that sums up the time step by step ends where rounding decides: at
+the last label below the stop time, or at the last label that a step reaches without passing the stop time.
 """
 
 
@@ -25,7 +25,7 @@ class MasterRules:
     Attributes
     ----------
     name, title
-        For the command line, and for people; the version that was looked at.
+        ``name`` is the word on the command line. ``title`` is the name for people, with the version that was examined.
     steps
         Jacobi or Gauss-Seidel.
     first_inputs
@@ -40,7 +40,7 @@ class MasterRules:
     last_label
         See `LastLabel`.
     source
-        Where each of these is to be seen.
+        Where in the master's source code or in the test results each choice can be seen.
     """
 
     name: str
@@ -61,14 +61,15 @@ class MasterRules:
         Parameters
         ----------
         components
-            All of them, in the order in which the master was given them.
+            Names of all components, in the order in which the master was given them.
         order
-            The order in which they step, where that is another; for Gauss-Seidel only.
+            Order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
 
         Raises
         ------
         InputError
-            If an order is given to a master that has none, or does not list every component once.
+            If the master steps all components side by side and an order is given, or the order does not list every
+            component once.
         """
         if self.steps == "side by side":
             if order is not None:
@@ -83,7 +84,7 @@ class MasterRules:
         return chosen
 
     def rows(self, step_size: float, stop_time: float) -> int:
-        """How many rows the master records, one a step, from label 0 on."""
+        """Number of rows that the master records: one for each step, beginning with label 0."""
         if not self.last_label.startswith("sum"):
             return round(stop_time / step_size) + (self.last_label == "stop")
         time, steps, ahead = 0.0, 0, step_size if self.last_label == "sum up to stop" else 0.0

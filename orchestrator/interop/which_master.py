@@ -13,19 +13,20 @@ from orchestrator.interop.probe_result import ProbeResult
 from orchestrator.interop.rules import MasterRules
 
 STEP_SIZE, STOP_TIME = 0.1, 2.0
-"""What the instructions ask for [s]."""
+"""Step size and stop time that the instructions ask for [s]."""
 
 _LEAST_ROWS = 4
 _ON_POINT = 1e-3
 """How far a label may be from a communication point, in steps."""
 
 _FITS = 1e-3
-"""Schedules differ by more than that within a few rows; the signals are near 1."""
+"""A schedule fits if it differs by less than this from the record. Two schedules differ by more within a few rows; the
+signals are near 1."""
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What was found.
+    """The schedules that fit a record.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class Identified:
     last_row
         Index of the last of them: it has the label ``last_row``·H.
     step_size, stop_time
-        With which the tool was run [s].
+        Step size and stop time with which the tool was run [s].
     """
 
     fits: tuple[Candidate, ...]
@@ -81,7 +82,7 @@ def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float
     Parameters
     ----------
     step_size, stop_time
-        With which the tool was run [s].
+        Step size and stop time with which the tool was run [s].
 
     Raises
     ------

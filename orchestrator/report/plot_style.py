@@ -1,10 +1,14 @@
 """The look that all plots share."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from orchestrator.safe_files import write_bytes
 
 STYLE: dict[Any, Any] = {
     "axes.grid": True,
@@ -37,5 +41,17 @@ def colour(index: int) -> str:
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure, with the folder it belongs in."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=_DPI)
+    _to_the_letter(figure)
+    picture = BytesIO()
+    figure.savefig(picture, dpi=_DPI, format=path.suffix.removeprefix("."))
+    write_bytes(path, picture.getvalue())
+
+
+def _to_the_letter(figure: Figure) -> None:
+    """Titles, labels and legends are foreign text: two dollar signs in it begin no formula. Ticks keep theirs."""
+    numbers: set[Any] = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            numbers |= set(axis.findobj(Text)) - {axis.label}
+    for text in set(figure.findobj(Text)) - numbers:
+        text.set_parse_math(False)

@@ -5,6 +5,7 @@ from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.values import as_text
@@ -13,9 +14,28 @@ _ITEMS_SHOWN = 5
 """How many of a long list are shown, largest first."""
 
 
-def make_table(title: str, *columns: str, left: int = 1) -> Table:
-    """Headings are shown as they are: rich would take a unit such as [rad/s] for a style and leave it out."""
-    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
+class PlainTable(Table):
+    """A table that shows its cells as they are: rich would take "[kV]" of a foreign text for a style.
+
+    Such a word would be left out, and "[/s]" would end the program.
+    """
+
+    def add_row(self, *cells: Any, **options: Any) -> None:
+        """Add a row; text in it is shown to the letter.
+
+        Parameters
+        ----------
+        cells
+            Text, or whatever else rich can show.
+        options
+            As rich's own.
+        """
+        super().add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options)
+
+
+def make_table(title: str, *columns: str, left: int = 1) -> PlainTable:
+    """A table whose title, headings and cells are shown as they are."""
+    table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
         table.add_column(escape(column), justify="left" if index < left else "right", overflow="fold")
     return table

@@ -1,13 +1,13 @@
-"""The members of an SSP archive, and nothing outside it."""
+"""Access to the members of an SSP archive; paths that lead out of the archive are refused."""
 
 import hashlib
 import posixpath
-import uuid
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from fmus.toolchain.cache import intact, keep
 from orchestrator.errors import InputError
 from orchestrator.fmi.archive import check_xml, names_in, read_member
 from orchestrator.ssp.names import SYSTEM_FILE
@@ -26,7 +26,7 @@ class SspArchive:
     Raises
     ------
     InputError
-        If there is no such file, or it is no SSP.
+        If there is no such file, or the file is not an SSP.
     """
 
     def __init__(self, path: Path) -> None:
@@ -42,7 +42,7 @@ class SspArchive:
         Raises
         ------
         InputError
-            If it leads out of the archive, or the archive does not have it.
+            If the URI leads out of the archive, or the archive has no such member.
         """
         uri = urlsplit(source)
         path = unquote(uri.path)
@@ -79,18 +79,19 @@ class SspArchive:
         Raises
         ------
         InputError
-            If it is not XML, or XML that a stranger wrote to do harm.
+            If the member is not XML, or is XML of a form that attacks its reader.
         """
         text = self.read(member)
         check_xml(self.path, member, text)
         return ElementTree.fromstring(text)
 
     def unpack(self, member: str, folder: Path) -> Path:
-        """Copy a member into a folder, under its own path there; what is there already stays."""
+        """Copy a member into the cache, under its own path in a folder there; an intact copy stays.
+
+        Raises
+        ------
+        CacheError
+            If it cannot be written there.
+        """
         target = folder / member
-        if not target.exists():
-            target.parent.mkdir(parents=True, exist_ok=True)
-            partial = target.with_name(f"{target.name}.{uuid.uuid4().hex}.part")
-            partial.write_bytes(self.read(member))
-            partial.replace(target)
-        return target
+        return target if intact(target) else keep(target, self.read(member))

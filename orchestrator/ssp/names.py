@@ -1,4 +1,4 @@
-"""Names that SSP prescribes, and those that are ours."""
+"""Names that SSP prescribes, and names of our own annotations."""
 
 import re
 from collections.abc import Collection
@@ -13,7 +13,7 @@ PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 PARAMETER_MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
 STUDY_TYPE = f"{REVERSE_DOMAIN}.study"
-"""Type of the annotation with what SSP cannot say."""
+"""Type of our annotation, which holds the parts of a scenario that SSP cannot express."""
 
 OSP_TYPE = "com.opensimulationplatform"
 """Type of libcosim's annotation, which carries the communication step."""
@@ -43,6 +43,6 @@ def children(element: Element, path: str) -> list[Element]:
 
 
 def plain_name(name: str, taken: Collection[str] = ()) -> str:
-    """A name of letters, digits, ``_`` and ``-`` that is not taken yet; SSP allows any text."""
+    """A name of letters, digits, ``_`` and ``-`` that is not taken yet; SSP itself allows any text."""
     plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "unnamed"
     return next(n for n in (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3))) if n not in taken)

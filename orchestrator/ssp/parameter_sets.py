@@ -14,7 +14,7 @@ SET_NAME = "initialValues"
 
 @dataclass(frozen=True, slots=True)
 class SspValue:
-    """A value as a parameter set has it; ``unit`` is empty where none is given."""
+    """A value of a parameter set; ``unit`` is empty if the set gives no unit."""
 
     value: float | bool | str
     unit: str = ""
@@ -47,18 +47,18 @@ def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
 
 
 def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> None:
-    """Define the units that a file uses; nothing where it uses none.
+    """Define the units that a file uses; a file without units gets no definitions.
 
     Parameters
     ----------
     parent
         Takes the group of units as its last element.
     name
-        Of that group, with its namespace.
+        Name of the group of units, with its namespace.
     used
         Units, each once.
     known
-        Attributes of ``BaseUnit`` by unit; a unit that is missing gets none.
+        Attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes.
     """
     units = [(unit, known.get(unit, {})) for unit in used]
     if units:
@@ -73,7 +73,7 @@ def read_parameter_set(root: Element) -> dict[str, SspValue]:
     Raises
     ------
     InputError
-        If it is no parameter set, or a value cannot be read.
+        If the text is not a parameter set, or a value cannot be read.
     """
     if root.tag != tag("ssv:ParameterSet"):
         raise InputError(f"{root.tag!r} is not a parameter set of SSP 1.0")

@@ -16,14 +16,14 @@ from orchestrator.ssp.study import SspStudy, foreign_step, read_study
 
 @dataclass(frozen=True)
 class SspCase:
-    """What an SSP comes to.
+    """The contents of an SSP as tables of a case file.
 
     Attributes
     ----------
     tables
-        Contents of a case file, without any that need another program.
+        Contents of a case file, without keys that would need another program.
     folder
-        Where its FMUs are unpacked; paths in the tables are relative to it.
+        Folder into which the FMUs are unpacked; paths in the tables are relative to it.
     digest
         SHA-256 of the archive.
     """
@@ -39,14 +39,14 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
     Parameters
     ----------
     cache
-        Folder for what is unpacked; each archive has one of its own in there.
+        Folder for unpacked files; each archive gets its own folder inside it.
 
     Raises
     ------
     InputError
-        If the file is no SSP 1.0.
+        If the file is not an SSP 1.0.
     CaseError
-        With everything in it that is not supported.
+        With every part of the archive that is not supported.
     """
     archive = SspArchive(path)
     description = archive.xml(SYSTEM_FILE)
@@ -101,7 +101,9 @@ def _times(description: Element) -> dict[str, float]:
 
 
 def _component_names(structure: Structure) -> dict[Owner, str]:
-    """A name for every component that a case file can have; those of nested ones begin with their system's."""
+    """A name for every component that is valid in a case file; the name of a nested component begins with its system's
+    name.
+    """
     names: dict[Owner, str] = {}
     for owner in structure.sources:
         names[owner] = plain_name("_".join(owner), names.values())
@@ -109,7 +111,9 @@ def _component_names(structure: Structure) -> dict[Owner, str]:
 
 
 def _description(fmu: Path) -> FmuDescription | None:
-    """None for an FMU that cannot be used: the case tells why, with all its other problems."""
+    """The FMU's description; None if it cannot be used. The preparation of the case then reports the reason with all
+    other problems.
+    """
     try:
         return read_description(fmu)
     except InputError:
@@ -117,10 +121,10 @@ def _description(fmu: Path) -> FmuDescription | None:
 
 
 def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> dict[str, Any]:
-    """Values of a component, as SSP means them.
+    """Values of a component by the rules of SSP.
 
-    Names that the FMU does not have are passed over; an input that nothing feeds stays at its start; a start value
-    of one that is fed gives way to what feeds it.
+    Names that the FMU does not have are ignored. An input without connection keeps its start value. The start value of
+    a connected input is left out.
     """
     given = structure.values[owner]
     if fmu is None:
@@ -139,7 +143,7 @@ def _converted(value: SspValue, unit: str) -> float | bool | str:
 
 
 def _add_study(tables: dict[str, Any], study: SspStudy) -> None:
-    """What our annotation says; its tables join those of SSP."""
+    """Add the tables of our annotation to those that SSP itself gives."""
     for name, content in study.tables.items():
         tables[name] = tables.get(name, {}) | content if isinstance(content, dict) else content
     tables["solver"] |= {

@@ -30,11 +30,11 @@ class Structure:
     Attributes
     ----------
     sources
-        Member of the archive that each component is, by its path.
+        Member of the archive for each component, by the component's path.
     connections
         Pairs of an output and the input that it feeds.
     values
-        Of every component, by variable.
+        Values of every component, by variable.
     """
 
     sources: dict[Owner, str] = field(default_factory=dict)
@@ -48,7 +48,7 @@ def read_structure(archive: SspArchive, description: Element, note: Callable[[st
     Parameters
     ----------
     note
-        Takes the place and the text of what cannot be used.
+        Called with the place and the text of each problem.
     """
     systems = children(description, "ssd:System")
     if len(systems) != 1:
@@ -58,7 +58,7 @@ def read_structure(archive: SspArchive, description: Element, note: Callable[[st
 
 
 class _Reader:
-    """Walks through nested systems and collects what is in them."""
+    """Walks through nested systems and collects their components, connections and values."""
 
     def __init__(self, archive: SspArchive, note: Callable[[str, str], None]) -> None:
         self._archive, self._note = archive, note
@@ -106,7 +106,9 @@ class _Reader:
             self._kinds[owner, connector.get("name", "")] = connector.get("kind", "")
 
     def _source(self, component: Element, owner: Owner) -> str:
-        """The component's member; empty, and noted, where it is no FMU of the archive."""
+        """The component's member of the archive. If this is not an FMU, the problem is noted and the result is
+        empty.
+        """
         kind, implementation = component.get("type", FMU_TYPE), component.get("implementation", "any")
         if kind != FMU_TYPE:
             self._refuse(owner, f"it is of type {kind!r}; only FMUs ({FMU_TYPE}) and systems written out are supported")
@@ -141,12 +143,16 @@ class _Reader:
 
     @staticmethod
     def _end(connection: Element, end: str, owner: Owner) -> Node:
-        """An end's connector: of an element, or where none is named of the system itself."""
+        """The connector at an end of a connection: of the named element, or of the system itself if no element is
+        named.
+        """
         element = connection.get(f"{end}Element")
         return (*owner, element) if element else owner, connection.get(f"{end}Connector", "")
 
     def _sends(self, node: Node, system: Owner) -> bool:
-        """Whether data flow from a connector into a connection of that system; the kinds say so, not start and end."""
+        """Whether data flow from a connector into a connection of the system. The kind of the connector decides,
+        because SSP allows start and end in either order.
+        """
         return self._kinds.get(node) in (_SENDING_INSIDE if node[0] == system else _SENDING_OUTSIDE)
 
     def _connect(self, sink: Node) -> None:
@@ -193,7 +199,7 @@ class _Reader:
             raise InputError(f"only the type {expected}, with sources relative to the archive, is supported")
 
     def _content(self, element: Element, inline: str, name: str) -> Element:
-        """What an element refers to by its source, or holds itself."""
+        """The content that an element refers to by its source, or holds itself."""
         source = element.get("source")
         if source:
             return self._archive.xml(self._archive.member(source))
@@ -203,7 +209,9 @@ class _Reader:
         return found
 
     def _find(self, owner: Owner, name: str) -> Node | None:
-        """What a hierarchical name means, seen from a component or system; None for nothing, which SSP lets pass."""
+        """The node that a hierarchical name means, seen from a component or system; None if there is no such node,
+        which SSP allows.
+        """
         if owner in self._structure.sources or (owner, name) in self._kinds:
             return owner, name
         inner = [e for e in self._elements.get(owner, []) if name.startswith(f"{e}.")]

@@ -1,4 +1,4 @@
-"""What a run needs beside SSP's own contents: step, schedule, events, and what is looked for.
+"""The parts of a scenario that SSP itself cannot hold: step, schedule, events, analysis and plots.
 
 It travels as an annotation, which other tools ignore. The step is written in libcosim's form as well.
 """
@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import tomli_w
 
-from orchestrator.coupling.events import Event
+from orchestrator.coupling.events import Event, faults_among
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import OSP_TYPE, STUDY_TYPE, children, tag
@@ -28,9 +28,9 @@ class SspStudy:
     step_size
         Communication step [s].
     groups
-        Of the schedule.
+        Groups of components of the schedule, in the order of stepping.
     settings
-        What the events set, in order: time [s], component, variable, value.
+        The changes by events, in order: time [s], component, variable, value.
     tables
         Tables of the case file that only this project knows, such as ``analysis`` and ``plots``.
     """
@@ -47,21 +47,28 @@ class SspStudy:
 def study_of(
     scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
 ) -> SspStudy:
-    """The study of a scenario; its events come down to the variables that they set.
+    """The study of a scenario. Each event is written as the variables that it sets.
 
     Parameters
     ----------
     scenario, title
-        Its name, and its name for people.
+        Name of the scenario, and its title for people.
     step_size
         Communication step [s].
     schedule
         The order in which the components are stepped.
     events
-        Their order is kept.
+        Events of the scenario, whose order is kept.
     tables
         Tables of the case file that only this project knows.
+
+    Raises
+    ------
+    InputError
+        If an event is a fault, which is no value of a variable.
     """
+    if faults := faults_among(events):
+        raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")
     settings = tuple(
         (event.time, component, variable, value)
         for event in events
@@ -72,7 +79,7 @@ def study_of(
 
 
 def write_study(annotations: Element, study: SspStudy) -> None:
-    """Our annotation."""
+    """Write our annotation."""
     annotation = SubElement(annotations, tag("ssc:Annotation"), type=STUDY_TYPE)
     root = SubElement(annotation, tag("gfor:Study"), scenario=study.scenario, title=study.title)
     SubElement(root, tag("gfor:CommunicationStep"), seconds=repr(study.step_size))
@@ -96,12 +103,12 @@ def write_osp_step(annotations: Element, step_size: float) -> None:
 
 
 def read_study(description: Element) -> SspStudy | None:
-    """Our annotation of a system structure description, if it has one.
+    """Read our annotation from a system structure description; None if it has no such annotation.
 
     Raises
     ------
     InputError
-        If it is not as `write_study` writes it.
+        If the annotation has another form than `write_study` gives it.
     """
     for annotation in children(description, "ssd:Annotations/ssc:Annotation"):
         if annotation.get("type") == STUDY_TYPE:
@@ -140,7 +147,7 @@ def _value(text: str) -> float | bool:
 
 
 def foreign_step(description: Element) -> float | None:
-    """The communication step [s] that libcosim's or OMSimulator's annotations give, if there are any."""
+    """The communication step [s] from the annotation of libcosim or OMSimulator; None without such an annotation."""
     for annotation in description.iter(tag("ssc:Annotation")):
         if annotation.get("type") in (OSP_TYPE, _OMS_TYPE):
             for element in annotation.iter():

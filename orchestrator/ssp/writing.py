@@ -6,31 +6,38 @@ from pathlib import Path
 from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.system import ComponentPlan, System
+from orchestrator.errors import InputError
 from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SYSTEM_FILE, plain_name, tag
 from orchestrator.ssp.parameter_sets import write_parameter_set, write_units
 from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 
 
 def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
-    """What the archive holds, by path: the structure, the components' values and their FMUs.
+    """Members of the archive by path: the structure, the components' values and their FMUs.
 
     Parameters
     ----------
     name, title
-        Of the system, as tools show them.
+        Name and title of the system, as tools show them.
     system
-        With all values that its components start from.
+        The system, with all values that its components start from.
     stop_time
-        Of the default experiment [s].
+        Stop time of the default experiment [s].
     study
-        What SSP cannot express.
+        The parts of the scenario that SSP cannot express.
 
     Raises
     ------
     InputError
-        If a value is of a type that cannot be written.
+        If a value is of a type that cannot be written, or a connection does more than carry its value.
     """
+    if disturbed := described(system.wires):
+        raise InputError(
+            f"an SSP cannot hold what a connection does to its value ({disturbed[0]}); remove the imperfections from "
+            "the case to export it"
+        )
     tool = f"gfor-cosim {version('gfor-cosim')}"
     fmus = _file_names(system)
     sets, files = {}, dict[str, str]()
@@ -45,7 +52,7 @@ def ssp_members(name: str, title: str, system: System, stop_time: float, study: 
 
 
 def _file_names(system: System) -> dict[Path, str]:
-    """FMU → its member; each FMU is packed once."""
+    """Name of the member for each FMU; each FMU is packed once."""
     members: dict[Path, str] = {}
     for plan in system.components.values():
         path = plan.description.path

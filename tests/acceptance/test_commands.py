@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import pytest
 import xarray as xr
 
+from orchestrator import load
 from orchestrator.acceptance.checks.all import CHECKS, MODULES, ORDER
 from orchestrator.acceptance.checks.base import CHECKS as ENTERED
 from orchestrator.acceptance.checks.subject import OperatingAt
@@ -16,6 +17,8 @@ from orchestrator.cases import infinite_bus, two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
 from orchestrator.cli.check import _in_one_line
+from orchestrator.errors import CaseError
+from orchestrator.fmi.protection import NAMES
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.sweep import plan_sweep
 from tests.acceptance.gallery.build import build
@@ -100,7 +103,7 @@ def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path
     ("arguments", "words"),
     [
         (("none.fmu",), "there is no such file"),
-        (("FMU", "--only", "nothing"), "there is no check 'nothing'; there are: fmi_validity"),
+        (("FMU", "--only", "nothing"), "there is no check 'nothing'; there are: archive, binding, fmi_validity"),
         (("FMU", "--binding", "none.toml"), "`gfor bind FILE.fmu` drafts one"),
         (("FMU", "--time-limit", "-1"), "must be a number above 0"),
     ],
@@ -263,3 +266,38 @@ def test_a_binding_without_an_fmu(gfor, case, tmp_path):
     code, _, error = gfor("modes", path)
     assert code == 2
     assert "'binding' is for an FMU of others" in error
+
+
+def test_a_file_alone_brings_no_foreign_code_into_this_process(gfor, gallery, case):
+    path = case(gallery("converter")[0], extra="isolated = false\n")
+    code, _, error = gfor("run", path, "--stop", "0.001")
+    assert code == 2
+    assert "components.gfor.isolated: this file wants" in error
+    assert "whatever you can; if you trust the FMU, say so by --trust-fmus" in error
+    with pytest.raises(CaseError, match="trust_fmus=True"):
+        load(path).scenario("vendor").prepared  # noqa: B018
+
+
+def test_the_user_may_trust_it(gfor, gallery, case, tmp_path):
+    path = case(gallery("converter")[0], extra="isolated = false\n")
+    assert load(path, trust_fmus=True).scenario("vendor").prepared.system.components["gfor"].isolated is False
+    found = []
+    for name, word in (("trusted", ["--trust-fmus"]), ("isolated", [])):
+        if not word:
+            path = case(gallery("converter")[0])
+        code, _, error = gfor("run", path, "--stop", "0.001", "--out", tmp_path / name, *word)
+        assert code == 0, error
+        (scenario,) = json.loads((tmp_path / name / "summary.json").read_text())["scenarios"]
+        found.append(scenario["isolated"])
+        said = "component 'gfor' runs in gfor's own process, because the case and --trust-fmus say so"
+        assert (said in scenario["warnings"], said in " ".join(error.split())) == (bool(word), bool(word))
+    assert found[0] == {}
+    assert [p["name"] for p in found[1]["gfor"]] == list(NAMES)
+    gfor("report", tmp_path / "trusted")
+    assert "own process, because the case and --trust-fmus say so" in (tmp_path / "trusted" / "report.html").read_text(
+        encoding="utf-8"
+    )
+    gfor("report", tmp_path / "isolated")
+    assert "gfor ran in a process of its own, with: the FMU&#x27;s processes end" in (
+        tmp_path / "isolated" / "report.html"
+    ).read_text(encoding="utf-8")

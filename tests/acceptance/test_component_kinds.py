@@ -17,20 +17,10 @@ from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.loaded import LoadedComponent
+from tests.support.bindings import GFOR_RATED
 
 KINDS = [LoadedComponent, IsolatedComponent, BoundComponent, HostedComponent]
 START = {"P_0": 0.6, "Q_0": 0.15, "v_0": 1.02, "theta_0": 0.3}
-BINDING = """
-rating = { S_n = "1500 MVA" }
-voltage = { form = "rectangular", variables = ["v_re", "v_im"] }
-current = { form = "rectangular", variables = ["i_re", "i_im"], base = "100 MVA" }
-[start]
-S_n = { variable = "S_n" }
-P_0 = { variable = "P_0" }
-Q_0 = { variable = "Q_0" }
-v_0 = { variable = "v_0" }
-theta_0 = { variable = "theta_0" }
-"""
 
 
 @pytest.fixture(params=KINDS, ids=lambda kind: kind.__name__)
@@ -46,7 +36,7 @@ def component(request, fmu_path, tmp_path):
             opened = stack.enter_context(HostedComponent("box", process))
         else:
             if request.param is BoundComponent:
-                (tmp_path / "binding.toml").write_text(BINDING, encoding="utf-8")
+                (tmp_path / "binding.toml").write_text(GFOR_RATED, encoding="utf-8")
                 description = bind(description, tmp_path / "binding.toml")
             isolated = request.param is IsolatedComponent
             opened = stack.enter_context(open_component("box", description, isolated=isolated))

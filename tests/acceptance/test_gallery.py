@@ -11,9 +11,11 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
+from tests.acceptance.gallery.build import check_macros
 from tests.acceptance.gallery.hostile import HOSTILE
-from tests.acceptance.gallery.members import faulty, good
+from tests.acceptance.gallery.members import converter, faulty, good
 
+ROOT = Path(__file__).parents[2]
 TABLE = Path(__file__).parent / "gallery" / "README.md"
 OURS = ("gfor", "synchronous_generator_st1", "synchronous_generator_st4b", "two_area_grid")
 LIMITS = Limits(seconds=6.0)
@@ -36,6 +38,8 @@ def checked(path, binding=None, only=()):
         ("crash", "runs"),
         ("undeclared_feedthrough_lag", "feedthrough"),
         ("reset_parameter", "reset"),
+        ("outputs_at_exit", "initial_outputs"),
+        ("outputs_at_entry", "initial_outputs"),
     ],
 )
 def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, gallery):
@@ -92,6 +96,31 @@ def test_an_fmu_does_not_reach_its_verdict(name, gallery):
 def test_forged_results_do_not_hide_what_is_wrong(gallery):
     found = check_fmu(*gallery("forged_results"), LIMITS, ("runs", "repeatability"), run_for=0.3)
     assert found.faults == ["not a number"]
+
+
+def test_every_macro_of_a_member_is_read_by_its_c_file():
+    for member in (*good(), *faulty()):
+        check_macros(member.source)
+
+
+def test_a_macro_that_nothing_reads_is_refused():
+    with pytest.raises(ValueError, match="reads the macro FAULT_ABSOLUTE_ANGLE; plant it"):
+        check_macros(converter("absolute", FAULT_ABSOLUTE_ANGLE=1))
+
+
+def test_pages_and_table_count_the_galleries_members():
+    """The README, the validation pages, and the gallery's own table."""
+    whole = len(good()) + 2 * len(OURS)
+    faults = len(faulty()) + len(HOSTILE)
+    named = {m.name for m in (*good(), *faulty())} | set(HOSTILE)
+    rows = [line.split("|")[1].strip() for line in TABLE.read_text(encoding="utf-8").splitlines() if "| yes |" in line]
+    assert {row for row in rows if "(" not in row} == named
+    assert len(rows) == whole + faults
+    pages = {"README.md": "{} FMUs", ".docs/validation/index.md": "{} FMUs",
+             ".docs/validation/foreign-fmus.md": "has {} FMUs: {} good ones"}  # fmt: skip
+    for page, words in pages.items():
+        assert words.format(whole + faults, whole) in (ROOT / page).read_text(encoding="utf-8"), page
+    assert f"{faults} faulty ones" in (ROOT / ".docs/validation/foreign-fmus.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -8,7 +8,10 @@ import pytest
 
 import orchestrator
 
-MODULES = ("acceptance", "case", "comparison", "design", "fmu", "linear", "models", "results", "scenario", "sweep")
+MODULES = (
+    *("acceptance", "case", "comparison", "design", "fmu", "identification", "linear", "models", "results"),
+    *("scenario", "sweep"),
+)
 
 
 def examples():

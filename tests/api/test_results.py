@@ -1,6 +1,8 @@
 """The Python face gives what the command line prints, as tables, datasets, pictures and HTML."""
 
+import copy
 import json
+import pickle
 
 import matplotlib as mpl
 import numpy as np
@@ -11,7 +13,8 @@ import orchestrator as face
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import RunEndedWarning, UnusualDataWarning
 from orchestrator.coupling.master import Master
-from orchestrator.errors import AnalysisError, CaseError, InputError
+from orchestrator.coupling.run_state import NOT_KEPT
+from orchestrator.errors import AnalysisError, CaseError, InputError, ResultsError
 
 mpl.use("Agg")
 
@@ -92,9 +95,32 @@ def test_a_sweep_is_that_of_the_command(gfor, tmp_path, two_area):
     assert sweep.dataset.sizes["grid.X_L"] == 2
     as_text = two_area.sweep(["grid.X_L=0.1:0.2:2"], ["gfor"], folder=tmp_path)
     assert as_text.table().equals(sweep.table())
+    written = sweep.save(tmp_path / "saved")
+    there = {path.name for path in tmp_path.iterdir() if path.is_file()}
+    assert {path.name for path in written} == there - {"manifest.json"}
+    with pytest.raises(InputError, match="results cannot be written there"):
+        sweep.save(written[1])
+    assert written[1].read_bytes() == (tmp_path / "sweep.csv").read_bytes()
     assert sweep.failures().empty
     assert isinstance(sweep.plot(), Axes)
     assert "stable at all points" in sweep._repr_html_()
+
+
+def test_a_comparison_and_its_modes_are_those_of_the_commands(gfor, tmp_path, run):
+    code, _, _ = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", 1.2, "--out", tmp_path)
+    assert code == 0
+    folder = tmp_path / "dip"
+    code, out, _ = gfor("compare", folder, folder, "--signal", "gfor.omega", "--start", 0.2, "--json")
+    compared = face.compare(folder, folder, ["gfor.omega"], start=0.2)
+    assert (code, json.loads(out)) == (0, json.loads(json.dumps(compared.as_json())))
+    code, out, err = gfor("identify", folder, "gfor.omega", "--start", 0.2, "--json")
+    modes = face.identify(run, "gfor.omega", start=0.2)
+    assert (code, json.loads(out)) == (0, modes.as_json())
+    assert err.splitlines() == modes.remarks
+    assert len(modes) == len(modes.table()) > 0
+    assert all(mode in modes.as_json() for mode in compared.as_json()[0]["modes"])
+    assert (modes.start, modes.stop) == (0.2, pytest.approx(1.2))
+    assert "show nothing above" in modes._repr_html_()
 
 
 @pytest.mark.slow
@@ -107,10 +133,53 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     assert printed.pop("parameter_file") == str(file)
     assert printed == json.loads(json.dumps(design.as_json()))
     saved = design.save(tmp_path / "saved.toml")
+    beside = json.loads(saved.with_suffix(".json").read_text(encoding="utf-8"))
+    with pytest.raises(ResultsError, match="cannot be written"):
+        design.save(file / "below_a_file.toml")
+    assert beside == json.loads(json.dumps(design.as_json(saved)))
     by_file = two_area.scenario("gfor", parameters=[saved])
     assert by_file.values == two_area.scenario("gfor", design.parameters).values
     assert "requirement met" in design._repr_html_()
     assert design.table().loc["with it", "damping_percent"] > 20
+
+
+@pytest.mark.parametrize("again", [lambda result: pickle.loads(pickle.dumps(result)), copy.deepcopy])
+def test_results_can_be_pickled_and_copied(modes, run, again):
+    same = again(modes)
+    assert same.table().equals(modes.table())
+    assert same.stability == modes.stability
+    old, new = modes.result.model, again(same).result.model
+    assert np.array_equal(new.A, old.A)
+    assert np.array_equal(new.apply(np.ones(len(new.names))), old.apply(np.ones(len(old.names))))
+    back = again(run)
+    assert back.dataset.equals(run.dataset)
+    assert back.modes.table().equals(run.modes.table())
+    assert back.linear.equals(run.linear)
+
+
+def test_another_stop_keeps_step_parameter_files_and_values(tmp_path):
+    file = tmp_path / "values.toml"
+    file.write_text('[set]\n"gfor.P_0" = 0.45\n', encoding="utf-8")
+    scenario = face.load("infinite_bus").scenario("dip", {"gfor.v_0": 1.01}, step="50 us", parameters=file)
+    ready = scenario.run(stop=0.02).result.modes.prepared
+    assert (ready.stop_time, ready.step_size) == (0.02, 5e-5)
+    assert (ready.values["gfor.P_0"], ready.values["gfor.v_0"]) == (0.45, 1.01)
+
+
+def test_a_design_is_made_with_the_step_files_and_values_that_are_given(two_area, tmp_path, monkeypatch):
+    file = tmp_path / "values.toml"
+    file.write_text('[set]\n"grid.X_L" = 0.15\n', encoding="utf-8")
+
+    class PreparedError(Exception):
+        pass
+
+    def prepared(case, request, *_):
+        raise PreparedError(request.step_size, [one.values for one in request.parameters], dict(request.overrides))
+
+    monkeypatch.setattr("orchestrator.api.design.design_pod", prepared)
+    with pytest.raises(PreparedError) as seen:
+        two_area.design("pod_p", values={"gfor.P_0": 0.4}, step="50 us", parameters=file)
+    assert seen.value.args == (5e-5, [{"grid.X_L": 0.15}], {"gfor.P_0": 0.4})
 
 
 # -- values and mistakes ---------------------------------------------------------------------------
@@ -136,6 +205,17 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").scenario("dip").modes(critical=20), "damping ratio between 0 and 1"),
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 0.2), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
+        (lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0), "workers = 0; it must be"),
+        (
+            lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=2, scheduler="tcp://host:1"),
+            "workers and scheduler exclude each other",
+        ),
+        (lambda: face.check("a.fmu", component="gfor"), "component = 'gfor' names a component of a case; give case"),
+        (lambda: face.check("a.fmu", scenario="dip"), "scenario = 'dip' names a scenario of a case; give case"),
+        (lambda: face.check("a.fmu", time_limit=0), "time_limit = 0; it must be a time above 0"),
+        (lambda: face.check("a.fmu", memory_limit=-1), "memory_limit = -1; it must be above 0 MB"),
+        (lambda: face.identify("a", "grid.v"), "there is no trajectory.nc"),
+        (lambda: face.info("a.fmu"), "a.fmu"),
         (lambda: face.load("infinite_bus").sweep("grid.X"), "not of the form component.parameter"),
         (lambda: face.load("two_area").design("pod_x"), "there are: pod_p, pod_q"),
         (lambda: face.load("two_area").design("pod_p", dampning=0.2), "dampning"),
@@ -164,6 +244,7 @@ def test_data_that_are_most_unusual_are_questioned_where_the_caller_stands():
     for prepare in (
         lambda: case.scenario("dip", {"gfor.pod_p.K": 5e4}),
         lambda: case.choose([], {"gfor.pod_p.K": 5e4}),
+        lambda: case.sweep({"gfor.P_0": [0.5]}, ["dip"], {"gfor.pod_p.K": 5e4}),
     ):
         with pytest.warns(UnusualDataWarning, match=r"gfor.pod_p.K") as caught:
             prepare()
@@ -174,8 +255,8 @@ def test_data_that_are_most_unusual_are_questioned_where_the_caller_stands():
 def test_a_run_that_ends_early_warns_and_keeps_what_it_has(monkeypatch):
     whole = Master.run
 
-    def broken(self, stop_time, events=(), observers=()):
-        whole(self, 0.5, events, observers)
+    def broken(self, stop_time, events=(), observers=(), keeper=NOT_KEPT):
+        whole(self, 0.5, events, observers, keeper)
         raise AnalysisError("made to fail")
 
     scenario = face.load("infinite_bus").scenario("load_step")
@@ -258,9 +339,20 @@ def test_an_fmu_is_set_stepped_and_read(fmu_path):
         for mistake in (lambda: fmu.get("w"), lambda: fmu.set({"w": 1}), lambda: fmu.set({"f_n": "3 MW"})):
             with pytest.raises(InputError, match="infinite_bus"):
                 mistake()
-        with pytest.raises(InputError, match="above 0 s"):
+        with pytest.raises(InputError, match="a time above 0"):
             fmu.step(0)
         assert "infinite_bus" in fmu._repr_html_()
+
+
+def test_an_fmu_that_was_closed_says_so(fmu_path):
+    fmu = face.open_fmu(fmu_path("infinite_bus"))
+    fmu.close()
+    fmu.close()
+    for call in (lambda: fmu.step(1e-4), lambda: fmu.get("v"), fmu.values, lambda: fmu.set({"dip.depth": 0.2})):
+        with pytest.raises(InputError, match="infinite_bus: this FMU was closed; open it again"):
+            call()
+    with pytest.raises(InputError, match="closed"), fmu:
+        pass
 
 
 def test_an_fmu_is_checked(fmu_path):
@@ -269,3 +361,24 @@ def test_an_fmu_is_checked(fmu_path):
     assert not report.faults
     assert report.as_json()["trusted"]
     assert "no check failed" in report._repr_html_()
+
+
+def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
+    fmu, options = fmu_path("infinite_bus"), {"case": "infinite_bus", "component": "grid", "scenario": "load_step"}
+    report = face.check(fmu, only=["runs"], time_limit="20 s", memory_limit=2000, step="200 us", **options)
+    assert "component 'grid' in scenario 'load_step'" in report.as_json()["used_as"]
+    assert "steps of 0.0002 s" in report.table().loc["runs", "evidence"]
+    words = [word for name, value in options.items() for word in (f"--{name}", value)]
+    code, out, _ = gfor("check", fmu, *words, "--only", "runs", "--step", 2e-4, "--json")
+    assert code == 0
+    assert json.loads(out)["used_as"] == report.as_json()["used_as"]
+    assert report.save_junit(tmp_path / "junit.xml").read_text(encoding="utf-8").count("<testcase") == 2
+
+
+def test_an_fmu_shows_what_it_declares(fmu_path, gfor):
+    found = face.info(fmu_path("infinite_bus"))
+    code, out, _ = gfor("info", fmu_path("infinite_bus"))
+    assert code == 0
+    assert all(name in out for name in found.table().index if not name.startswith("der("))
+    assert found.linear_model is None
+    assert found.description.model_name in found._repr_html_()

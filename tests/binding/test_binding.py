@@ -11,28 +11,13 @@ from orchestrator.errors import BindingError, InputError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
+from tests.support.bindings import GFOR_RATED
 
 H = 1e-4
 START = {"P_0": 0.6, "Q_0": 0.15, "v_0": 1.02, "theta_0": 0.3}
 
-OURS = """
-[rating]
-S_n = "1500 MVA"
-[voltage]
-form = "rectangular"
-variables = ["v_re", "v_im"]
-[current]
-form = "rectangular"
-variables = ["i_re", "i_im"]
-base = "100 MVA"
-[start]
-S_n = { variable = "S_n" }
-P_0 = { variable = "P_0" }
-Q_0 = { variable = "Q_0" }
-v_0 = { variable = "v_0" }
-theta_0 = { variable = "theta_0" }
-[signals]
-omega = { variable = "omega" }
+OURS = f"""{GFOR_RATED}[signals]
+omega = {{ variable = "omega" }}
 """
 
 
@@ -100,9 +85,7 @@ def test_another_rating_is_that_many_units_in_parallel(gallery):
 
 
 def test_a_frame_that_is_turned_and_a_current_into_the_converter(gallery, binding):
-    turned = OURS.replace('[start]\nS_n = { variable = "S_n" }', "[start]").replace(
-        "[signals]\nomega", "[signals]\nomega"
-    )
+    turned = OURS.replace('S_n = { variable = "S_n" }\n', "")
     for table in ("voltage", "current"):
         turned = turned.replace(f"[{table}]", f'[{table}]\nframe_angle = "-40 deg"')
     turned = turned.replace('base = "100 MVA"', 'base = "100 MVA"\ndirection = "into the converter"')
@@ -239,7 +222,7 @@ def test_a_switch_has_a_name_of_ours(binding, fmu_path):
     """A Boolean parameter is shown under our name, and takes what is set there."""
     found = bound_fmu(fmu_path("gfor"), binding(OURS + SWITCH))
     info = found.variables["pod_p.enabled"]
-    assert (info.type, info.causality, found.natives["pod_p.enabled"]) == ("Boolean", "parameter", "pod_q.enabled")
+    assert (info.type, info.causality, found.inner_names["pod_p.enabled"]) == ("Boolean", "parameter", "pod_q.enabled")
     with open_component("box", found, isolated=False) as component:
         for value in (True, False):
             component.set({"pod_p.enabled": value})

@@ -68,6 +68,47 @@ def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
     assert word in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("command", [["compare", "{0}", "{1}"], ["identify", "{0}", "a.omega"]])
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        ("nan", "argument --start: 'nan' must be 0 or above and finite"),
+        ("-5", "argument --start: '-5' must be 0 or above and finite"),
+        ("true", "argument --start: 'true' is not a time"),
+        ("2 kV", "argument --start: '2 kV' is in kV, but s is needed"),
+        ("99", "ends at t = 14.99 s; give an earlier start"),
+    ],
+)
+def test_a_start_that_leaves_nothing_is_refused(runs, gfor, command, start, words):
+    code, out, err = gfor(*[word.format(*runs) for word in command], "--start", start)
+    assert (code, out) == (2, "")
+    assert words in err
+
+
+def test_a_start_may_have_a_unit_and_be_the_beginning(runs, gfor):
+    for start, same in (("1200 ms", "1.2"), ("0 s", "0")):
+        printed = [gfor("identify", runs[0], "a.omega", "--start", text, "--json")[1] for text in (start, same)]
+        assert printed[0] == printed[1]
+        assert json.loads(printed[0])
+
+
+def test_the_heading_names_the_part_of_the_record_that_was_used(runs, gfor):
+    _, out, _ = gfor("identify", runs[0], "a.omega", "--start", "1.005", "--stop", "99")
+    assert "a.omega from 1.01 to 14.99 s" in out
+    code, _, err = gfor("identify", runs[0], "a.omega", "--start", "3", "--stop", "2")
+    assert (code, "stop = 2.0: it must come after start = 3.0" in err) == (2, True)
+
+
+def test_other_intervals_and_short_runs_are_said(runs, gfor, tmp_path):
+    _, out, _ = gfor("compare", *runs)
+    assert "they are compared at the 750 times that both have" in out.replace("\n", " ")
+    short = save(tmp_path / "short", -0.3 + 4j, times=np.arange(0, 1.5, 0.01))
+    code, out, err = gfor("compare", runs[0], short, "--json")
+    assert code == 0
+    assert [c["modes"][1] for c in json.loads(out)] == [None, None]
+    assert "short ends at t = 1.49 s: its oscillations, which are read from t = 2 s on, are not shown" in err
+
+
 @pytest.mark.parametrize(("interval", "near"), [(0.01, False), (1.0, True)])
 def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, near):
     """0.5733 Hz, recorded every second, appears at 0.4267 Hz."""

@@ -4,6 +4,7 @@ from orchestrator.acceptance.checks import (
     base,
     extremes,
     file,
+    initialisation,
     instances,
     loading,
     port,
@@ -17,14 +18,15 @@ from orchestrator.acceptance.checks import (
 )
 
 MODULES = (
-    *(file, loading, running, instances, state, sampling, timing),
+    *(file, loading, running, initialisation, instances, state, sampling, timing),
     *(port, signs, ride_through, extremes, resources),
 )
 """Importing them enters their checks."""
 
 ORDER = (
     "fmi_validity", "units", "declared_starts", "declared_dependencies", "loads",
-    "runs", "start_values", "call_order", "independence", "repeatability", "reading", "reset", "reinstantiation",
+    "runs", "start_values", "initial_outputs", "call_order", "independence", "repeatability", "reading",
+    "reset", "reinstantiation",
     "state", "settable_states", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
     "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip

@@ -26,6 +26,7 @@ class Whose(StrEnum):
 
     NOBODY = ""
     FMU = "the FMU"
+    BINDING = "the binding"
     HERE = "not supported here"
     CALL = "provoked by a forbidden call"
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.running import EQUAL, affordable
-from orchestrator.acceptance.checks.subject import Subject, difference
+from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 

@@ -7,7 +7,7 @@ REMEDIES = {
     "zip bomb": "do not trust this file; ask for the FMU to be packed again by its exporter",
     "entity expansion": "do not trust this file; ask for a model description without a document type",
     "unreadable": "ask for the file again, exported as an FMI 2.0 co-simulation FMU for this platform",
-    "binding does not fit": "mend the binding; `gfor bind` drafts one from this file",
+    "binding does not fit": "mend these places of the binding; `gfor bind` drafts one from the FMU",
     "invalid FMI": "have the exporter corrected; `fmpy validate` lists all problems",
     "wrong units": "have the unit corrected in modelDescription.xml; what it means cannot be known otherwise",
     "bad start values": "have the start values declared as FMI 2.0 asks",
@@ -40,6 +40,8 @@ REMEDIES = {
     "no second instance": "fmi2FreeInstance must leave room for another one",
     "instances differ": "look for static variables that live longer than the instance",
     "hidden state": "all that changes must be in the saved state; until then neither linearise nor repeat steps",
+    "outputs come late": "have outputs computed in initialisation mode already, from parameters and inputs: there a "
+    "master reads them to initialise their partners, and fmi2ExitInitializationMode comes too late",
     "growing state": "the state must not keep its past; ask the author",
     "serialised state": "have fmi2SerializeFMUstate and fmi2DeSerializeFMUstate corrected, or do not declare them",
     "incomplete state": "the state must hold all continuous states; ask the author",

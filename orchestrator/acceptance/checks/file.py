@@ -8,7 +8,7 @@ from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.fmi.archive import MODEL_DESCRIPTION
 from orchestrator.fmi.description import FmuDescription, VariableInfo
-from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.port import without_binding
 from orchestrator.fmi.validation import validation_problems
 from orchestrator.units import base_exponents
 
@@ -21,12 +21,6 @@ _PORT_UNITS = {
 }
 _PLAIN = ("", "1", "-", "%", "pu", "p.u.", "p.u", "per unit", "per_unit")
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-
-
-def native(subject: Subject) -> FmuDescription:
-    """What the file itself says, without a binding."""
-    described = subject.description
-    return described.native if isinstance(described, BoundDescription) else described
 
 
 def some_of(texts: list[str], between: str = "; ") -> str:
@@ -52,7 +46,7 @@ def fmi_validity(subject: Subject) -> CheckResult:
 
 @check("units", "Are units declared, known, and what their definitions say?")
 def units(subject: Subject) -> CheckResult:
-    described = native(subject)
+    described = without_binding(subject.description)
     wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described)
     if wrong:
         return failed("units", "wrong units", some_of(wrong))
@@ -113,7 +107,7 @@ def _wrong_port_units(described: FmuDescription) -> list[str]:
 @check("declared_starts", "Does every input and parameter start, within its own bounds?")
 def declared_starts(subject: Subject) -> CheckResult:
     missing, wrong = [], []
-    for info in native(subject).variables.values():
+    for info in without_binding(subject.description).variables.values():
         if info.causality not in ("input", "parameter") or info.type == "Clock":  # a clock ticks, and starts at nothing
             continue
         if info.start is None:
@@ -137,7 +131,7 @@ def _out_of_bounds(info: VariableInfo) -> str | None:
 
 @check("declared_dependencies", "Does the file say what its outputs depend on?")
 def declared_dependencies(subject: Subject) -> CheckResult:
-    described = native(subject)
+    described = without_binding(subject.description)
     if not described.outputs:
         return not_applicable("declared_dependencies", "because the FMU has no outputs")
     silent = [name for name in described.outputs if described.output_dependencies.get(name) is None]

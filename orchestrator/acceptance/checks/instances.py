@@ -1,27 +1,17 @@
 """Whether instances of one FMU leave each other alone, and begin anew as new ones do."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.running import EQUAL, affordable
-from orchestrator.acceptance.checks.subject import (
-    OperatingAt,
-    Running,
-    Stimulus,
-    Subject,
-    difference,
-    elsewhere,
-    settings,
-    tune,
-    with_settings,
-)
+from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, with_each_setting
+from orchestrator.acceptance.checks.subject import OperatingAt, Running, Stimulus, Subject
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
-
-Setting = Mapping[str, float | bool]
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 
@@ -31,10 +21,10 @@ def independence(subject: Subject) -> CheckResult:
     """Leave an instance idle beside another one that runs; then run both, with different inputs."""
     if subject.description.one_instance:
         return not_applicable("independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess")
-    return _with_each_setting(subject, _independent)
+    return _first_fault(subject, _independent)
 
 
-def _with_each_setting(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
+def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
     """The first fault that is found with some parameters set, or else the result with the parameters as they are.
 
     Raises
@@ -43,15 +33,9 @@ def _with_each_setting(subject: Subject, look: Callable[[Subject, Setting], Chec
         With the parameters as they are; a setting with which the FMU does not work is passed over.
     """
     results = []
-    for setting in settings(subject):
-        try:
-            found = look(subject, setting)
-        except ComponentError:
-            if not setting:
-                raise
-            continue
+    for found, said in with_each_setting(subject, lambda setting: look(subject, setting)):
         if found.fault:
-            return replace(found, evidence=f"{found.evidence}{with_settings(setting)}")
+            return replace(found, evidence=f"{found.evidence}{said}")
         results.append(found)
     return results[0]
 
@@ -109,7 +93,7 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) 
 def reset(subject: Subject) -> CheckResult:
     """Also with its tunable Booleans the other way: in the life before, and in the one after."""
     try:
-        return _with_each_setting(subject, _like_new)
+        return _first_fault(subject, _like_new)
     except ComponentError as error:
         return failed("reset", "reset fails", str(error))
 

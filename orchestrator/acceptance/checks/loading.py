@@ -1,16 +1,17 @@
 """Whether an FMU's binary can be loaded here and gives an instance, and what it does with calls that FMI forbids."""
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, passed, provoked, remarked
-from orchestrator.acceptance.checks.file import native, some_of
+from orchestrator.acceptance.checks.file import some_of
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.acceptance.process import HostedComponent, ProcessEndedError
 from orchestrator.errors import ComponentError, EndedError, InputError, UnsupportedFmuError
+from orchestrator.fmi.port import without_binding
 
 
 @check("loads", "Can its binary be loaded here, and does it give an instance?")
 def loads(subject: Subject) -> CheckResult:
     """What this machine lacks is said here, once; all that needs an instance is not asked then."""
-    described, process = native(subject), subject.process()
+    described, process = without_binding(subject.description), subject.process()
     try:
         answer = process.talk("loading its binary", -1, "absent_functions")
     except UnsupportedFmuError:

@@ -96,7 +96,7 @@ def cannot_import(subject: Subject, point: OperatingAt) -> str:
     takers = [("P_0", point.P)]
     if isinstance(described, BoundDescription):
         takers = [(m.variable, m.factor * point.P + m.offset) for m in described.port.start["P_0"]]
-        described = described.native
+        described = described.inner
     for name, value in takers:
         least, most = described.variables[name].minimum, described.variables[name].maximum
         if (least is not None and value < least) or (most is not None and value > most):

@@ -6,7 +6,9 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.subject import Subject, difference, elsewhere
+from orchestrator.acceptance.checks.comparing import difference
+from orchestrator.acceptance.checks.settings import elsewhere
+from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch

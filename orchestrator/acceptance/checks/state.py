@@ -1,21 +1,12 @@
 """Whether a saved state is all of the state."""
 
-from collections.abc import Mapping
 from time import perf_counter
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import (
-    Running,
-    Stimulus,
-    Subject,
-    difference,
-    elsewhere,
-    saved,
-    settings,
-    tune,
-    with_settings,
-)
+from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, with_each_setting
+from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, saved
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
@@ -36,17 +27,20 @@ def state(subject: Subject) -> CheckResult:
     """Run, save, run on; restore, and run the same again: what was not saved goes on from where it was."""
     if not subject.description.can_save_state:
         return not_applicable("state", "because the FMU does not declare canGetAndSetFMUstate")
-    seen: tuple[float, int, str] = (0.0, 0, "")
-    for setting in settings(subject):
+
+    def look(setting: Setting) -> tuple[str, float, int]:
         try:
-            wrong, worst, place = _brought_back(subject, setting, elsewhere(subject))
+            return _brought_back(subject, setting, elsewhere(subject))
         except ComponentError:
             if setting:
-                continue  # it does not work so
-            wrong, worst, place = _brought_back(subject, setting, elsewhere(subject, switches=False))
+                raise
+            return _brought_back(subject, setting, elsewhere(subject, switches=False))
+
+    seen: tuple[float, int, str] = (0.0, 0, "")
+    for (wrong, worst, place), said in with_each_setting(subject, look):
         if wrong:
-            return failed("state", "hidden state", f"{wrong}{with_settings(setting)}")
-        seen = max(seen, (worst, place, with_settings(setting)), key=lambda one: one[0])
+            return failed("state", "hidden state", f"{wrong}{said}")
+        seen = max(seen, (worst, place, said), key=lambda one: one[0])
     worst, place, where = seen
     steps = affordable(subject, _STEPS)
     if worst > _CLEAR:
@@ -120,9 +114,7 @@ def state_size(subject: Subject) -> CheckResult:
     return passed("state_size", f"{sizes[0]} bytes, saved in {1e6 * seconds:.0f} µs", **figures)
 
 
-def _brought_back(
-    subject: Subject, setting: Mapping[str, float | bool], moved: Mapping[str, float | bool]
-) -> tuple[str, float, int]:
+def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[str, float, int]:
     """What reads otherwise after it was restored; the largest difference of two runs, and the output's place.
 
     Parameters are moved before the state is saved, and back before it is restored: they belong to it. A second state

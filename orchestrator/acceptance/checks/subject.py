@@ -12,7 +12,6 @@ import numpy as np
 
 from orchestrator.acceptance.process import FmuProcess, HostedComponent
 from orchestrator.arrays import Numbers
-from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import START, BoundDescription
@@ -138,6 +137,30 @@ class Subject:
             component.close()
             raise
 
+    def prepare(
+        self,
+        component: HostedComponent,
+        point: OperatingAt | None = None,
+        parameters: Mapping[str, float | bool] | None = None,
+    ) -> None:
+        """Give a new instance what it is given before initialisation.
+
+        Parameters
+        ----------
+        component
+            The instance.
+        point
+            Operating point that it starts from; the one of use where None.
+        parameters
+            Values of further parameters.
+        """
+        if self.starts:
+            at = point or self.point
+            start = {"P_0": at.P, "Q_0": at.Q, "v_0": at.v, "theta_0": at.theta}
+            component.set({n: v for n, v in start.items() if n in self.description.variables})
+        component.set({**self.use.values, **(parameters or {})})
+        component.setup(0.0, None)
+
     def memory_in_use(self) -> int:
         """Bytes in use in the FMU's process, as it says; 0 where it cannot."""
         return self.process().number("memory in use", -1, "memory_in_use")
@@ -230,12 +253,7 @@ class Running:
         """Initialise the instance, new or reset."""
         subject, component = self.subject, self.component
         self.time = 0.0
-        if subject.starts:
-            point = self.point or subject.point
-            start = {"P_0": point.P, "Q_0": point.Q, "v_0": point.v, "theta_0": point.theta}
-            component.set({n: v for n, v in start.items() if n in subject.description.variables})
-        component.set({**subject.use.values, **self.parameters})
-        component.setup(0.0, None)
+        subject.prepare(component, self.point, self.parameters)
         component.enter_initialization_mode()
         self.rest = subject.start_inputs(self.point)
         self._in = RealBatch(component, subject.inputs)
@@ -310,82 +328,3 @@ def saved(running: Running) -> Iterator[Any]:
         yield state
     finally:
         running.component.free_state(state)
-
-
-def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | bool]:
-    """Other values of the tunable parameters, within their bounds.
-
-    Parameters
-    ----------
-    switches
-        Booleans as well, and whole numbers with declared bounds.
-    """
-    found: dict[str, float | bool] = {}
-    for name, info in subject.description.variables.items():
-        if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
-            continue
-        if info.type == "Real":
-            value = info.start_number
-            moved = value * 1.1 if value else 0.1
-            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
-                found[name] = moved
-        elif info.type == "Integer" and info.minimum is not None and info.maximum is not None:
-            value = info.start_number
-            others = [other for other in (value - 1, value + 1) if info.minimum <= other <= info.maximum]
-            if others and switches:
-                found[name] = others[-1]
-        elif info.type == "Boolean" and switches:
-            found[name] = not _switched_on(subject, name)
-    return found
-
-
-_MOST_SWITCHES = 3
-"""Switches that are tried one by one; where there are more, all together as well."""
-
-
-def settings(subject: Subject) -> list[dict[str, float | bool]]:
-    """Parameters to look at it with: as they are, and with its tunable Booleans the other way."""
-    variables = subject.description.variables.values()
-    names = [
-        v.name for v in variables if v.causality == "parameter" and v.variability == "tunable" and v.type == "Boolean"
-    ]
-    toggled: dict[str, float | bool] = {n: not _switched_on(subject, n) for n in names}
-    found = [{}, *({n: toggled[n]} for n in names[:_MOST_SWITCHES])]
-    return [*found, toggled] if len(names) > _MOST_SWITCHES else found
-
-
-def with_settings(setting: Mapping[str, float | bool]) -> str:
-    """A setting in words, to stand at the end of a sentence."""
-    return f", with {', '.join(f'{n} = {str(v).lower()}' for n, v in setting.items())}" if setting else ""
-
-
-def _switched_on(subject: Subject, name: str) -> bool:
-    return bool(subject.use.values.get(name, subject.description.variables[name].start_number))
-
-
-def tune(running: "Running", values: Mapping[str, float | bool]) -> None:
-    """Set parameters one by one, up to one that it refuses."""
-    for name, value in values.items():
-        try:
-            running.component.set({name: value})
-        except ComponentError:
-            return
-
-
-def scales(*trajectories: Numbers) -> Numbers:
-    """For each output how far it moves in all runs together; its size where it hardly moves."""
-    values = np.concatenate(trajectories)
-    finite = np.where(np.isfinite(values), values, 0.0)
-    size = np.abs(finite).max(axis=0)
-    moved: Numbers = np.maximum(np.ptp(finite, axis=0), np.maximum(1e-6 * size, 1e-9))
-    return moved
-
-
-def difference(a: Numbers, b: Numbers) -> tuple[float, int]:
-    """Largest difference of two runs relative to how far the outputs move, and the output's place."""
-    if not a.size:
-        return 0.0, 0
-    apart = np.abs(a - b) / scales(a, b)
-    apart = np.where(np.isnan(a) & np.isnan(b), 0.0, np.where(np.isfinite(apart), apart, np.inf))
-    place = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    return float(apart[place]), int(place[1])

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.acceptance.checks.subject import scales
+from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.arrays import Numbers
 
 _LEVELS = 4

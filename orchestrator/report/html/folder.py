@@ -11,6 +11,8 @@ import xarray as xr
 
 from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
+from orchestrator.results.manifest import MANIFEST, check_one_run, checked
+from orchestrator.results.recording import TRAJECTORY, open_whole, warn_of_early_end
 
 
 @dataclass
@@ -49,7 +51,8 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
     Raises
     ------
     InputError
-        If the folder holds no run, or a file in it cannot be read.
+        If the folder holds no run, its files are of different runs or not as they were written, or a file in it cannot
+        be read.
     """
     summary = folder / "summary.json"
     if not summary.is_file():
@@ -65,6 +68,8 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
                 f"{other}: this is the folder of another run; a report is of one run, {folder}, with its sweeps "
                 "and designs; write one report for each run, or compare two with `gfor compare`"
             )
+    tables = ("summary.json", "case.toml", "modes.csv", "participation.csv", "step_size.csv")
+    check_one_run(folder, tables, ("trajectory.nc", "linear.nc"))
     try:
         content = json.loads(summary.read_text(encoding="utf-8"))
         case = load_case(folder / "case.toml")
@@ -113,10 +118,24 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 def _datasets(folder: Path, names: Sequence[str], file: str) -> Iterator[tuple[str, xr.Dataset]]:
     for name in names:
-        if (folder / name / file).is_file():
-            yield name, _load(folder / name / file)
+        path = folder / name / file
+        if path.is_file():
+            dataset = _load(path)
+            if (found := dataset.attrs.get("scenario", name)) != name:
+                raise InputError(
+                    f"{path}: it is the recording of scenario {found!r}, and lies in the folder of {name!r}: the "
+                    "folders were renamed or swapped; give each its own name again, or run the study again"
+                )
+            if not dataset.sizes["time"]:
+                raise InputError(
+                    f"{path}: nothing was recorded in it, so there is no response to show; run the scenario again"
+                )
+            if file == TRAJECTORY:
+                warn_of_early_end(dataset, str(path))
+            yield name, dataset
 
 
 def _load(path: Path) -> xr.Dataset:
-    with xr.open_dataset(path) as dataset:
-        return dataset.load()
+    if path.name == "sweep.nc" and (path.parent / MANIFEST).is_file():
+        checked(path.parent, [path.name])
+    return open_whole(path)

@@ -7,6 +7,7 @@ from orchestrator.report.html import sections, studies
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures
 from orchestrator.report.html.folder import Results, read_results
+from orchestrator.safe_files import write_text
 
 
 def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = None) -> Path:
@@ -28,7 +29,7 @@ def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = 
     """
     results = read_results(folder, others)
     target = path or folder / "report.html"
-    target.write_text(page(results), encoding="utf-8")
+    write_text(target, page(results))
     return target
 
 

@@ -22,6 +22,7 @@ _KINDS = {
     "run_away": "run-away",
     "active_limit": "active limit",
     "loss_of_synchronism": "loss of synchronism",
+    "not_judged": "not judged",
     "not_finite": "not a number",
 }
 """What a run found, in words."""
@@ -102,9 +103,21 @@ def studied(results: Results) -> str:
         f"({escape(first['schedule'])}), simulated for {first['stop_time']:g} s. {_linearised(results)}"
     )
     source = f"<p>{escape(case.source)}</p>" if case.source else ""
-    return f"{source}<p>{solver}</p>" + table(
+    return f"{source}<p>{solver}</p>{_isolated(results)}" + table(
         "Scenarios", ["Scenario", "What differs", "Events", "States"], rows, left=3
     )
+
+
+def _isolated(results: Results) -> str:
+    """What kept foreign FMUs from the rest of the machine."""
+    found = {name: tuple(p["name"] for p in listed if p["in_force"])
+             for s in results.scenarios for name, listed in s.get("isolated", {}).items()}  # fmt: skip
+    sentences = [
+        f"{', '.join(name for name, has in found.items() if has == names)} ran in a process of its own, with: "
+        f"{', '.join(names)}."
+        for names in dict.fromkeys(found.values())
+    ]
+    return f"<p>{escape(' '.join(sentences))}</p>" if sentences else ""
 
 
 def _linearised(results: Results) -> str:

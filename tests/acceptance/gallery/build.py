@@ -1,5 +1,6 @@
 """From C and a few words on its variables to an FMU file."""
 
+import re
 import uuid
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -147,7 +148,19 @@ def _code(file: str) -> str:
     return (HERE / file).read_text(encoding="utf-8")
 
 
+def check_macros(source: Source) -> None:
+    """A macro that no C file reads switches nothing on: the FMU would be a good one under a fault's name."""
+    code = "".join(_code(file) for file in (source.file, "fmi2.c", "tampering.h"))
+    code = re.sub(r"/\*.*?\*/", "", code, flags=re.DOTALL)
+    code += "".join(map(str, source.defines.values()))
+    unread = [name for name in source.defines if not re.search(rf"\b{name}\b", code)]
+    if unread:
+        named = ", ".join(unread)
+        raise ValueError(f"{source.name}: neither {source.file} nor fmi2.c reads the macro {named}; plant it")
+
+
 def library(source: Source) -> Path:
+    check_macros(source)
     macros = {**source.defines, "GUID": f'"{identity(source)}"'}
     text = "".join(f"#define {name} {value}\n" for name, value in macros.items())
     # The model comes first for its SIZE, the interface after it.

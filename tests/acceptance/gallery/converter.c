@@ -305,6 +305,11 @@ static void outputs(double *z, double *m, const double *hidden) {
 #endif
     const phasor v = voltage(z, now);
     phasor i = {m[I_RE] - SHUNT * v.re, m[I_IM] - SHUNT * v.im};
+#ifdef ALGEBRAIC /* the current of the voltage behind the impedance, at once */
+    const double e = emf(m), z2 = R_PU * R_PU + X_PU * X_PU;
+    const phasor u = {e * cos(m[DELTA]) - v.re, e * sin(m[DELTA]) - v.im};
+    i.re = (u.re * R_PU + u.im * X_PU) / z2, i.im = (u.im * R_PU - u.re * X_PU) / z2;
+#endif
 #ifdef FAULT_NAN_LIMIT
     if (hypot(i.re, i.im) > FAULT_NAN_LIMIT) i.re = NAN;
 #endif

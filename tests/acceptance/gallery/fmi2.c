@@ -45,7 +45,7 @@ typedef struct {
     const callbacks_t *callbacks;
     char *name;
     void *owner; /* whose state this was */
-    int calls, was_reset, was_restored, ended;
+    int calls, was_reset, was_restored, ended, at_exit;
 } instance_t;
 
 #ifdef FAULT_SHARED
@@ -135,6 +135,10 @@ EXPORT int fmi2SetupExperiment(void *c, int defined, double tolerance, double st
 EXPORT int fmi2EnterInitializationMode(void *c) {
     instance_t *instance = c;
     S->phase = INITIALISING, S->dirty = 1;
+#if defined INITIALISED_AT_ENTRY || defined FAULT_OUTPUTS_AT_ENTRY
+    initialise(S->z, S->memory);
+    outputs(S->z, S->memory, instance->hidden);
+#endif
     return OK;
 }
 
@@ -143,7 +147,18 @@ static void refresh(instance_t *instance) {
     S->z[GAIN] = shared_gain;
 #endif
     if (!S->dirty) return;
-    if (S->phase < STEPPING) initialise(S->z, S->memory);
+#ifdef FAULT_OUTPUTS_AT_EXIT
+    if (S->phase == INITIALISING && !instance->at_exit) return; /* until then they are what START has */
+#endif
+#ifdef FAULT_OUTPUTS_AT_ENTRY
+    if (S->phase == INITIALISING && !instance->at_exit) return; /* inputs that are set later do not count */
+#endif
+#ifdef INITIALISED_AT_ENTRY
+    if (S->phase < INITIALISING) /* the parameters are known at entry; outputs follow the inputs */
+#else
+    if (S->phase < STEPPING)
+#endif
+        initialise(S->z, S->memory);
     outputs(S->z, S->memory, instance->hidden);
     S->dirty = 0;
 }
@@ -154,6 +169,7 @@ EXPORT int fmi2ExitInitializationMode(void *c) {
     if (instance->was_reset) *(volatile int *)8 = 1;
 #endif
     S->dirty = 1;
+    instance->at_exit = 1;
     refresh(instance);
     S->phase = STEPPING;
     memcpy(instance->late, S->z, sizeof S->z);
@@ -166,6 +182,7 @@ EXPORT int fmi2Terminate(void *c) {
 EXPORT int fmi2Reset(void *c) {
     instance_t *instance = c;
     instance->was_reset = 1;
+    instance->at_exit = 0;
 #ifdef FAULT_LEAK_RESET
     static void *volatile forgotten;
     forgotten = malloc(FAULT_LEAK_RESET);

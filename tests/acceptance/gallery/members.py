@@ -7,8 +7,8 @@ from math import sqrt
 from tests.acceptance.gallery.build import Source, Variable
 
 FORMS = {
-    # form -> (macro, (names, unit) of the voltage, of the current)
-    "rectangular": ("PORT_RECTANGULAR", ("v_re", "v_im"), ("i_re", "i_im")),
+    # form -> (macro, empty where it is the usual one, (names, unit) of the voltage, of the current)
+    "rectangular": ("", ("v_re", "v_im"), ("i_re", "i_im")),
     "polar": ("PORT_POLAR", ("V_mag", "V_ang"), ("I_mag", "I_ang")),
     "abc": ("PORT_ABC", ("va", "vb", "vc"), ("ia", "ib", "ic")),
     "qd": ("PORT_QD", ("vq", "vd"), ("iq", "id")),
@@ -71,7 +71,9 @@ def converter(
     variables += [Variable(omega[0], 13, "output", None, omega[1])]
     if switch:
         variables += [Variable("damping", 0, "parameter", 0, "", variability="tunable", type="Boolean")]
-    return Source(name, "converter.c", {macro: 1, **defines}, tuple(variables), step_size, stop_time, state)
+    return Source(
+        name, "converter.c", {**({macro: 1} if macro else {}), **defines}, tuple(variables), step_size, stop_time, state
+    )
 
 
 START = "\n".join(f'[start.{n}]\nvariable = "{n}"' for n in ("P_0", "Q_0", "v_0", "theta_0"))
@@ -173,6 +175,8 @@ def good():
         Member(converter("converter_coarse_steps", FIXED_STEP="1e-4", step_size="1e-3")),
         Member(converter("converter_feedthrough", SHUNT=0.05, depends=("v_re", "v_im"))),
         Member(converter("converter_feedthrough_unsaid", SHUNT=0.05, depends=None)),
+        Member(converter("converter_initialised_at_entry", SHUNT=0.05, depends=("v_re", "v_im"),
+                         INITIALISED_AT_ENTRY=1)),
         Member(converter("converter_strict_time", STRICT_TIME=1)),
         Member(converter("converter_one_step_size", ONLY_STEP="1e-4")),
         Member(converter("converter_unstable_beyond", ONE_SUBSTEP=1, step_size="4e-3", stop_time="20")),
@@ -287,6 +291,17 @@ def faulty():
         *missed_by_one_point(),
         *reported(),
         *tampering(),
+        *late_outputs(),
+    ]
+
+
+def late_outputs():
+    """What a master reads in initialisation mode is not there yet, or is of the inputs before."""
+    only = ("runs", "initial_outputs")
+    entry = converter("outputs_at_entry", FAULT_OUTPUTS_AT_ENTRY=1, SHUNT=0.05, depends=("v_re", "v_im"))
+    return [
+        *carriers("outputs_at_exit", "outputs come late", only=only, FAULT_OUTPUTS_AT_EXIT=1),
+        Member(entry, "outputs come late", only=only),
     ]
 
 
@@ -431,7 +446,8 @@ def _wrong_units():
     kelvin = converter("units_definition")
     kelvin = replace(kelvin, units={"MVA": {"kg": "1", "m": "2", "s": "-3", "factor": "1000"}})
     bound = converter("units_bound", units=("kV", "pu", "pu"))
-    return [Member(kilovolts, "wrong units"), Member(kelvin, "wrong units"), Member(bound, "wrong units", IDENTITY)]
+    unfit = Member(bound, "binding does not fit", IDENTITY)
+    return [Member(kilovolts, "wrong units"), Member(kelvin, "wrong units"), unfit]
 
 
 def _invalid():

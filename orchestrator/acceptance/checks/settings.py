@@ -1,0 +1,92 @@
+"""Parameters that an FMU is looked at with: its tunable ones, moved within their bounds, and its switches."""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TypeVar
+
+from orchestrator.acceptance.checks.subject import Running, Subject
+from orchestrator.errors import ComponentError
+
+Look = TypeVar("Look")
+
+Setting = Mapping[str, float | bool]
+"""Values of parameters by their names."""
+
+
+def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | bool]:
+    """Other values of the tunable parameters, within their bounds.
+
+    Parameters
+    ----------
+    switches
+        Booleans as well, and whole numbers with declared bounds.
+    """
+    found: dict[str, float | bool] = {}
+    for name, info in subject.description.variables.items():
+        if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
+            continue
+        if info.type == "Real":
+            value = info.start_number
+            moved = value * 1.1 if value else 0.1
+            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
+                found[name] = moved
+        elif info.type == "Integer" and info.minimum is not None and info.maximum is not None:
+            value = info.start_number
+            others = [other for other in (value - 1, value + 1) if info.minimum <= other <= info.maximum]
+            if others and switches:
+                found[name] = others[-1]
+        elif info.type == "Boolean" and switches:
+            found[name] = not _switched_on(subject, name)
+    return found
+
+
+_MOST_SWITCHES = 3
+"""Switches that are tried one by one; where there are more, all together as well."""
+
+
+def _settings(subject: Subject) -> list[dict[str, float | bool]]:
+    """Parameters to look at it with: as they are, and with its tunable Booleans the other way."""
+    variables = subject.description.variables.values()
+    names = [
+        v.name for v in variables if v.causality == "parameter" and v.variability == "tunable" and v.type == "Boolean"
+    ]
+    toggled: dict[str, float | bool] = {n: not _switched_on(subject, n) for n in names}
+    found = [{}, *({n: toggled[n]} for n in names[:_MOST_SWITCHES])]
+    return [*found, toggled] if len(names) > _MOST_SWITCHES else found
+
+
+def _in_words(setting: Setting) -> str:
+    """A setting in words, to stand at the end of a sentence."""
+    return f", with {', '.join(f'{n} = {str(v).lower()}' for n, v in setting.items())}" if setting else ""
+
+
+def with_each_setting(subject: Subject, look: Callable[[Setting], Look]) -> Iterator[tuple[Look, str]]:
+    """What a look gives with one setting after another, and the setting in words.
+
+    A setting with which the FMU does not work is passed over.
+
+    Raises
+    ------
+    ComponentError
+        Where the FMU does not work with its parameters as they are.
+    """
+    for setting in _settings(subject):
+        try:
+            found = look(setting)
+        except ComponentError:
+            if not setting:
+                raise
+        else:
+            yield found, _in_words(setting)
+
+
+def _switched_on(subject: Subject, name: str) -> bool:
+    return bool(subject.use.values.get(name, subject.description.variables[name].start_number))
+
+
+def tune(running: Running, values: Setting) -> None:
+    """Set parameters one by one, up to one that it refuses."""
+    for name, value in values.items():
+        try:
+            running.component.set({name: value})
+        except ComponentError:
+            return

@@ -1,0 +1,162 @@
+"""The modes in a recorded signal."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+from orchestrator.analysis.identification import IdentifiedMode, interval_used
+from orchestrator.api.results import Run
+from orchestrator.api.show import page
+from orchestrator.api.values import Time, moment, text_or_none
+from orchestrator.errors import InputError
+from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.recording import warn_of_early_end
+from orchestrator.study.comparison import open_trajectory, recorded, strongest_modes
+
+_ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
+
+
+class SignalModes:
+    """A recorded signal as a sum of modes, the strongest first. `identify` makes it.
+
+    Attributes
+    ----------
+    signal
+        The signal, as it was asked for.
+    start, stop
+        Beginning and end of the part of the record that was used [s].
+    modes
+        Eigenvalue [rad/s], damping and amplitude [unit of the signal] of each mode.
+    interval
+        Time between the samples used [s].
+    """
+
+    def __init__(
+        self, signal: str, start: float, stop: float, modes: Sequence[IdentifiedMode], interval: float
+    ) -> None:
+        """Keep the result of an identification.
+
+        Parameters
+        ----------
+        signal
+            The signal: ``"a.b"`` or ``"a.b - c.d"``.
+        start, stop
+            Beginning and end of the part of the record that was used [s].
+        modes
+            The modes, the strongest first.
+        interval
+            Time between the samples used [s].
+        """
+        self.signal, self.start, self.stop, self.modes, self.interval = signal, start, stop, list(modes), interval
+
+    def __iter__(self) -> Iterator[IdentifiedMode]:
+        return iter(self.modes)
+
+    def __len__(self) -> int:
+        return len(self.modes)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences on the highest frequency that the samples can show, and on the modes near it."""
+        highest = 0.5 / self.interval
+        texts = [
+            f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
+            "a faster oscillation appears as a slower one."
+        ]
+        near = [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]
+        if near:
+            texts.append(
+                f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
+                f"of the system: {', '.join(near)}. Record more often (solver.record_interval) to be sure."
+            )
+        return texts
+
+    def table(self) -> pd.DataFrame:
+        """One row for every mode: eigenvalue [1/s, rad/s], frequency, damping ratio, amplitude [unit of the signal]."""
+        figures = ["real", "imag", "frequency_hz", "damping_percent", "amplitude"]
+        return pd.DataFrame(self.as_json(), columns=figures)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """The same as ``gfor identify --json`` prints, as JSON's types."""
+        return [identified_mode_json(mode) for mode in self.modes]
+
+    def __repr__(self) -> str:
+        return f"<SignalModes of {self.signal} from {self.start:g} to {self.stop:g} s: {len(self)} modes>"
+
+    def _repr_html_(self) -> str:
+        return page(repr(self).strip("<>"), self.remarks, self.table())
+
+
+def identified_mode_json(mode: IdentifiedMode) -> dict[str, Any]:
+    """A mode of a signal as JSON's types."""
+    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"amplitude": mode.amplitude}
+
+
+def identify(
+    run: Run | xr.Dataset | str | Path, signal: str, start: Time = 2.0, stop: Time | None = None
+) -> SignalModes:
+    """Find the modes in a signal of a run by the matrix pencil method.
+
+    Parameters
+    ----------
+    run
+        A run, its dataset, or the folder of a scenario's results.
+    signal
+        ``"a.b"`` or ``"a.b - c.d"``.
+    start
+        Beginning of the free response [s].
+    stop
+        End of the free response [s]; by default the end of the run.
+
+    Raises
+    ------
+    InputError
+        If there is no such run, it does not have the signal, or it has nothing between the two times.
+    AnalysisError
+        If the signal has too few samples between the two times, or does not oscillate.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=2.0)
+    >>> modes = gfor.identify(run, "gfor.omega", start=1.2)
+    >>> print(f"{modes.table()['frequency_hz'][0]:.2f} Hz")
+    2.83 Hz
+    """
+    if text_or_none(signal, "signal", _ONE_SIGNAL) is None:
+        raise InputError(f"signal = None; {_ONE_SIGNAL}")
+    dataset, label = opened(run, "run")
+    curve = recorded(dataset, signal, label)
+    begin, last = moment(start, "start"), float(curve["time"][-1])
+    if begin >= last:
+        raise InputError(f"start = {start!r}: {label} ends at t = {last:g} s; give an earlier start")
+    end = last if stop is None else moment(stop, "stop")
+    if end <= begin:
+        raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
+    modes = strongest_modes(curve, begin, end)
+    times = curve["time"].sel(time=slice(begin, end)).values
+    return SignalModes(signal, float(times[0]), float(times[-1]), modes, interval_used(times))
+
+
+def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Dataset, str]:
+    """A run's dataset and its name; ``otherwise`` names a dataset without a scenario's name.
+
+    Warns
+    -----
+    ResultsWarning
+        If the run ended before its stop time.
+    """
+    if isinstance(run, str | Path):
+        dataset, label = open_trajectory(Path(run)), str(run)
+    else:
+        dataset = run.dataset if isinstance(run, Run) else run
+        if not isinstance(dataset, xr.Dataset):
+            raise InputError(f"{otherwise} = {run!r}; give a run, its dataset, or the folder of a scenario's results")
+        label = str(dataset.attrs.get("scenario", otherwise))
+    if not dataset.sizes.get("time"):
+        raise InputError(f"{label}: nothing was recorded over the time; give a run that came beyond its start")
+    warn_of_early_end(dataset, label)
+    return dataset, label

@@ -1,0 +1,76 @@
+"""Which components are federates at HELICS: options of ``gfor run``."""
+
+import argparse
+
+from orchestrator.cli.arguments import seconds
+from orchestrator.cli.terminal import make_errors
+from orchestrator.errors import InputError
+from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
+
+
+def port(text: str) -> int:
+    """A port that a broker can listen on; it takes the next one as well."""
+    if not text.isdigit() or not 1 <= int(text) <= 65534:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1 to 65534")
+    return int(text)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options of the engine."""
+    group = parser.add_argument_group("federates over HELICS (extra `federation`)")
+    group.add_argument("--engine", choices=ENGINES, default="local",
+                       help="local: all components here; helics: some of them as federates")  # fmt: skip
+    group.add_argument("--federate", type=names, default=(), metavar="NAME,NAME",
+                       help="components that become federates on this machine (default: all but the grid)")  # fmt: skip
+    group.add_argument("--external", type=names, default=(), metavar="NAME,NAME",
+                       help="components whose federates others start: `gfor federate`, or a program")  # fmt: skip
+    group.add_argument("--broker", metavar="ADDRESS", help="a broker that runs, such as tcp://host:23405 "
+                       "(default: gfor starts one for this machine alone)")  # fmt: skip
+    group.add_argument("--broker-port", type=port, metavar="PORT",
+                       help="start the broker at this port of all network interfaces")  # fmt: skip
+    group.add_argument("--patience", type=seconds, default=None, metavar="T",
+                       help=f"longest time of a federate for one step [s] (default: {PATIENCE:g})")  # fmt: skip
+    group.add_argument("--to-join", type=seconds, default=None, metavar="T",
+                       help=f"how long federates are waited for [s] (default: {TO_JOIN:g})")  # fmt: skip
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
+    found = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
+    if not all(found):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")
+    return found
+
+
+def choice(options: argparse.Namespace, number_of_scenarios: int) -> Federates | None:
+    """The choice of federates; None for the local master.
+
+    Raises
+    ------
+    InputError
+        If options contradict each other, or somebody else's federates would have to begin several times.
+    """
+    given = {
+        "names": options.federate, "external": options.external, "broker": options.broker, "port": options.broker_port,
+        "patience": options.patience, "to_join": options.to_join,
+    }  # fmt: skip
+    given = {key: value for key, value in given.items() if value not in (None, ())}
+    if options.engine == "local":
+        if given:
+            raise InputError("--federate, --external, --broker, --broker-port, --patience and --to-join need "
+                             "--engine helics")  # fmt: skip
+        return None
+    if options.like is not None:
+        raise InputError("--like emulates another master on this machine; leave out either --like or --engine helics")
+    if options.resume is not None or options.require_checkpoint or options.checkpoint:
+        raise InputError("a run with federates keeps no checkpoints; leave out --engine helics, or --resume, "
+                         "--checkpoint and --require-checkpoint")  # fmt: skip
+    if options.external and number_of_scenarios > 1:
+        raise InputError(
+            f"--external {','.join(options.external)}: a federate of others takes part in one run, and here are "
+            f"{number_of_scenarios} scenarios; choose one with --scenario"
+        )
+    console = make_errors()
+    if options.checkpoint is None:
+        console.print("a run with federates keeps no checkpoints: if it is interrupted, it cannot be resumed")
+    return Federates(**given, announce=lambda text: console.print(text, markup=False))

@@ -1,0 +1,304 @@
+"""What a user may type in Python: one clear error of our own, or what was meant; never another answer in silence."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import orchestrator as gfor
+from orchestrator.api.design import ControllerDesign
+from orchestrator.errors import InputError
+
+mpl.use("agg")
+
+
+@pytest.fixture(scope="module")
+def case():
+    return gfor.load("two_area")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return gfor.load("infinite_bus").scenario("dip").run(stop=1.1)
+
+
+@pytest.mark.parametrize("values", [{"grid": {"X_L": 0.3}}, {"grid.X_L": np.float64(0.3)}, {"grid.X_L": "0.3"}])
+def test_a_value_is_taken_however_it_is_written(case, values):
+    assert case.scenario("pod_p", values).values["grid.X_L"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"grid": 0.3}, "'grid' is not of the form component.variable"),
+        ({"X_L": 0.3}, "'X_L' is not of the form component.variable"),
+        ({".X_L": 0.3}, "'.X_L' is not of the form"),
+        ({3: 0.3}, "3 is not a name"),
+        ({"grid": {3: 0.3}}, "3 is not a name"),
+        (["grid.X_L=0.3"], "give values by name"),
+        ("grid.X_L=0.3", "give values by name"),
+    ],
+)
+def test_values_that_say_nothing_are_refused(case, values, words):
+    with pytest.raises(InputError, match=words):
+        case.scenario("pod_p", values)
+    with pytest.raises(InputError, match=words):
+        case.sweep({"grid.X_L": [0.1, 0.2]}, ["gfor"], values)
+    with pytest.raises(InputError, match=words):
+        case.design("pod_p", values=values)
+
+
+@pytest.mark.parametrize(
+    ("vary", "words"),
+    [
+        ({"grid": [0.1, 0.2]}, "'grid' is not of the form component.variable"),
+        ({"grid": {"X_L": [0.1]}}, "'grid' is not of the form component.variable"),
+        ({"grid.X_L": 0.1}, "a sweep needs a list of values"),
+        ({"grid.X_L": "0.1:0.5:9"}, "a sweep needs a list of values"),
+        ({"grid.X_L": []}, "a sweep needs values"),
+        ({4: [0.1]}, "4 is not a name"),
+        ({}, "varies nothing"),
+        ([], "give what is varied"),
+        (None, "give what is varied"),
+        (3, "give what is varied"),
+    ],
+)
+def test_a_sweep_of_nothing_is_refused(case, vary, words):
+    with pytest.raises(InputError, match=words):
+        case.sweep(vary, ["gfor"])
+
+
+def test_one_name_is_as_good_as_a_list_of_one(case, tmp_path):
+    assert [scenario.name for scenario in case.choose("pod_p")] == ["pod_p"]
+    report = gfor.check(gfor.build("infinite_bus", tmp_path), only="runs")
+    assert report.table().index.tolist() == ["archive", "runs"]
+    scenario = gfor.load("infinite_bus").scenario("load_step")
+    model = scenario.linearize("gfor.droop.delta_P_ref", "gfor.omega")
+    assert model.inputs == ("gfor.droop.delta_P_ref",)
+    with pytest.raises(InputError, match=r"x\.toml: the parameter file cannot be read"):
+        case.scenario("pod_p", parameters="x.toml")
+    for wrong in (3, [3], None):
+        with pytest.raises(InputError, match="give a name, or a list of names"):
+            case.choose(wrong)
+
+
+@pytest.mark.parametrize("frequencies", [2, None, "0.1", (0.1,), (2, 0.1), ("x", "y"), (0.1, float("nan")), (-1, 2)])
+def test_frequencies_are_two_numbers_in_order(case, frequencies):
+    with pytest.raises(InputError, match="frequencies"):
+        case.scenario("pod_p").modes(frequencies)
+
+
+@pytest.mark.parametrize("ratio", ["5 %", "0.05", 5, 0, True, float("nan"), [0.05]])
+def test_a_damping_ratio_is_a_number_between_0_and_1(case, ratio):
+    with pytest.raises(InputError, match=r"critical = .*it is a damping ratio between 0 and 1"):
+        case.scenario("pod_p").modes(critical=ratio)
+    with pytest.raises(InputError, match=r"damping = .*it is a damping ratio between 0 and 1"):
+        case.design("pod_p", damping=ratio)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"gain_bounds": 5}, r"gain_bounds = 5; give the lowest and the highest gain in pu"),
+        ({"gain_bounds": ("0", "9")}, "in pu, such as"),
+        ({"gain_bounds": (200, 0)}, "0 ≤ lowest ≤ highest"),
+        ({"gain_bounds": (-5, 10)}, "0 ≤ lowest ≤ highest"),
+        ({"gain_bounds": (0, float("nan"))}, "0 ≤ lowest ≤ highest"),
+        ({"gain_bounds": None}, "gain_bounds = None; give the lowest"),
+        ({"delta_gain": "1"}, "delta_gain = '1'; give a gain above 0 in pu, such as"),
+        ({"delta_gain": None}, "delta_gain = None; give a gain"),
+        ({"delta_gain": -1.0}, "delta_gain = -1.0; give a gain"),
+        ({"stages": True}, "stages = True; give a whole number from 0 to 10"),
+        ({"stages": "2"}, "stages = '2'; give a whole number"),
+        ({"least_damping": None}, "least_damping = None; it is a damping ratio"),
+        ({"damping_increment": None}, "damping_increment = None; it is a damping ratio"),
+        ({"component": ["gfor"]}, r"component = \['gfor'\]; give one name"),
+        ({"scenario": ["gfor"]}, r"scenario = \['gfor'\]; a design is made for one scenario"),
+        ({"refine": "no"}, "refine = 'no'; give True or False"),
+    ],
+)
+def test_what_is_asked_of_a_design_is_of_its_kind(case, wanted, words):
+    with pytest.raises(InputError, match=words):
+        case.design("pod_p", **wanted)
+
+
+@pytest.mark.parametrize(
+    ("path", "words"), [("design.json", "name it design.toml"), (None, "give the path"), (3, "give the path")]
+)
+def test_a_design_is_not_saved_over_its_own_json(tmp_path, monkeypatch, path, words):
+    monkeypatch.chdir(tmp_path)
+    design = ControllerDesign(None)  # the path is refused before anything of the design is looked at
+    with pytest.raises(InputError, match=words):
+        design.save(path, "a command")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("nothing", [None, 3, ""])
+def test_a_file_is_named_by_its_path(nothing):
+    for function in (gfor.load, gfor.open_fmu, gfor.info, gfor.check):
+        with pytest.raises(InputError, match=r"give (a built-in case|the path)"):
+            function(nothing)
+
+
+def test_what_is_compared_must_be_runs(run):
+    for other in (None, run.modes, 3):
+        with pytest.raises(InputError, match="give a run, its dataset, or the folder"):
+            gfor.compare(run, other)
+    with pytest.raises(InputError, match="give a run, its dataset, or the folder"):
+        gfor.identify(None, "gfor.omega")
+
+
+@pytest.mark.parametrize("start", ["500 ms", "0.5 s", np.float64(0.5), 0.5])
+def test_a_start_is_a_time_however_it_is_written(run, start):
+    assert gfor.compare(run, run, "gfor.omega", start).signals == gfor.compare(run, run, "gfor.omega", 0.5).signals
+    assert gfor.identify(run, "gfor.omega", start).start == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("start", [float("nan"), -1, True, "soon", "1 kV", 1.1, 99, [1.0]])
+def test_a_start_that_leaves_nothing_is_refused(run, start):
+    with pytest.raises(InputError, match="start"):
+        gfor.compare(run, run, "gfor.omega", start)
+    with pytest.raises(InputError, match="start"):
+        gfor.identify(run, "gfor.omega", start)
+
+
+def test_a_run_too_short_for_its_rings_says_so(run):
+    found = gfor.compare(run, run, "gfor.omega")
+    assert found.signals[0].modes == (None, None)
+    assert [text.partition(":")[0] for text in found.remarks] == [f"{x} (dip) ends at t = 1.1 s" for x in "ab"]
+    assert "give an earlier start" in found._repr_html_()
+
+
+def test_a_record_of_nothing_is_refused(run):
+    with pytest.raises(InputError, match="nothing was recorded over the time"):
+        gfor.identify(run.dataset.isel(time=slice(0)), "gfor.omega")
+
+
+def test_a_misspelt_signal_names_the_one_that_was_meant(run):
+    with pytest.raises(InputError, match=r"did you mean gfor\.omega"):
+        run.signal("gfor.omga")
+    with pytest.raises(InputError, match=r"the difference 'a\.b - c\.d' of two"):
+        run.plot("gfor.omega + gfor.p")
+    with pytest.raises(InputError, match="give one signal"):
+        run.plot(["gfor.omega", "gfor.p"])
+    with pytest.raises(InputError, match=r"ax = 3; give Matplotlib Axes"):
+        run.plot("gfor.omega", 3)
+
+
+def test_modes_are_a_sequence():
+    modes = gfor.load("infinite_bus").scenario("dip").modes((0.1, 100.0))
+    assert modes[0] is next(iter(modes))
+    with pytest.raises(InputError, match="give Matplotlib Axes"):
+        modes.plot(3)
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return gfor.build("infinite_bus", tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda case: case.scenario(""), "name = ''; give the name of one scenario: base"),
+        (lambda case: case.scenario(["gfor"]), "give the name of one scenario"),
+        (lambda _: gfor.load("a" * 5000), "case = 'aaaa.* is no path that a file can have"),
+        (lambda case: case.scenario("gfor", {"grid.X_L": 10**400}), "a whole number beyond 1e308"),
+        (lambda case: case.scenario("gfor", step=10**400), "a whole number beyond 1e308"),
+        (lambda case: case.sweep({"grid.X_L": [0.1]}, workers="2"), "workers = '2'; it must be a whole number"),
+        (lambda case: case.sweep({"grid.X_L": [0.1]}, workers=True), "workers = True; it must be a whole number"),
+        (lambda case: case.sweep({"grid.X_L": [0.1]}, folder="/proc/x"), "folder = '/proc/x': points cannot be kept"),
+        (lambda case: case.sweep({"grid.X_L": [0.1]}, folder=__file__), "points cannot be kept there"),
+        (lambda case: case.scenario("gfor", {"grid": {"X_L": 0.1}, "grid.X_L": 0.2}), "'grid.X_L' is given twice"),
+        (lambda case: case.scenario("gfor").run(observers=[3]), r"observers = \[3\]; give a list of observers"),
+        (lambda case: case.scenario("gfor").run(observers=None), "observers = None; give a list of observers"),
+        (lambda _: gfor.read_linear_model(None), "fmu = None; give the path of a file"),
+    ],
+)
+def test_an_argument_of_another_kind_is_named(case, call, words):
+    with pytest.raises(InputError, match=words):
+        call(case)
+
+
+@pytest.mark.parametrize("signal", [None, ["gfor.omega"], ""])
+def test_modes_are_identified_in_one_signal(run, signal):
+    with pytest.raises(InputError, match=r"signal = .*; give one signal, 'a\.b' or the difference"):
+        gfor.identify(run, signal)
+
+
+def test_one_number_in_an_array_is_a_number(case):
+    assert len(case.scenario("pod_p").modes(critical=np.array([0.3]))) > 0
+
+
+def test_a_matrix_is_named_by_a_letter():
+    model = gfor.load("infinite_bus").scenario("load_step").linearize()
+    with pytest.raises(InputError, match=r"there is no matrix \['A'\]"):
+        model.table(["A"])
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"model": ["gfor"]}, "give the name of a model of the catalogue"),
+        ({"model": None}, "give the name of a model of the catalogue"),
+        ({"folder": None}, "folder = None; give the path of a folder"),
+        ({"folder": __file__}, "an FMU cannot be written there: File exists"),
+        ({"folder": "/proc/x"}, "an FMU cannot be written there"),
+        ({"platforms": ["amiga"]}, "there is no platform 'amiga'; choose from darwin64, linux64, win64"),
+        ({"platforms": ["amiga"], "native": True}, "there is no platform 'amiga'"),
+        ({"platforms": 3}, "platforms = 3; give a name"),
+        ({"extra": {"../../x": b""}}, r"'\.\./\.\./x' is not a path in the FMU's folder extra/"),
+        ({"extra": {"extra/../modelDescription.xml": b""}}, "is not a path in the FMU's folder extra/"),
+        ({"extra": {"modelDescription.xml": b""}}, "is not a path in the FMU's folder extra/"),
+        ({"extra": {"extra/x": "text"}}, "is of type str; give bytes"),
+        ({"extra": ["x"]}, "give bytes by path"),
+    ],
+)
+def test_a_build_that_cannot_be_is_refused(tmp_path, wanted, words):
+    with pytest.raises(InputError, match=words):
+        gfor.build(**{"model": "infinite_bus", "folder": tmp_path} | wanted)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_one_platform_is_as_good_as_a_list_of_one(tmp_path):
+    assert gfor.build("infinite_bus", tmp_path, platforms="linux64", extra={"extra/a/b.txt": b"1"}).exists()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"memory_limit": 4}, "memory_limit = 4 is 4 MB, too little to load any FMU; give at least 32 MB"),
+        ({"memory_limit": True}, "memory_limit = True; give an amount of memory in MB"),
+        ({"memory_limit": "4 s"}, "'4 s' is in s, but MB is needed"),
+        ({"memory_limit": "1 kB"}, "is 0.001 MB, too little"),
+        ({"component": ["grid"], "case": "infinite_bus"}, r"component = \['grid'\]; give one name"),
+        ({"component": "nope", "case": "infinite_bus"}, "there is no component 'nope'; there are: gfor, grid"),
+        ({"case": 3}, "case = 3; give the path"),
+        ({"binding": 3}, "binding = 3; give the path of a file"),
+    ],
+)
+def test_a_check_names_what_it_cannot_use(fmu, wanted, words):
+    with pytest.raises(InputError, match=words):
+        gfor.check(fmu, **wanted)
+
+
+def test_a_memory_limit_has_a_unit(fmu):
+    assert gfor.check(fmu, only="runs", memory_limit="2 GB").trusted
+    assert gfor.check(fmu, only="runs", memory_limit=32).trusted
+
+
+def test_an_fmu_takes_times_with_a_unit_and_refuses_others(fmu):
+    with gfor.open_fmu(fmu, stop="1 s") as opened:
+        opened.step("1 ms")
+        assert opened.time == 1e-3
+        assert opened.values("v") == {"v": opened.get("v")}
+        for step in ("1 MW", None, -1, True, 10**400):
+            with pytest.raises(InputError):
+                opened.step(step)
+        for name in (["v"], None, 3):
+            with pytest.raises(InputError, match="there is no variable"):
+                opened.get(name)
+        with pytest.raises(InputError, match="names = 3; give a name"):
+            opened.values(3)
+    for wanted in ({"stop": -1}, {"stop": "x"}, {"binding": 3}):
+        with pytest.raises(InputError):
+            gfor.open_fmu(fmu, **wanted)

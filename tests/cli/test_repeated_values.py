@@ -1,0 +1,35 @@
+"""``--set`` given more than once: a value overrides those before it."""
+
+import json
+from argparse import Namespace
+
+import pytest
+
+from orchestrator.cli.case_arguments import values_set
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        ([("gfor.P_0", 0.5), ("gf*.P_0", 0.2), ("gfor.P_0", 0.5)], [("gf*.P_0", 0.2), ("gfor.P_0", 0.5)]),
+        ([("gfor.P_0", 0.5), ("gfor.P_0", 0.4)], [("gfor.P_0", 0.4)]),
+        ([("*.native", True), ("gfor.native", False)], [("*.native", True), ("gfor.native", False)]),
+    ],
+)
+def test_the_last_of_a_name_takes_the_last_place(given, found):
+    assert list(values_set(Namespace(set=given)).items()) == found
+
+
+def test_the_last_value_counts_in_a_sweep_and_for_modes(gfor, tmp_path):
+    def modes(*texts):
+        sets = [word for text in texts for word in ("--set", text)]
+        code, out, _ = gfor("modes", "infinite_bus", "--scenario", "dip", "--range", "0:100", "--json", *sets)
+        assert code == 0
+        code, swept, _ = gfor("sweep", "infinite_bus", "--scenario", "dip", "--range", "0:100", "--json", *sets,
+                              "--vary", "gfor.pod_p.K=1,2", "--workers", 1, "--out", tmp_path / texts[-1])  # fmt: skip
+        assert code == 0
+        return json.loads(out)["scenarios"][0]["modes"], json.loads(swept)["scenarios"][0]["trajectories"]
+
+    repeated, alone = modes("gfor.P_0=0.5", "gf*.P_0=0.2", "gfor.P_0=0.5"), modes("gfor.P_0=0.5")
+    assert repeated == alone
+    assert repeated != modes("gfor.P_0=0.2")

@@ -1,0 +1,196 @@
+"""``gfor run --resume`` and signals, with real processes that are killed at any moment."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import xarray as xr
+
+from orchestrator.cases.case import BUILT_IN
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can be sent these signals there")
+
+EVENT = """
+[[events]]
+type = "load_change"
+time = "{time} s"
+component = "grid"
+load = "load_2"
+scale = {scale}
+"""
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    """The two areas, five events, one scenario with an FMU in a process of its own."""
+    text = (BUILT_IN / "two_area" / "case.toml").read_text(encoding="utf-8")
+    head, _, tail = text.partition("[[events]]")
+    tail = tail[tail.index("\n[") :]
+    times = ((0.5, 1.05), (1.7, 0.98), (1.7005, 0.97), (2.3333, 1.0), (2.6, 1.02))
+    events = "".join(EVENT.format(time=t, scale=s) for t, s in times)
+    head = head.replace('stop_time = "20 s"', 'stop_time = "3 s"')
+    path = tmp_path_factory.mktemp("case") / "events.toml"
+    path.write_text(f"{head}{events}{tail}", encoding="utf-8")
+    return path
+
+
+def started(tmp, *words):
+    call = [sys.executable, "-m", "orchestrator.cli", "run", *map(str, words)]
+    tmp.mkdir(exist_ok=True)
+    return subprocess.Popen(
+        call, env=os.environ | {"TMPDIR": str(tmp)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def finished(tmp, *words):
+    process = started(tmp, *words)
+    _, error = process.communicate(timeout=300)
+    assert process.returncode == 0, error
+    return error
+
+
+def values_of(folder):
+    """Every file of a run without the figures of its speed and the run's id."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir() or path.name == "manifest.json":
+            continue
+        if path.suffix == ".nc":
+            with xr.open_dataset(path) as data:
+                attributes = {key: value for key, value in data.attrs.items() if key != "run"}
+                found[name] = attributes, {str(n): data[n].values.tobytes() for n in data.variables}
+        elif path.name == "summary.json":
+            found[name] = json.loads(path.read_text(encoding="utf-8"))
+            for scenario in found[name]["scenarios"]:
+                del scenario["steps_per_second"], scenario["share_in_fmus"]
+        else:
+            found[name] = path.read_bytes()
+    return found
+
+
+WORDS = ("--scenario", "gfor", "--scenario", "pod_pq")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(case, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    begun = time.monotonic()
+    finished(folder / "tmp", case, *WORDS, "--out", folder / "out")
+    return values_of(folder / "out"), time.monotonic() - begun
+
+
+def stopped_at_random(process, folder, longest, number):
+    """Wait for the first checkpoint, and a little longer; send the signal."""
+    end = time.monotonic() + 120
+    while not list(folder.glob(".checkpoints/*.checkpoint")) and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.01)
+    time.sleep(random.uniform(0, 0.5 * longest))
+    process.send_signal(number)
+    return process.communicate(timeout=120)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attempt", range(5))
+def test_a_killed_run_goes_on_to_the_last_bit(case, undisturbed, tmp_path, attempt):
+    out = tmp_path / "out"
+    process = started(tmp_path / "tmp", case, *WORDS, "--out", out, "--checkpoint", "0.05")
+    stopped_at_random(process, out, undisturbed[1], signal.SIGKILL)
+    if process.returncode == -signal.SIGKILL and (out / ".checkpoints").exists():
+        finished(tmp_path / "tmp", "--resume", out)
+    assert values_of(out) == undisturbed[0]
+    assert not (out / ".checkpoints").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("attempt", range(3))
+def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(case, undisturbed, tmp_path, attempt):
+    out = tmp_path / "out"
+    process = started(tmp_path / "tmp", case, *WORDS, "--out", out, "--checkpoint", "0.05")
+    _, error = stopped_at_random(process, out, undisturbed[1], signal.SIGTERM)
+    assert list((tmp_path / "tmp").iterdir()) == []
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)
+    if process.returncode != 0:
+        assert process.returncode == 143, error
+        assert "ended by SIGTERM" in error
+        finished(tmp_path / "tmp", "--resume", out)
+    assert values_of(out) == undisturbed[0]
+
+
+@pytest.mark.slow
+def test_an_isolated_fmu_goes_on_in_a_new_process(case, tmp_path):
+    text = case.read_text(encoding="utf-8")
+    own = tmp_path / "isolated.toml"
+    own.write_text(text.replace("[components.gfor]\n", "[components.gfor]\nisolated = true\n"), encoding="utf-8")
+    assert own.read_text(encoding="utf-8") != text
+    finished(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", tmp_path / "whole")
+    out = tmp_path / "out"
+    process = started(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", out, "--checkpoint", "0.05")
+    _, error = stopped_at_random(process, out, 1.0, signal.SIGTERM)
+    assert process.returncode == 143, error
+    assert list((tmp_path / "tmp").iterdir()) == []
+    assert "gfor run --resume" in error
+    assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out)
+    assert values_of(out) == values_of(tmp_path / "whole")
+
+
+# -- what is asked -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "the case is missing: gfor run CASE"),
+        (("--resume", "{}"), "there is no interrupted run in it"),
+        (("two_area", "--resume", "{}"), "goes on with the run as it was asked for, so CASE cannot go with it"),
+        (("--resume", "{}", "--set", "a.b=1", "--no-csv"), "so --set, --no-csv cannot go with it"),
+        (("--resume", "{}", "--checkpoint", "0"), "so --checkpoint 0 cannot go with it"),
+    ],
+)
+def test_what_cannot_be_resumed_is_refused(gfor, tmp_path, words, said):
+    code, _, error = gfor("run", *(word.format(tmp_path) for word in words))
+    assert code == 2
+    assert said in " ".join(error.split())
+
+
+def test_a_request_that_cannot_be_read_is_refused(gfor, tmp_path):
+    (tmp_path / ".checkpoints").mkdir()
+    (tmp_path / ".checkpoints" / "request.json").write_text('{"case": 1')
+    code, _, error = gfor("run", "--resume", tmp_path)
+    assert code == 2
+    assert "cannot be read" in error
+    assert "start the run anew, without --resume" in " ".join(error.split())
+
+
+def test_a_run_that_came_to_its_end_leaves_nothing_to_resume(gfor, tmp_path):
+    code, _, _ = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    assert code == 0
+    assert not (tmp_path / ".checkpoints").exists()
+
+
+def test_fmus_without_serialised_states_are_named_or_refused(gfor, tmp_path, monkeypatch):
+    from orchestrator.study import checkpoints  # noqa: PLC0415
+
+    monkeypatch.setattr(checkpoints, "why_not_kept", lambda fmu: "it declares no canSerializeFMUstate")
+    words = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    code, _, error = gfor(*words)
+    assert code == 0
+    assert "if it is interrupted, it starts again at t = 0, because of component 'gfor' (" in error
+    code, _, error = gfor(*words, "--require-checkpoint")
+    assert code == 2
+    assert "leave --require-checkpoint out" in error
+    code, _, error = gfor(*words, "--checkpoint", "0")
+    assert (code, "interrupted" in error) == (0, False)
+
+
+def test_a_sigterm_after_all_was_done_does_not_change_the_exit_code():
+    end = "import atexit, os, sys; from orchestrator.cli import main; atexit.register(os.kill, os.getpid(), 15)"
+    call = [sys.executable, "-c", f"{end}; sys.argv[1:] = ['--version']; sys.exit(main())"]
+    assert subprocess.run(call, check=False, capture_output=True).returncode == 0
