@@ -1,8 +1,8 @@
 """Hooks of MkDocs: every page is a file of the repository, and links between files become links between pages.
 
-Pages are the Markdown files of this folder, the README and the packages' own leaflets. They stay where they are, and
-their links are those that work in the repository. A link to a file that is no page (a case file, a module) becomes the
-file's path.
+Pages are the Markdown files and notebooks of this folder, the README and the packages' own leaflets. They stay where
+they are, and their links are those that work in the repository. A link to a file that is no page (a case file, a
+module) becomes the file's path.
 """
 
 import argparse
@@ -15,6 +15,7 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from notebook_pages import as_markdown
 
 ROOT = Path(__file__).resolve().parents[1]
 LOG = logging.getLogger("mkdocs.hooks.gfor")
@@ -31,9 +32,12 @@ def repository_pages() -> dict[str, str]:
     found = {"README.md": "index.md"}
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*")):
-            if path.suffix in (".md", ".png") and "/." not in path.relative_to(ROOT / folder).as_posix():
+            kinds = (".md", ".ipynb", ".png")
+            if path.suffix in kinds and "/." not in path.relative_to(ROOT / folder).as_posix():
                 name = path.relative_to(ROOT).as_posix()
-                found[name] = name.removeprefix(".docs/")
+                site = name.removeprefix(".docs/").replace(".ipynb", ".md")
+                # A README would become the page of the section of `nav` that it stands in, not one of its entries.
+                found[name] = site.replace("/README.md", ".md")
     return found
 
 
@@ -42,9 +46,17 @@ ORIGIN = {site: name for name, site in PAGES.items()}
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add all pages, wherever they are in the repository."""
+    """Add all pages, wherever they are in the repository; notebooks with their pictures, and for download."""
     for name, site in PAGES.items():
-        files.append(File.generated(config, site, abs_src_path=str(ROOT / name)))
+        path = ROOT / name
+        if path.suffix != ".ipynb":
+            files.append(File.generated(config, site, abs_src_path=str(path)))
+            continue
+        text, pictures = as_markdown(path)
+        files.append(File.generated(config, site, content=text))
+        files.append(File.generated(config, site.replace(".md", ".ipynb"), abs_src_path=str(path)))
+        for picture, content in pictures.items():
+            files.append(File.generated(config, f"{posixpath.dirname(site)}/{picture}", content=content))
     return files
 
 
@@ -54,20 +66,36 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     text = markdown.replace("```sh first-run", "```sh").replace("<!-- commands -->", commands())
     text = FILE_MARK.sub(lambda found: f'```{found[3]} title="{found[2]}"\n', text)
     inside, listed, lines = False, False, []
-    for line in text.splitlines():
+    for line in _with_links(text, name, page.file.src_uri).splitlines():
         if NUMBERED.match(line) and listed and lines[-1].strip():
             lines.append("")
         listed = bool(NUMBERED.match(line)) or (listed and line[:1] in ("", " "))
         if FENCE.match(line):
             inside = not inside
-        shown = line if inside else LINK.sub(lambda found: _link(found, name, page.file.src_uri), line)
-        lines.append(f" {shown}" if listed and line.startswith("   ") else shown)
+        lines.append(f" {line}" if listed and line.startswith("   ") else line)
+    if name.endswith(".ipynb"):
+        notebook = Path(name).name
+        lines.insert(1, f'\n[Download this notebook]({notebook}){{ download="{notebook}" }}')
     return "\n".join(lines)
+
+
+def _with_links(text: str, name: str, site: str) -> str:
+    """The text with the site's links outside of fenced blocks; a link may go over two lines."""
+    parts: list[list[str]] = [[]]
+    for line in text.splitlines():
+        if FENCE.match(line):
+            parts.append([])
+        parts[-1].append(line)
+    for k in range(0, len(parts), 2):  # every second part begins with the end of a block
+        fence = parts[k][:1] if k else []
+        prose = "\n".join(parts[k][len(fence) :])
+        parts[k] = [*fence, LINK.sub(lambda found: _link(found, name, site), prose)]
+    return "\n".join("\n".join(part) for part in parts)
 
 
 def _link(found: re.Match[str], name: str, site: str) -> str:
     picture, text, target = found.groups()
-    if re.match(r"[a-z]+:|#", target):
+    if re.match(r"[a-z]+:|#", target) or (picture and name.endswith(".ipynb")):
         return found.group()
     path, _, anchor = target.partition("#")
     wanted = posixpath.normpath(posixpath.join(posixpath.dirname(name), path))
@@ -100,9 +128,9 @@ def _command(name: str, words: str) -> str:
             shown += f" {value}"
         text = (action.help or "").replace("%%", "%").replace("|", "\\|").replace("<", "&lt;")
         rows.append(f"| `{shown.replace('|', '/')}` | {text} |")
-    usage = parser.format_usage().removeprefix("usage: ").rstrip()
+    usage = "\n".join(line[len("usage: ") :] for line in parser.format_usage().rstrip().splitlines())
     return f"## `gfor {name}`\n\n{words[0].upper()}{words[1:]}.\n\n```text\n{usage}\n```\n\n" + "\n".join(rows)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:
-    return argparse.HelpFormatter(prog, width=100)
+    return argparse.HelpFormatter(prog, width=90)

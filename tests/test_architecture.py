@@ -15,11 +15,12 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
     ("orchestrator.arrays", "orchestrator.errors", "orchestrator.units"),
-    ("orchestrator.toml_files",),
+    ("orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),
     ("orchestrator.analysis", "orchestrator.cases"),
+    ("orchestrator.federation",),
     ("orchestrator.results", "orchestrator.points", "orchestrator.interop", "orchestrator.watch"),
     ("orchestrator.report",),
     ("orchestrator.study",),
@@ -134,6 +135,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
     borrowers = {
         "orchestrator.black_box.bench",
         "orchestrator.coupling.loop",
+        "orchestrator.coupling.wire_bank",
         "orchestrator.fmi.bound",
         "orchestrator.fmi.fmi3",
         "orchestrator.fmi.mailbox",
@@ -145,12 +147,12 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return True
         if b in PLAIN_DATA:
             return True
-        if b == "fmus.toolchain.extras":
-            return True  # says which library is missing
+        if b in ("fmus.toolchain.extras", "fmus.toolchain.removal", "fmus.toolchain.temporary"):
+            return True  # the first says which library is missing
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
-        if a == "orchestrator.fmi.instance":
-            return b == "fmus.toolchain.cache"  # what was built here is ours
+        if a in ("orchestrator.fmi.instance", "orchestrator.ssp.archive"):
+            return b == "fmus.toolchain.cache"  # what was built or unpacked here, and is intact, is trusted
         return within(a, *importers) and not within(b, "gfor_fmu")
 
     assert not breaches(allowed)
@@ -215,11 +217,41 @@ def test_there_is_no_cycle():
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),
         ("pint", {"orchestrator.units"}),
+        ("helics", {"orchestrator.federation.helics_calls"}),
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
     found = {name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree))}
     assert found == users
+
+
+ON_THE_FACE = {
+    "build": {"api.models.build", "api.models.catalogue_model"},
+    "check": {"api.acceptance.check"},
+    "compare": {"api.comparison.compare"},
+    "design": {"api.design.design_controller"},
+    "identify": {"api.identification.identify"},
+    "info": {"api.fmu.info"},
+    "linearize": {"cli.case_arguments.chosen"},
+    "modes": {"cli.case_arguments.chosen"},
+    "run": {"cli.case_arguments.chosen"},
+    "sweep": {"api.sweep.plan", "api.sweep.compute"},
+}
+"""Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
+
+COMPUTING = {
+    *("acceptance.runner.check_fmu", "pod_design.design.design_pod", "study.comparison.compare"),
+    *("study.comparison.strongest_modes", "study.linear.linear_model", "study.modes.compute_modes"),
+    *("study.run.run_scenario", "sweep.sweep.plan_sweep", "sweep.sweep.run_sweep"),
+}
+"""Functions that the face wraps: a command that called one itself would hold a copy of the face's logic."""
+
+
+@pytest.mark.parametrize("command", sorted(ON_THE_FACE))
+def test_a_command_is_written_on_the_face(command):
+    names = {name.removeprefix("orchestrator.") for name in imported_names(MODULES[f"orchestrator.cli.{command}"])}
+    assert names >= ON_THE_FACE[command]
+    assert not names & COMPUTING
 
 
 def test_only_the_command_line_reads_options():

@@ -50,7 +50,15 @@ def test_the_changelog_counts_what_there_is():
 def test_the_changelog_names_commands_models_and_cases_that_exist():
     text = CHANGELOG[NEWEST.start() :]
     assert set(re.findall(r"`gfor ([a-z][\w-]*)", text)) <= set(COMMANDS)
-    assert set(COMMANDS) - {"info"} <= set(re.findall(r"`gfor ([a-z][\w-]*)", text))
+    assert set(COMMANDS) - {"info"} <= set(re.findall(r"`gfor ([a-z][\w-]*)", CHANGELOG))
     assert {"gfor", "gfor_abc", "gfor_phasor", "infinite_bus"} <= set(model_names())
     for case in (path.parent.name for path in BUILT_IN.glob("*/case.toml")):
         assert f"`{case}`" in text
+
+
+def test_nothing_lies_at_the_top_that_has_no_place_there():
+    """A test or a command that writes into the working directory leaves its file here, and it is soon committed."""
+    kept = {"CHANGELOG.md", "CITATION.cff", "LICENSE", "README.md", "pyproject.toml"}
+    done = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    files = {name for name in done.stdout.splitlines() if "/" not in name and not name.startswith(".")}
+    assert files <= kept

@@ -23,8 +23,8 @@ COUNT = 20_000_000
 
 def sweep(points: int, executor: str, folder: str) -> None:
     """Print the seconds of a sweep's points; run by ``python -c``, so that all imports count in the whole."""
+    from orchestrator.api.executors import choose_executor  # noqa: PLC0415
     from orchestrator.cases.case import load_case  # noqa: PLC0415
-    from orchestrator.cli.executors import choose_executor  # noqa: PLC0415
     from orchestrator.points.store import PointStore  # noqa: PLC0415
     from orchestrator.sweep.axes import parse_vary  # noqa: PLC0415
     from orchestrator.sweep.sweep import plan_sweep, run_sweep  # noqa: PLC0415

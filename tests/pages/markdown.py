@@ -12,10 +12,15 @@ A comment on the line before a fence says what a test does with the block:
     it is inserted after the first line that holds TEXT.
 ``<!-- replace: PATH | TEXT -->``
     it stands in place of the first line that holds TEXT.
+
+A notebook is read as the page that it becomes: each code cell is a block of Python, of shell commands (``!gfor …``), or
+of a file's text (``%%writefile``).
 """
 
+import json
 import re
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -29,8 +34,30 @@ def pages() -> list[Path]:
     """README, changelog, pages of the site, leaflets of the packages."""
     found = [ROOT / "README.md", ROOT / "CHANGELOG.md"]
     for folder in FOLDERS:
-        found += sorted(p for p in (ROOT / folder).rglob("*.md") if "/." not in p.relative_to(ROOT / folder).as_posix())
+        files = (p for p in (ROOT / folder).rglob("*") if p.suffix in (".md", ".ipynb"))
+        found += sorted(p for p in files if "/." not in p.relative_to(ROOT / folder).as_posix())
     return found
+
+
+def text_of(page: Path) -> str:
+    """Markdown of a page; that of a notebook has its code cells as fenced blocks, and no outputs."""
+    text = page.read_text(encoding="utf-8")
+    if page.suffix != ".ipynb":
+        return text
+    cells = [("".join(cell["source"]), cell["cell_type"]) for cell in json.loads(text)["cells"]]
+    return "\n".join(source if kind == "markdown" else _fenced(source) for source, kind in cells)
+
+
+def _fenced(source: str) -> str:
+    """A code cell as blocks: what it writes, or Python and the commands of the shell in it, in order."""
+    if written := re.match(r"%%writefile (\S+)\n", source):
+        language = Path(written[1]).suffix.removeprefix(".")
+        return f"<!-- file: {written[1]} -->\n```{language}\n{source[written.end() :]}\n```\n"
+    blocks = []
+    for shell, lines in groupby(source.splitlines(), key=lambda line: line.startswith("!")):
+        inside = "\n".join(line.removeprefix("!") for line in lines)
+        blocks.append(f"```{'sh' if shell else 'python'}\n{inside}\n```\n")
+    return "".join(blocks)
 
 
 def name_of(page: Path) -> str:
@@ -45,7 +72,7 @@ class Block:
     Attributes
     ----------
     line
-        Of its first fence.
+        Of its first fence; in a notebook that of the text which `text_of` gives.
     language
         The first word behind it.
     kind, path, text_of_line
@@ -67,7 +94,7 @@ class Block:
 
 def blocks(page: Path) -> list[Block]:
     """All fenced blocks of a page, in order."""
-    found, lines = [], page.read_text(encoding="utf-8").splitlines()
+    found, lines = [], text_of(page).splitlines()
     k = 0
     while k < len(lines):
         opened = _FENCE.match(lines[k])
@@ -88,7 +115,7 @@ def blocks(page: Path) -> list[Block]:
 def prose(page: Path) -> list[str]:
     """Lines outside of fenced blocks; inside they are empty."""
     inside, lines = False, []
-    for line in page.read_text(encoding="utf-8").splitlines():
+    for line in text_of(page).splitlines():
         fence = line.strip().startswith("```")
         lines.append("" if inside or fence else line)
         inside ^= fence
@@ -97,7 +124,8 @@ def prose(page: Path) -> list[str]:
 
 def links(page: Path) -> list[tuple[int, str]]:
     """Line and target of every link outside of fenced blocks."""
-    return [(k, target) for k, line in enumerate(prose(page), start=1) for target in _LINK.findall(line)]
+    text = "\n".join(prose(page))
+    return [(1 + text.count("\n", 0, found.start()), found[1]) for found in _LINK.finditer(text)]
 
 
 def anchors(page: Path) -> set[str]:
@@ -111,9 +139,9 @@ def anchors(page: Path) -> set[str]:
 
 
 def commands(block: Block) -> list[str]:
-    """The single commands of a shell block: without comments, and parted at ``&&``."""
+    """The single commands of a shell block: without comments and ``> file``, and parted at ``&&``."""
     found = []
     for line in block.text.replace("\\\n", " ").splitlines():
-        text = re.sub(r"(^|\s)#.*", "", line).strip()
+        text = re.sub(r"(^|\s)#.*|\s> \S+$", "", line).strip()
         found += [part.strip() for part in text.split("&&") if part.strip()]
     return found

@@ -12,7 +12,7 @@ from orchestrator import cli
 from tests.pages.markdown import ROOT, blocks, commands, name_of, pages
 
 PAGES = [page for page in pages() if blocks(page)]
-OTHERS = {"cd", "git", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest", "ruff"}
+OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest", "ruff"}
 """Commands that pages use beside ``gfor`` and ``python``."""
 ADDED = {"least-damped"}
 """Commands of ``gfor`` that a guide adds."""
@@ -66,7 +66,8 @@ def test_files_in_blocks_read(page):
 
 
 def runs(block):
-    return block.language == "python" and not block.kind
+    """Whether it is run here; notebooks are executed by `test_notebooks.py`."""
+    return block.language == "python" and not block.kind and block.page.suffix == ".md"
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if any(map(runs, blocks(p)))], ids=name_of)

@@ -1,4 +1,4 @@
-"""Guides and tutorials, executed as they are written: files are made and changed, commands run."""
+"""Guides, executed as they are written: files are made and changed, commands run."""
 
 import os
 import shutil
@@ -13,10 +13,7 @@ from tests.pages.markdown import ROOT, blocks
 
 DOCS = ROOT / ".docs"
 IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study")
-ANYWHERE = (
-    *("first-steps", "how-to/use-your-own-fmu", "how-to/black-box"),
-    *("tutorials/paper", "tutorials/your-network", "tutorials/vendor-fmu", "tutorials/pod-design"),
-)
+ANYWHERE = ("first-steps", "how-to/use-your-own-fmu", "how-to/black-box")
 SECONDS = 1800.0
 
 
