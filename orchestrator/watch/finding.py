@@ -18,7 +18,8 @@ UNSTABLE: frozenset[Kind] = frozenset(
         "failure",
     }
 )
-"""Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may be."""
+"""Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
+be, or the run ends too early after an event."""
 
 
 @dataclass(frozen=True, slots=True)

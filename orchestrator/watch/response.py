@@ -69,8 +69,8 @@ CLEAN = 0.15
 that noise excites wanders in amplitude and phase, and leaves more."""
 
 FAR_ABOVE, _RISING = 10.0, 1.3
-"""In a stretch with noise, a swing of any other shape is reported if it rises by the first factor from the first to the
-last quarter of the judged part, and by the second one at least from each quarter to the next."""
+"""A swing of any other shape grows if it rises by the first factor from the first to the last quarter of the judged
+part, and by the second one at least from each quarter to the next. With noise only such a swing is reported."""
 
 _SMOOTHEST = 3
 """Number of signals in which a clean oscillation is searched in a stretch with noise: those that noise moves least."""
@@ -139,9 +139,9 @@ def unsettled_response(
     """
     seen = seen.until(stretch.end)
     first = int(np.searchsorted(seen.times, stretch.begin))
-    begin = stretch.begin + (stretch.end - stretch.begin) / 4
-    if (seen.times >= begin).sum() < FEWEST_LOOKS:
+    if not enough_looks(seen, stretch):
         return []
+    begin = _judged_from(stretch)
     times = seen.times[first:]
     slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
@@ -157,6 +157,17 @@ def unsettled_response(
         return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
     told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
     return told or _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
+
+
+def enough_looks(seen: Seen, stretch: Stretch) -> bool:
+    """Whether the judged part of a stretch has the looks that any judgement needs."""
+    judged = (seen.times >= _judged_from(stretch)) & (seen.times <= stretch.end * (1 + 1e-12))
+    return int(judged.sum()) >= FEWEST_LOOKS
+
+
+def _judged_from(stretch: Stretch) -> float:
+    """Where the last three quarters begin [s]."""
+    return stretch.begin + (stretch.end - stretch.begin) / 4
 
 
 def _told(
@@ -381,12 +392,14 @@ def _sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stret
 def _irregular(swing: Swing, unit: str, stretch: Stretch) -> Finding:
     amplitude, since = float(np.sqrt(2)) * swing.size * swing.scale, _since(swing, None)
     fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
+    grows = _rises(swing)
     message = (
-        f"the response does not settle: from t = {since:.4g} s to {_end(stretch)} {_shown(swing.name)} swings by about "
-        f"{amplitude:.3g} {unit}, at no single frequency{fast}"
+        f"the response {'grows' if grows else 'does not settle'}: from t = {since:.4g} s to {_end(stretch)} "
+        f"{_shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
     )
+    kind: Kind = "growing_oscillation" if grows else "sustained_oscillation"
     figures = {"amplitude": amplitude}
-    return Finding("sustained_oscillation", since, *_place(swing.name), message, _until(stretch), figures)
+    return Finding(kind, since, *_place(swing.name), message, _until(stretch), figures)
 
 
 def _finding(

@@ -14,12 +14,13 @@ from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
-from orchestrator.watch.finding import Finding, Kind
+from orchestrator.watch.finding import UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
-from orchestrator.watch.response import resting_signals, unsettled_response
+from orchestrator.watch.response import enough_looks, resting_signals, unsettled_response
 from orchestrator.watch.run_away import run_away, speed_signals
 from orchestrator.watch.seen import Seen, Watcher, look_every
 from orchestrator.watch.settings import Settings
+from orchestrator.watch.short_stretches import is_short, too_short
 from orchestrator.watch.stretches import Stretch, stretches
 from orchestrator.watch.synchronism import angle_signals, lost_synchronism
 from orchestrator.watch.undisturbed import undisturbed_motion
@@ -81,13 +82,22 @@ class Watch:
             As `Master` has them.
         """
         seen = self._watcher.seen(self.recorder if self._looks_at_records else None)
-        told = judged(seen, self._prepared.system, self._prepared.events) if len(seen.times) > 1 else ()
+        whole = failure is None
+        told = judged(seen, self._prepared.system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
         found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), told)
         return sorted(found, key=lambda finding: finding.time)
 
 
-def judged(seen: Seen, system: System, events: Sequence[Event]) -> list[Finding]:
-    """All findings from the signals."""
+def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool = True) -> list[Finding]:
+    """All findings from the signals.
+
+    Parameters
+    ----------
+    seen, system, events
+        What was seen of the run, what ran, and what happened in it.
+    whole
+        Whether the run came to its end; of one that did not, nobody asks whether it settles.
+    """
     settings = Settings(system, events, seen.times)
     end = float(seen.times[-1])
     happened = [time for time in settings.effective_times() if time < end]
@@ -109,15 +119,29 @@ def judged(seen: Seen, system: System, events: Sequence[Event]) -> list[Finding]
     units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
     responses = _Responses(seen, system, units, disturbances(system, events, end))
     told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
-    return [*found, *told, *not_judged(responses.masked)]
+    if happened and not enough_looks(seen, parts[-1]):
+        responses.short.append(parts[-1])
+    found = [*found, *told, *not_judged(responses.masked)]
+    if whole and not any(finding.kind in UNSTABLE for finding in found):
+        found += too_short(responses.short)
+    return found
 
 
 class _Responses:
-    """Findings stretch by stretch; ``masked`` has the stretches whose motion may come from noise, with its sources."""
+    """Findings stretch by stretch.
+
+    Attributes
+    ----------
+    masked
+        The stretches whose motion may come from noise, with its sources.
+    short
+        The stretches whose motion may decay after they end.
+    """
 
     def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
+        self.short: list[Stretch] = []
 
     def found(self, part: Stretch) -> list[Finding]:
         """Findings in a stretch as a whole, or, if it shows no findings, between its unnoticed events."""
@@ -130,7 +154,12 @@ class _Responses:
         found = unsettled_response(self._seen, self._system, part, self._units, noisy=bool(acting))
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
             self.masked[part] = acting
-        return found
+        if not is_short(part):
+            return found
+        growing = [finding for finding in found if finding.kind == "growing_oscillation"]
+        if told and growing != found:
+            self.short.append(part)
+        return growing
 
 
 def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
