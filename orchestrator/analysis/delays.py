@@ -137,15 +137,35 @@ def transport(delay: float) -> tuple[Matrix, Matrix, Matrix]:
 
 
 def representation_error(link: WireLink, eigenvalue: complex, step_size: float | None) -> float:
-    """How far a model's delay is from the true one at an eigenvalue [rad/s], as a part of it."""
+    """How far a model's delay is from the true one at an eigenvalue [rad/s], as a part of it; infinite where the
+    true one is beyond any number.
+    """
     if step_size is None:
-        line, at, true = continuous_line(link.delay), eigenvalue, np.exp(-eigenvalue * link.delay)
+        line, at = continuous_line(link.delay), eigenvalue
     else:
         line, at = delay_line(link.delay, step_size), np.exp(eigenvalue * step_size)
-        true = np.exp(-eigenvalue * link.delay)
     n = len(line.A)
     given = (line.C @ np.linalg.solve(at * np.eye(n) - line.A, line.B))[0, 0] + line.d
-    return float(abs(given / true - 1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(abs(given * np.exp(eigenvalue * link.delay) - 1))
+    return error if np.isfinite(error) else np.inf
+
+
+def highest_hz(link: WireLink, step_size: float | None) -> float:
+    """Frequency [Hz] up to which a linear model has the delay; infinite where it is exact."""
+    exact = not link.delay or (step_size is not None and link.delay <= SHORT * step_size)
+    return np.inf if exact else ORDER / (2 * np.pi * link.delay)
+
+
+def too_long(links: Iterable[WireLink], top_hz: float, step_size: float | None) -> list[str]:
+    """Delays that the linear model does not have up to the range's top [Hz], in words."""
+    return [
+        f"connection {link.name}: the linear model has the delay of {link.delay:g} s up to {bound:.3g} Hz; what it "
+        f"shows from there to {top_hz:g} Hz are not the system's modes, and others may be missing; simulate, or take a "
+        "--range that ends there"
+        for link in links
+        if (bound := highest_hz(link, step_size)) < top_hz
+    ]
 
 
 def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], step_size: float | None) -> list[str]:
@@ -156,9 +176,10 @@ def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], s
         errors = [representation_error(link, value, step_size) for value in values] if link.delay else []
         if errors and not max(errors) <= LARGEST_ERROR:
             value = values[int(np.argmax(errors))]
+            size = f"wrong by {100 * max(errors):.2g} %" if max(errors) < 1 else "altogether wrong"
             said.append(
-                f"connection {link.name}: the linear model has the delay of {link.delay:g} s wrong by "
-                f"{100 * max(errors):.2g} % at the eigenvalue {value:.4g} rad/s; look at that mode by simulation"
+                f"connection {link.name}: the linear model has the delay of {link.delay:g} s {size} at the eigenvalue "
+                f"{value:.4g} rad/s; look at that mode by simulation"
             )
     return said
 

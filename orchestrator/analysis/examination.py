@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from orchestrator.analysis.coupled_response import confirmed
-from orchestrator.analysis.delays import doubtful_delays, warnings_of
+from orchestrator.analysis.delays import LARGEST_ERROR, doubtful_delays, representation_error, too_long, warnings_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearity import Doubt, doubts
 from orchestrator.analysis.linearization import Blocks
@@ -73,13 +73,27 @@ def examine(
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     shown = modes if shown is None else shown
     eigenvalues = [mode.eigenvalue for mode in [*shown, *rightmost]]
-    wires = (*warnings_of(master), *doubtful_delays(blocks.links.values(), eigenvalues, model.step_size))
+    links = blocks.links.values()
+    long = too_long(links, frequency_range[1], model.step_size)
+    wires = (*warnings_of(master), *long, *doubtful_delays(links, eigenvalues, model.step_size))
+    if long and not (stability.stable is False and _has_delays(blocks, model, rightmost)):
+        stability = replace(stability, stable=None, reason="; ".join(long))
     if turning := _turning(blocks, master, model, stability, found, rightmost):
         stability = replace(stability, stable=None, reason="; ".join(map(str, turning)))
         found = [doubt for doubt in found if doubt not in turning]
         return Examination(stability, (*verdict_warnings(stability), *map(str, found), *wires))
     step = check_resolution(master, model, system, shown, frequency_range, stability)
     return Examination(stability, (*step, *map(str, found), *wires))
+
+
+def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bool:
+    """Whether the model has all delays right at these modes."""
+    return all(
+        representation_error(link, mode.eigenvalue, model.step_size) <= LARGEST_ERROR
+        for link in blocks.links.values()
+        if link.delay
+        for mode in modes
+    )
 
 
 def _turning(

@@ -11,6 +11,7 @@ import numpy as np
 from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.arrays import Matrix
+from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.errors import AnalysisError
@@ -88,10 +89,13 @@ def find_operating_point(
     tolerance *= min(1.0, master.clock.step_size / _SHORT)  # the same drift is accepted however short the step is
     if not residual <= tolerance:
         worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
-        raise AnalysisError(
-            f"no steady state found: {_newton_in_words(iterations)} a communication step changes {worst}, more than "
-            f"{tolerance:g}; {what_to_check(master)}"
-        )
+        changes = f"{_newton_in_words(iterations)} a communication step changes {worst}, more than {tolerance:g}"
+        if present := described(master.system.wires):
+            raise AnalysisError(
+                f"no steady state found with {'; '.join(present)}: leave it out, or let it begin later, as an event "
+                f"([[events]] with a time); {changes}"
+            )
+        raise AnalysisError(f"no steady state found: {changes}; {what_to_check(master)}")
     values = dict(zip(names, x.tolist(), strict=True))
     return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
 

@@ -57,7 +57,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             continue
         if table.time >= stop:
             _note_late(draft, table.time, stop, where)
-        for event in _all_events_of(draft, table, clock, where):
+        for event in _all_events_of(draft, table, clock, stop, where):
             checked = event if isinstance(event, Fault) else _checked(draft, event, fed, where)
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
                 events.append((checked, where))
@@ -85,9 +85,9 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
         draft.questions.append(Problem(where, f"{text} (--stop)"))
 
 
-def _all_events_of(draft: Draft, table: EventTable, clock: Clock, where: str) -> list[Event]:
+def _all_events_of(draft: Draft, table: EventTable, clock: Clock, stop: float, where: str) -> list[Event]:
     if isinstance(table, WireEventTable):
-        return wire_events(draft, table, clock, where)
+        return wire_events(draft, table, clock, stop, where)
     if isinstance(table, ComponentFaultTable):
         return component_events(draft, table, where)
     return _events_of(draft, table, where)

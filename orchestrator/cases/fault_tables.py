@@ -1,11 +1,19 @@
 """Faults among a case file's events: what they do to connections and components, and which cannot stand together."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of
-from orchestrator.cases.schema import ComponentFaultTable, ComponentTripTable, TimeOutTable, WireEventTable
+from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of, note_long_delay
+from orchestrator.cases.schema import (
+    ComponentFaultTable,
+    ComponentTripTable,
+    DelayTable,
+    EventTable,
+    NanOutputTable,
+    TimeOutTable,
+    WireEventTable,
+)
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     Event,
@@ -17,13 +25,14 @@ from orchestrator.coupling.events import (
     WireRecovery,
 )
 from orchestrator.coupling.imperfections import DropOut
+from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
 from orchestrator.fmi.instance import is_isolated
 
 _BREAKER = "connected"
 
 
-def wire_events(draft: Draft, table: WireEventTable, clock: Clock, where: str) -> list[Event]:
+def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
     """What an imperfection that begins at a time, and may end, does to every connection that is meant.
 
     Parameters
@@ -34,6 +43,8 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, where: str) -
         The imperfection with its times.
     clock
         Whose communication points the times must be.
+    stop
+        End of the run [s]; a delay that lasts beyond it is noted.
     where
         Place of the table in the file.
     """
@@ -48,6 +59,8 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, where: str) -
         except InputError as error:
             draft.note(where, str(error))
             return []
+    if isinstance(table, DelayTable):
+        note_long_delay(draft, table.delay, stop, where)
     events: list[Event] = []
     for connection in connections_meant(draft, table.connection, where):
         imperfection = imperfection_of(draft, table, connection, clock, where)
@@ -84,6 +97,16 @@ def component_events(draft: Draft, table: ComponentFaultTable, where: str) -> li
         draft.note(where, f"component {name!r} feeds nothing, so that nobody would notice what its outputs are")
         return []
     return [NotANumber(table.time, name)]
+
+
+def component_faults(tables: Iterable[EventTable], system: System) -> list[str]:
+    """Which components fail later, in words; those that a scenario removes do not."""
+    words = {ComponentTripTable: "trips", NanOutputTable: "gives no numbers", TimeOutTable: "answers no more"}
+    return [
+        f"component {table.component!r} {words[type(table)]} at t = {table.time:g} s"
+        for table in tables
+        if isinstance(table, ComponentFaultTable) and table.component in system.components
+    ]
 
 
 def _trip(draft: Draft, table: ComponentTripTable, where: str) -> list[Event]:

@@ -24,7 +24,7 @@ from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfection, Noise, Quantisation
 from orchestrator.coupling.system import Connection, System
 from orchestrator.coupling.wire_bank import whole_steps
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.toml_files import fault_of
 
@@ -40,13 +40,25 @@ def sets_imperfection(key: str) -> bool:
     return key.partition(".")[0] == KEY
 
 
-def disturb_connections(draft: Draft, clock: Clock) -> dict[str, float | bool]:
-    """Give the connections what the case and the scenario say of them; the numbers that were given, by key."""
+def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, float | bool]:
+    """Give the connections what the case and the scenario say of them; the numbers that were given, by key.
+
+    Parameters
+    ----------
+    draft
+        Takes the system and the notes.
+    clock
+        Delays are whole steps of it.
+    stop
+        End of the run [s]; a delay that lasts beyond it is noted.
+    """
     given: dict[str, float | bool] = {}
     tables = {name: (table, draft.place(KEY, name)) for name, table in draft.case.imperfections.items()}
     for name, table in draft.scenario.imperfections.items():
         tables[name] = table, draft.place("scenarios", draft.name, KEY, name)
     for name, (table, where) in _overridden(draft, tables).items():
+        if isinstance(table, DelayTable):
+            note_long_delay(draft, table.delay, stop, where)
         for connection in connections_meant(draft, table.connection, where):
             imperfection = imperfection_of(draft, table, connection, clock, where)
             if imperfection is None:
@@ -59,6 +71,27 @@ def disturb_connections(draft: Draft, clock: Clock) -> dict[str, float | bool]:
             except InputError as error:
                 draft.note(where, str(error))
     return given
+
+
+def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None:
+    """A delay after which nothing arrives before the run ends: a mistake, or worth a word if the run was cut short.
+
+    Parameters
+    ----------
+    draft
+        Takes the note.
+    delay, stop
+        How late a value is, and the end of the run [s].
+    where
+        Place in the file.
+    """
+    if delay < stop:
+        return
+    text = f"delay = {delay:g} s, but the run ends at {stop:g} s: nothing that is sent in it arrives"
+    if stop == draft.case.solver.stop_time:
+        draft.note(where, f"{text}; give a shorter delay, or the run a later solver.stop_time")
+    else:
+        draft.questions.append(Problem(where, f"{text} (--stop)"))
 
 
 def _overridden(

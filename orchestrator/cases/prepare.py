@@ -161,7 +161,7 @@ class Preparer:
             tell_step(draft.system, clock.step_size)
         stop = stop_time if stop_time is not None else draft.case.solver.stop_time
         self._check_length(clock, stop)
-        imperfections = disturb_connections(draft, clock) if clock is not None else {}
+        imperfections = disturb_connections(draft, clock, stop) if clock is not None else {}
         events = scenario_events(draft, clock, stop)
         schedule = self._schedule()
         references = references_of(draft, imperfections)

@@ -25,6 +25,7 @@ from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spe
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master, open_plan
@@ -202,6 +203,8 @@ def modes_from(
     )
     stability = examined.stability
     analysis = prepared.case.table.analysis
+    own = prepared.case.scenarios[prepared.name].events
+    failing = component_faults(prepared.case.table.events if own is None else own, prepared.system)
     return ModesResult(
         prepared=prepared,
         operating_point=point,
@@ -212,6 +215,7 @@ def modes_from(
         warnings=(
             *map(str, prepared.questions),
             *examined.warnings,
+            *(f"{fault}: the modes are those before it" for fault in failing),
         ),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),

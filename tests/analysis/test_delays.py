@@ -5,7 +5,7 @@ import pytest
 from scipy.special import lambertw
 
 from orchestrator.analysis.coupled_response import worst_disagreement
-from orchestrator.analysis.delays import SHORT, WireLink, representation_error
+from orchestrator.analysis.delays import SHORT, WireLink, doubtful_delays, representation_error
 from orchestrator.analysis.examination import examine
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import eigenvalues
@@ -84,6 +84,30 @@ def test_the_continuous_delay_gives_the_roots_of_the_transcendental_equation():
     for branch in range(-3, 3):
         root = lambertw(K * delay, branch) / delay  # λ = K·exp(−λ·T)
         assert np.abs(found - root).min() < 1e-6 * abs(root)
+
+
+@pytest.mark.parametrize(("delay", "stable"), [(1.0, True), (20.0, None)])
+def test_a_range_beyond_the_delay_gives_no_verdict(delay, stable):
+    """ẋ = K·x(t − T) is stable for |K|·T < π/2; 24 / (2π·20 s) = 0.19 Hz is less than the range's 2 Hz."""
+    system = System()
+    system.add("x", small_fmu("integrator"), {"gain": -0.01})
+    system.connect("x.y", "x.u")
+    system.disturb(system.connections[0], Delay(delay))
+    with Master(system, LOOP, 0.01) as master:
+        blocks = Blocks(master, derivatives=True)
+        examined = examine(master, blocks, compose(blocks, LOOP), None)
+    assert examined.stability.stable is stable
+    assert bool(examined.warnings) == (stable is None)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("eigenvalue", [-19.5 + 3.3j, -1e3 + 0j, 1e3 + 2j])
+def test_an_error_beyond_all_numbers_is_an_error(eigenvalue):
+    """e^(1950) is no number; the delay must be said to be wrong all the same."""
+    link = WireLink("a.y -> b.u", 100.0, is_cut=False)
+    assert representation_error(link, eigenvalue, 1e-4) > 0.9
+    (said,) = doubtful_delays([link], [-0.1 + 0.05j, eigenvalue], 1e-4)
+    assert f"at the eigenvalue {eigenvalue:.4g}" in said
 
 
 def test_the_representation_knows_its_error():

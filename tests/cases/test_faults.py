@@ -7,11 +7,11 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.cli import main
 from orchestrator.coupling.events import NotANumber, Silence, UnitSwitching, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Noise, Quantisation
-from orchestrator.errors import CaseError
+from orchestrator.errors import AnalysisError, CaseError
 from orchestrator.interop.masters import MASTERS
 from orchestrator.study.like import run_like
 from orchestrator.study.linear import linear_response
-from orchestrator.study.modes import running
+from orchestrator.study.modes import compute_modes, running
 from orchestrator.study.run import run_scenario
 from orchestrator.watch.settings import Settings
 
@@ -248,3 +248,45 @@ def test_many_events_are_read_without_looking_through_all_of_them_for_each(tmp_p
     said = problems(case_with(tmp_path, "", off), stop_time=3.0)
     assert len(said.splitlines()) == 202
     assert "more problems" in said.splitlines()[-1]
+
+
+# -- what modes can say of them --------------------------------------------------------------------
+
+
+def test_a_later_trip_is_named_by_the_modes(tmp_path):
+    case = case_with(tmp_path, "", event("component_trip", 'component = "gfor"', "5 s", ""))
+    said = "component 'gfor' trips at t = 5 s: the modes are those before it"
+    assert said in compute_modes(prepare(case)).warnings
+    assert not any("trips" in text for text in compute_modes(prepare(case, "base")).warnings)  # it has no converter
+
+
+def test_a_permanent_loss_without_a_steady_state_is_named_first(tmp_path):
+    table = '[imperfections.lost]\ntype = "drop_out"\nconnection = "grid.*.v_* -> gfor.v_*"\nsubstitute = "zero"'
+    with pytest.raises(AnalysisError) as caught:
+        compute_modes(prepare(case_with(tmp_path, table)))
+    assert str(caught.value).startswith(f"no steady state found with {V_RE}: lost, replaced by 0; grid.")
+    assert "as an event" in str(caught.value)
+    assert "start values" not in str(caught.value)
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_a_delay_as_long_as_the_run_is_refused(tmp_path, events):
+    rest = 'delay = "20 s"'
+    table = "" if events else f'[imperfections.late]\ntype = "delay"\nconnection = "{V_RE}"\n{rest}'
+    case = case_with(tmp_path, table, event("delay", rest) if events else "")
+    text = problems(case)
+    assert "delay = 20 s, but the run ends at 20 s: nothing that is sent in it arrives; give a shorter delay" in text
+
+
+def test_a_delay_beyond_a_shorter_stop_is_asked_about(tmp_path):
+    table = f'[imperfections.late]\ntype = "delay"\nconnection = "{V_RE}"\ndelay = 2'
+    (question,) = prepare(case_with(tmp_path, table), stop_time=1.5).questions
+    assert "the run ends at 1.5 s" in str(question)
+
+
+@pytest.mark.filterwarnings("error")
+def test_modes_beyond_what_a_long_delay_allows_are_named(tmp_path):
+    table = f'[imperfections.late]\ntype = "delay"\nconnection = "{V_RE}"\ndelay = 15'
+    result = compute_modes(prepare(case_with(tmp_path, table)))
+    assert any("up to 0.255 Hz; what it shows from there to 2 Hz" in text for text in result.warnings)  # 24 / (2π·15)
+    assert result.stability.stable is False  # it grows without an oscillation, where the delay is right
