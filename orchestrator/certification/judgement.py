@@ -15,7 +15,7 @@ from orchestrator.certification.criteria import (
     neighbouring_modes,
     stability_fault,
 )
-from orchestrator.certification.motion import motion_faults
+from orchestrator.certification.motion import motion_faults, not_judged
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import SwingTest, slow_part, swing_test
 
@@ -161,7 +161,8 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
         faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
-    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, base_critical=critical)
+    unknown = "" if faults else not_judged(having.findings)
+    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, unknown, critical)
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:

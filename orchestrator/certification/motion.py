@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.certification.point import FREQUENCY, POWER
 from orchestrator.certification.swings import SLOWEST_PERIOD
-from orchestrator.watch.finding import UNSTABLE
+from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 
 LARGEST_DEVIATION = 2.5
 """Largest accepted deviation of the frequency at bus 2 from its start [Hz]; the study moves it by about 0.1 Hz."""
@@ -46,6 +46,11 @@ def motion_faults(
     for name in (POWER, FREQUENCY):
         if name in signals and len(times) > 1:
             yield from _late_swing(times, name, signals[name], event_time)
+
+
+def not_judged(findings: Sequence[Mapping[str, Any]]) -> str:
+    """What the watch could not judge of a run, in its words; empty where it judged all of it."""
+    return "; ".join(str(finding["message"]) for finding in findings if finding["kind"] == NOT_JUDGED)
 
 
 def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -> Iterator[str]:

@@ -10,7 +10,7 @@ from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
 from orchestrator.certification.criteria import is_judged, judge_mode, stability_fault
 from orchestrator.certification.judgement import RATED_POWER, judge_response, watched
-from orchestrator.certification.motion import motion_faults
+from orchestrator.certification.motion import motion_faults, not_judged
 from orchestrator.certification.request import missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 
@@ -78,6 +78,8 @@ def _of_point(point: dict[str, Any], content: dict[str, Any], responses: xr.Data
         if again.accepted is not time["accepted"] or not _same(ratio, time["swings"]["ratio"]):
             yield f"the response gives {again.swings.reason}, and {time['swings']['reason']} is stated"
         bad |= not again.accepted
+    if point["accepted"] and not_judged(findings):
+        yield "it is stated as accepted, and the watch did not judge its whole response"
     if bad and point["accepted"]:
         yield "it is stated as accepted, and its figures do not meet the criteria"
     if point["accepted"] is bool(point["faults"]):

@@ -19,6 +19,12 @@ _HALF = 25
 _BETA = 7.857
 """Of the Kaiser window: 80 dB."""
 
+FILTER = (
+    f"symmetric FIR filter over all steps of {_HALF} intervals to both sides, Kaiser window with beta = {_BETA:g}; "
+    f"passes up to {PASS_BAND:g}/interval, stops from {STOP_BAND:g}/interval on (80 dB), no delay"
+)
+"""What a row is made by, in words."""
+
 _MOST_READ = 1024
 """Steps whose values are kept until they are added to the rows that they are part of."""
 

@@ -18,7 +18,7 @@ from orchestrator.errors import InputError, ResultsError
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.netcdf import Attributes, join_netcdf, netcdf_image
 from orchestrator.results.room import require_room
-from orchestrator.results.storage import column_attributes, provenance
+from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
 
 FOLDER = "recording"
@@ -57,7 +57,7 @@ class RecordingFolder:
         self.folder = folder
         self._names = tuple(prepared.record)
         self._units = column_attributes(prepared.record, prepared)
-        self._attributes: dict[str, Any] = provenance(prepared) | dict(further or {})
+        self._attributes: dict[str, Any] = origin_of_rows(prepared) | dict(further or {})
         self._chunk = 0
         self._rows: int | None = None  # until a run begins: then what lies there is of an earlier one
 

@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
 from orchestrator.results.netcdf import netcdf_image
 from orchestrator.safe_files import replacing, write_bytes, write_text
@@ -41,6 +42,17 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
         ),
         "versions": json.dumps(versions_of(packages)),
         "Conventions": "CF-1.10",
+    }
+
+
+def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
+    """`provenance` of a recording, with the interval of its rows and what they went through before."""
+    filtered = prepared.record_filtered and prepared.record_every > 1
+    how = f"low-pass: {FILTER}" if filtered else "none: every row is the signal at its time"
+    return provenance(prepared) | {
+        "record_interval_s": prepared.record_every * prepared.step_size,
+        "record_every_steps": prepared.record_every,
+        "record_filter": how,
     }
 
 
@@ -86,7 +98,7 @@ def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dat
     values = recorder.values
     data = {name: ("time", values[:, k].copy(), attributes[name]) for k, name in enumerate(recorder.names)}
     time = ("time", recorder.times.copy(), attributes["time"])
-    return xr.Dataset(data, coords={"time": time}, attrs=provenance(prepared))
+    return xr.Dataset(data, coords={"time": time}, attrs=origin_of_rows(prepared))
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:

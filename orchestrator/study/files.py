@@ -18,6 +18,7 @@ from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, pl
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
+from orchestrator.watch.finding import NOT_JUDGED
 
 _LEAST_PARTICIPATION = 1e-3
 """Smaller factors are left out of the files."""
@@ -206,4 +207,4 @@ def _stable_in_simulation(result: RunResult) -> bool | None:
     """None where a part of the run was not judged and nothing else was wrong."""
     if result.went_unstable:
         return False
-    return None if any(finding.kind == "not_judged" for finding in result.findings) else True
+    return None if any(finding.kind == NOT_JUDGED for finding in result.findings) else True

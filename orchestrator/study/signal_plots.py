@@ -14,7 +14,10 @@ from orchestrator.study.run import RunResult
 
 
 def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> bool:
-    """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded."""
+    """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded.
+
+    A panel whose signal no scenario recorded says so.
+    """
     if all(signal(r.dataset.isel(time=slice(1)), panel.signal) is None for panel in table.panels for r in results):
         return False
     with mpl.rc_context(STYLE):
@@ -23,10 +26,14 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
         for axis, panel in zip(axes, table.panels, strict=True):
             draw_signal(axis, results, panel.signal, panel.scale)
             axis.set_ylabel(panel.label)
+            if not axis.lines:
+                said = f"{panel.signal} was not recorded"
+                axis.text(0.5, 0.5, said, transform=axis.transAxes, ha="center", va="center", parse_math=False)
         dashed = "; dashed: linear model" if any(r.linear is not None for r in results) else ""
         axes[0].set_title(f"{table.title}{dashed}", loc="left")
         axes[-1].set_xlabel("Time [s]")
-        handles, labels = axes[0].get_legend_handles_labels()
+        full = next(axis for axis in axes if axis.lines)
+        handles, labels = full.get_legend_handles_labels()
         add_legend(figure, handles, labels)
         save_figure(figure, path)
     return True

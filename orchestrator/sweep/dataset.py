@@ -109,7 +109,8 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
     names = [[""] * longest for _ in result.scenarios]
     residual, errors = np.full(shape[:-1], np.nan), np.full(shape[:-1], "", dtype=object)
     warnings = np.full(shape[:-1], "", dtype=object)
-    growth, stable = np.full(shape[:-1], np.nan), np.full(shape[:-1], -1, dtype=np.int8)
+    growth, hertz = np.full(shape[:-1], np.nan), np.full(shape[:-1], np.nan)
+    stable = np.full(shape[:-1], -1, dtype=np.int8)
     for s, sweep in enumerate(result.scenarios):
         for t, trajectory in enumerate(sweep.trajectories):
             names[s][t] = trajectory.name
@@ -129,6 +130,8 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
                 stable[(s, *place)] = verdict["stable"]
             if verdict.get("largest_growth_rate") is not None:
                 growth[(s, *place)] = verdict["largest_growth_rate"]
+            if verdict.get("frequency_hz") is not None:
+                hertz[(s, *place)] = verdict["frequency_hz"]
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
     data: dict[str, Any] = {
         _IN_DATASET.get(name, name): (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
@@ -150,6 +153,9 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
         ),
         "largest_growth_rate": (
             dims[:-1], growth, {"units": "1/s", "long_name": "Largest real part of the whole spectrum"},
+        ),
+        "largest_growth_frequency": (
+            dims[:-1], hertz, {"units": "Hz", "long_name": "Frequency of the mode with the largest real part"},
         ),
         "error": (dims[:-1], errors.astype(str), {"long_name": "Why there are no modes"}),
         "warnings": (dims[:-1], warnings.astype(str), {"long_name": "What is to be known of the point"}),
@@ -212,7 +218,12 @@ def _verdict(record: PointRecord) -> dict[str, str]:
     """The stability of a point in a row of the table."""
     rate = record.stability.get("largest_growth_rate")
     word = "" if record.stability.get("stable") is None else str(record.stability["stable"]).lower()
-    return {"stable": word, "largest growth rate [1/s]": "" if rate is None else f"{rate:.10g}"}
+    hertz = record.stability.get("frequency_hz")
+    return {
+        "stable": word,
+        "largest growth rate [1/s]": "" if rate is None else f"{rate:.10g}",
+        "frequency of largest growth rate [Hz]": "" if hertz is None else f"{hertz:.10g}",
+    }
 
 
 def _share(shares: dict[str, float], name: str) -> str:

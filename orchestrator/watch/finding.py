@@ -21,6 +21,8 @@ UNSTABLE: frozenset[Kind] = frozenset(
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
 be, or the run ends too early after an event."""
 
+NOT_JUDGED: Kind = "not_judged"
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:

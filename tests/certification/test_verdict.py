@@ -109,6 +109,17 @@ def test_a_point_whose_judged_modes_are_fine_fails_for_what_else_is_wrong(certif
     assert "failed (2 of 13)</h1>" in page
 
 
+def test_a_response_that_the_watch_did_not_judge_is_not_passed(certified):
+    said = "growth and lasting oscillations are not judged between t = 1 s and t = 20 s: noise can explain the motion"
+    finding = {"kind": "not_judged", "message": said, "time": 1.0}
+    code, _, content, page = certified("--reactances", "0.1,0.3", points=only(0.3, findings=[finding]))
+    assert code == 3
+    assert (content["verdict"], content["passed"], content["judged"]) == ("incomplete", False, "1 of 13")
+    judged = {point["X_L"]: point["judged"] for point in content["points"]}
+    assert judged == {0.1: True, 0.3: False}
+    assert said in page
+
+
 def test_failing_beyond_the_norms_reactances_is_failing(certified):
     code, _, content, _ = certified("--reactances", "0.1,0.7", points=only(0.7, **UNSTABLE))
     assert code == 1

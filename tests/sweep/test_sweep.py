@@ -377,6 +377,10 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, 
     assert scenario["warnings"] == [{"values": {"a1.gain": 2.0}, "warnings": ["the step hides 2 %"]}]
     with xr.open_dataset(out / "sweep.nc") as data:
         assert data["warnings"].values[0].tolist() == ["", "the step hides 2 %"]
+        hertz = data["largest_growth_frequency"].values[0]
+    with (out / "sweep.csv").open(encoding="utf-8") as file:
+        beside = {float(row["frequency of largest growth rate [Hz]"]) for row in csv.DictReader(file)}
+    assert sorted(beside) == pytest.approx(sorted(set(hertz.tolist())))
     with (out / "sweep.csv").open(encoding="utf-8") as file:
         assert {row["warnings"] for row in csv.DictReader(file)} == {"", "the step hides 2 %"}
     _, text, _ = gfor(case, *arguments, "a1.gain=1,2")

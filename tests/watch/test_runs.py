@@ -152,7 +152,7 @@ def test_limits_and_lost_synchronism_are_said_once_in_terminal_summary_and_repor
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     for finding in summary["findings"]:
         assert page.count(finding["message"]) == 1
-    assert "What the runs did wrong" in page
+    assert "What was found in the runs" in page
 
 
 @pytest.mark.parametrize("limit", [0.5984, 0.6])

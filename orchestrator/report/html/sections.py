@@ -1,7 +1,9 @@
 """The sections of the page that a run fills: findings, operating point, modes, responses, provenance."""
 
 import json
+from collections.abc import Mapping
 from html import escape
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +13,7 @@ from orchestrator.report.html.elements import Figures, colour, damping, eigenval
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.signals import relative_difference, signal
+from orchestrator.watch.finding import NOT_JUDGED
 
 _BARS = 8
 
@@ -54,7 +57,7 @@ def findings(results: Results) -> str:
             shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")
             items.append(f'{escape(s["title"])}: <b class="{shade}">{escape(verdict["sentence"])}</b>')
         items += [
-            f'{escape(s["title"])}: <span class="bad">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
+            f'{escape(s["title"])}: <span class="{_shade(f)}">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
             f"{escape(f['message'])}"
             for f in s.get("findings", [])
             if f["message"] != s["failure"]
@@ -76,6 +79,11 @@ def findings(results: Results) -> str:
         for text in s["warnings"]
     )
     return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{warnings}'
+
+
+def _shade(finding: Mapping[str, Any]) -> str:
+    """Colour of a finding: what was not judged is no fault, and no health either."""
+    return "soft" if finding["kind"] == NOT_JUDGED else "bad"
 
 
 def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
@@ -291,7 +299,7 @@ def _watched(results: Results) -> str:
     ]  # fmt: skip
     columns = ["Scenario", "Found", "Component", "Variable", "From [s]", "To [s]"]
     if rows:
-        return table("What the runs did wrong", columns, rows, left=4)
+        return table("What was found in the runs", columns, rows, left=4)
     watched = all("findings" in s for s in results.scenarios)
     return f'<p class="soft">{_NOTHING}</p>' if watched else ""
 
