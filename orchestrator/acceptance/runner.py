@@ -9,10 +9,10 @@ import traceback
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from shutil import rmtree
 from time import monotonic
 from typing import Any
 
+from fmus.toolchain.removal import remove_tree
 from orchestrator.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.acceptance.checks.base import (
     Check,
@@ -199,7 +199,7 @@ def check_fmu(
         finally:
             runner.close()
     finally:
-        rmtree(directory, ignore_errors=True)
+        remove_tree(directory)
     return report
 
 

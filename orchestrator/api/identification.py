@@ -14,7 +14,7 @@ from orchestrator.api.values import Time, moment, text_or_none
 from orchestrator.errors import InputError
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recording import warn_of_early_end
-from orchestrator.study.comparison import open_trajectory, recorded, strongest_modes
+from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes
 
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
 
@@ -114,7 +114,7 @@ def identify(
     Raises
     ------
     InputError
-        If there is no such run, it does not have the signal, or it has nothing between the two times.
+        If there is no such run, it does not have the signal, or nothing but numbers of it between the two times.
     AnalysisError
         If the signal has too few samples between the two times, or does not oscillate.
 
@@ -136,6 +136,7 @@ def identify(
     end = last if stop is None else moment(stop, "stop")
     if end <= begin:
         raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
+    require_numbers(curve.sel(time=slice(begin, end)), signal, label)
     modes = strongest_modes(curve, begin, end)
     times = curve["time"].sel(time=slice(begin, end)).values
     return SignalModes(signal, float(times[0]), float(times[-1]), modes, interval_used(times))

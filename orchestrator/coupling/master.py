@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from math import isfinite
 from pathlib import Path
-from shutil import rmtree
 from time import perf_counter
 from types import TracebackType
 from typing import Self
@@ -12,6 +11,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
@@ -132,7 +132,7 @@ class Master:
             path = plan.description.path
             if path not in folders:
                 folders[path] = extract(path)
-                self._release.callback(rmtree, folders[path], ignore_errors=True)
+                self._release.callback(remove_tree, folders[path])
             component = opener(name, plan, folders[path])
             self._release.enter_context(component)
             self.components[name] = component

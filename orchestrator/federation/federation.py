@@ -9,16 +9,15 @@ import pickle
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from ctypes import c_int
 from dataclasses import asdict, replace
 from pathlib import Path
-from shutil import rmtree
 from typing import Any, Self
 
+from fmus.toolchain import temporary
 from fmus.toolchain.extras import require
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -92,7 +91,7 @@ class Federation:
 
     def __enter__(self) -> Self:
         require("--engine helics", "helics")
-        self._folder = Path(tempfile.mkdtemp(prefix="gfor_federation_"))
+        self._folder = temporary.own_folder("federation")
         try:
             self._start()
             self._join()
@@ -384,7 +383,7 @@ class Federation:
         if hub is not None:
             hub.close()
         if self._folder is not None:
-            rmtree(self._folder, ignore_errors=True)
+            temporary.remove(self._folder)
 
 
 def _all_but_the_grid(prepared: PreparedScenario) -> tuple[str, ...]:

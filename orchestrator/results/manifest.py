@@ -40,11 +40,14 @@ class Manifest:
         By name. Several commands may have written into one folder.
     scenarios
         Folders in it, by the run that says so: those of the last run.
+    scenario
+        That the folder is of; empty where it is no scenario's folder.
     """
 
     folder: Path
     files: dict[str, WrittenFile]
     scenarios: dict[str, str] = field(default_factory=dict)
+    scenario: str = ""
 
     def check(self, names: Iterable[str]) -> None:
         """Compare files with what was written.
@@ -137,7 +140,8 @@ def read_manifest(folder: Path) -> Manifest | None:
         files = {
             str(n): WrittenFile(str(f["run"]), str(f["sha256"]), int(f["bytes"])) for n, f in content["files"].items()
         }
-        return Manifest(folder, files, {str(n): str(run) for n, run in content["scenarios"].items()})
+        beside = {str(n): str(run) for n, run in content["scenarios"].items()}
+        return Manifest(folder, files, beside, str(content.get("scenario", "")))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

@@ -24,6 +24,16 @@ _SLACK = 1_000_000
 Attributes = Mapping[str, str | float]
 
 
+def stored_name(name: str) -> str:
+    """A column's name in a file: a ``/``, which FMI allows and HDF5 takes for a group, is written as ``%2F``."""
+    return name.replace("%", "%25").replace("/", "%2F")
+
+
+def name_of(stored: str) -> str:
+    """The name of a column whose name in a file is this."""
+    return stored.replace("%2F", "/").replace("%25", "%")
+
+
 def netcdf_image(
     names: Sequence[str],
     times: NDArray[np.float64],
@@ -84,7 +94,7 @@ def create_columns(
     time.make_scale("time")
     columns = [time]
     for name in names:
-        column = file.create_dataset(name, **form)
+        column = file.create_dataset(stored_name(name), **form)
         column.dims[0].attach_scale(time)
         column.attrs["_FillValue"] = np.array([np.nan])
         columns.append(column)
@@ -189,7 +199,7 @@ def join_netcdf(
             for part, count in zip(parts, rows, strict=True):
                 with h5py.File(part, "r") as source:
                     for column, name in zip(columns, ("time", *names), strict=True):
-                        _copy(source[name], column, begin, count)
+                        _copy(source[stored_name(name)], column, begin, count)
                 begin += count
         if target.error is not None:
             raise target.error

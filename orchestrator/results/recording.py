@@ -16,7 +16,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.rows import Block
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.results.manifest import ResultsWarning
-from orchestrator.results.netcdf import Attributes, join_netcdf, netcdf_image
+from orchestrator.results.netcdf import Attributes, join_netcdf, name_of, netcdf_image, stored_name
 from orchestrator.results.room import require_room
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
@@ -166,7 +166,7 @@ def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArra
 
     try:
         with h5py.File(part, "r") as file:
-            return file["time"][...], np.column_stack([file[name][...] for name in names])
+            return file["time"][...], np.column_stack([file[stored_name(name)][...] for name in names])
     except (OSError, KeyError) as error:
         raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
 
@@ -189,7 +189,7 @@ class _Column(xr.backends.BackendArray):
         pieces = []
         for part in self._parts:
             with h5py.File(part, "r") as file:
-                pieces.append(file[self._name][...])
+                pieces.append(file[stored_name(self._name)][...])
         return np.concatenate(pieces)[: self.shape[0]][key]
 
 
@@ -217,8 +217,10 @@ def open_recording(folder: Path) -> xr.Dataset:
                 rows += len(file["time"])
                 if part == parts[0]:
                     attributes = dict(file.attrs)
-                    units = {name: {k: file[name].attrs[k] for k in ("units", "long_name") if k in file[name].attrs}
-                             for name in file}  # fmt: skip
+                    units = {
+                        name_of(kept): {k: file[kept].attrs[k] for k in ("units", "long_name") if k in file[kept].attrs}
+                        for kept in file
+                    }
         except (OSError, KeyError) as error:
             raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
     data = {
@@ -232,7 +234,9 @@ def open_recording(folder: Path) -> xr.Dataset:
 
 def open_whole(path: Path) -> xr.Dataset:
     """A finished recording: in memory if it is of moderate size, else with signals that are read when they are used."""
-    dataset = xr.open_dataset(path, cache=False)
+    found = xr.open_dataset(path, cache=False)
+    dataset = found.rename({name: name_of(str(name)) for name in found.data_vars})
+    dataset.set_close(found.close)
     if dataset.nbytes > IN_MEMORY:
         return dataset
     with dataset:

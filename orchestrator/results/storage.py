@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
-from orchestrator.results.netcdf import netcdf_image
+from orchestrator.results.netcdf import netcdf_image, stored_name
 from orchestrator.safe_files import replacing, write_bytes, write_text
 
 _CSV_ROWS = 10_000
@@ -199,4 +199,5 @@ def save_netcdf(dataset: xr.Dataset, path: Path) -> None:
     ResultsError
         If it cannot be written.
     """
-    write_bytes(path, bytes(dataset.to_netcdf(engine="scipy")))
+    kept = dataset.rename({name: stored_name(str(name)) for name in dataset.data_vars})
+    write_bytes(path, bytes(kept.to_netcdf(engine="scipy")))

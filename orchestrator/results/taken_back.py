@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.results.netcdf import stored_name
 from orchestrator.results.recording import RecordingFolder, parts_of, rows_in
 
 
@@ -45,7 +46,7 @@ def take_back(
                 recording.begin(names)
                 for first in range(0, rows, block):
                     part = slice(first, min(first + block, rows))
-                    values = np.column_stack([file[name][part] for name in names])
+                    values = np.column_stack([file[stored_name(name)][part] for name in names])
                     recording.keep(first, file["time"][part], values)
                 return True
         except (OSError, KeyError):  # it is not there, or not whole

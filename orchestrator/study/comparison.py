@@ -90,6 +90,23 @@ def _hint(path: Path) -> str:
     return "`gfor run` writes one a scenario"
 
 
+def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
+    """Refuse a signal that is not all numbers.
+
+    Raises
+    ------
+    InputError
+        If a value is NaN or infinite.
+    """
+    bad = np.flatnonzero(~np.isfinite(curve.values))
+    if len(bad):
+        times = curve["time"].values
+        raise InputError(
+            f"{label}: {expression} is no finite number ({curve.values[bad[0]]}) at t = {times[bad[0]]:.6g} s, and at "
+            f"{len(bad)} of {len(times)} times in all; take another signal, or a part of the run without them"
+        )
+
+
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     """A signal of a run.
 
@@ -137,9 +154,11 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
     Raises
     ------
     InputError
-        If a run does not have the signal, or they have no time in common.
+        If a run does not have the signal, it is not all numbers there, or they have no time in common.
     """
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
+    for curve, label in zip((first, second), labels, strict=True):
+        require_numbers(curve, expression, label)
     common = common_times(first["time"].values, second["time"].values, labels)
     y_1, y_2 = (common.values(run, curve.values) for run, curve in enumerate((first, second)))
     difference = y_2 - y_1
@@ -179,7 +198,8 @@ def most_different(
     def share(name: str) -> float:
         one, other = (times.values(number, run[name].values) for number, run in enumerate((a, b)))
         deviation = max(np.abs(one - one[0]).max(), np.abs(other - other[0]).max(), 1e-12)
-        return float(np.abs(one - other).max() / deviation)
+        found = float(np.abs(one - other).max() / deviation)
+        return found if np.isfinite(found) else -1.0  # what is no number cannot be compared
 
     common = [str(name) for name in a.data_vars if name in b.data_vars]
     return sorted(common, key=share, reverse=True)[:count]

@@ -163,6 +163,8 @@ def _axis(vary: Vary, info: VariableInfo) -> Axis:
             values = [convert(info, value) for value in vary.values]
         else:
             start, stop = (_number(info, limit) for limit in vary.limits)
+            for limit in (start, stop):  # what was written is named, rather than a value between the two
+                convert(replace(info, type="Real"), limit)
             values = [convert(info, value) for value in _spaced(start, stop, vary.count, vary.logarithmic)]
     except ValueError as error:
         raise InputError(f"--vary {vary.key}: {error}") from error

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fmus.toolchain.temporary import sweep
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
@@ -323,6 +324,8 @@ def test_nothing_is_left_when_gfor_is_killed(number, prepared, tmp_path):
         process.send_signal(getattr(signal, number))
         process.wait()
         _until(lambda: not any(Path(f"/proc/{child}").exists() for child in children))
+        sweep(tmp_path)  # as the next start does
+        assert not [path for path in tmp_path.iterdir() if "federation" in path.name]
     finally:
         process.kill()
         process.wait()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.errors import InputError
+from orchestrator.api.identification import identify
+from orchestrator.errors import AnalysisError, InputError
 from orchestrator.study.common_times import common_times
 from orchestrator.study.comparison import compare, most_different, open_trajectory
 
@@ -110,3 +111,15 @@ def test_a_folder_of_scenarios_and_a_damaged_file_are_told_apart(tmp_path):
     (tmp_path / "base" / "trajectory.nc").write_bytes(b"no file of results")
     with pytest.raises(InputError, match="cannot be read as NetCDF"):
         open_trajectory(tmp_path / "base")
+
+
+def test_a_signal_that_is_no_number_is_one_error():
+    times = np.linspace(0, 10, 101)
+    broken = np.where(times < 8.95, 1.0, np.nan)
+    one, two = run_of(times, g__x=np.sin(times)), run_of(times, g__x=broken)
+    with pytest.raises(InputError, match=r"^two: g.x is no finite number \(nan\) at t = 9 s, and at 11 of 101 times"):
+        compare(one, two, "g.x", 0.0, LABELS)
+    with pytest.raises(InputError, match=r"second: g.x is no finite number .* at t = 9 s, and at 11 of 81 times"):
+        identify(two.assign_attrs(scenario="second"), "g.x")
+    with pytest.raises(AnalysisError, match="constant"):
+        identify(two, "g.x", stop=8.0)  # there it is one

@@ -12,12 +12,13 @@ import xarray as xr
 
 from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
+from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep import sweep as sweep_module
-from orchestrator.sweep.axes import parse_vary, resolve
+from orchestrator.sweep.axes import _axis, parse_vary, resolve
 from orchestrator.sweep.point import PointRecord, compute_point
 from orchestrator.sweep.sweep import ScenarioSweep, plan_sweep, run_sweep
 from tests.support.interruption import interrupted_after
@@ -385,3 +386,9 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, 
         assert {row["warnings"] for row in csv.DictReader(file)} == {"", "the step hides 2 %"}
     _, text, _ = gfor(case, *arguments, "a1.gain=1,2")
     assert re.search(r"not known: .*: 1 of 2 points have no verdict, 1 are stable, 0 are unstable", text)
+
+
+def test_the_limit_that_was_written_is_named_rather_than_a_value_between():
+    info = VariableInfo("n.deviation", 0, "Real", "parameter", "tunable", "pu", None, 0.0, None, "")
+    with pytest.raises(InputError, match=r"n.deviation = -3 pu; it must be at least 0 pu"):
+        _axis(parse_vary("n.deviation=0.1:-3:3"), info)

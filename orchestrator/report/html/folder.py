@@ -11,7 +11,7 @@ import xarray as xr
 
 from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
-from orchestrator.results.manifest import MANIFEST, check_one_run, checked
+from orchestrator.results.manifest import MANIFEST, check_one_run, checked, read_manifest
 from orchestrator.results.recording import TRAJECTORY, open_whole, warn_of_early_end
 
 
@@ -121,7 +121,9 @@ def _datasets(folder: Path, names: Sequence[str], file: str) -> Iterator[tuple[s
         path = folder / name / file
         if path.is_file():
             dataset = _load(path)
-            if (found := dataset.attrs.get("scenario", name)) != name:
+            manifest = read_manifest(path.parent)
+            said = (manifest.scenario if manifest else "") or name
+            if (found := dataset.attrs.get("scenario", said)) != name or (found := said) != name:
                 raise InputError(
                     f"{path}: it is the recording of scenario {found!r}, and lies in the folder of {name!r}: the "
                     "folders were renamed or swapped; give each its own name again, or run the study again"
