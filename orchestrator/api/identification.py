@@ -13,7 +13,7 @@ from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment, text_or_none
 from orchestrator.errors import InputError
 from orchestrator.results.mode_json import eigenvalue_json
-from orchestrator.results.recording import warn_of_early_end
+from orchestrator.results.recorded import warn_of_early_end
 from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes
 
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"

@@ -31,7 +31,8 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
-from orchestrator.results.recording import IN_MEMORY, RecordingFolder, temporary_recording
+from orchestrator.results.recorded import IN_MEMORY
+from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 

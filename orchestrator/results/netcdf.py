@@ -88,7 +88,7 @@ def create_columns(
     attributes
         Of the whole file.
     """
-    form = {"shape": (rows,), "dtype": "<f8", "chunks": (chunk,), "maxshape": (None,), "compression": "gzip",
+    form = {"shape": (rows,), "dtype": "<f8", "chunks": (chunk,), "maxshape": (rows or None,), "compression": "gzip",
             "compression_opts": LEVEL, "shuffle": True, "track_order": True}  # fmt: skip
     time = file.create_dataset("time", **form)
     time.make_scale("time")

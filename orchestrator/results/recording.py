@@ -1,22 +1,19 @@
 """A recording on the disk while it grows: a folder of small files, each of them whole, that are joined at the end."""
 
 import atexit
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.rows import Block
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.manifest import ResultsWarning
-from orchestrator.results.netcdf import Attributes, join_netcdf, name_of, netcdf_image, stored_name
+from orchestrator.results.netcdf import Attributes, join_netcdf, netcdf_image, stored_name
 from orchestrator.results.room import require_room
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
@@ -30,9 +27,6 @@ TRAJECTORY = "trajectory.nc"
 
 ENDED_EARLY = "ended_early"
 """Attribute of a recording whose run ended before its stop time: the reason."""
-
-IN_MEMORY = 256_000_000
-"""Size of a recording up to which it is read as a whole [bytes]."""
 
 
 class RecordingFolder:
@@ -169,84 +163,3 @@ def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArra
             return file["time"][...], np.column_stack([file[stored_name(name)][...] for name in names])
     except (OSError, KeyError) as error:
         raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
-
-
-class _Column(xr.backends.BackendArray):
-    """A column of all files of an unfinished recording, read when it is asked for."""
-
-    def __init__(self, parts: Sequence[Path], name: str, rows: int) -> None:
-        self._parts, self._name = parts, name
-        self.shape, self.dtype = (rows,), np.dtype(float)
-
-    def __getitem__(self, key: Any) -> Any:
-        return xr.core.indexing.explicit_indexing_adapter(
-            key, self.shape, xr.core.indexing.IndexingSupport.BASIC, self._all
-        )
-
-    def _all(self, key: tuple[Any, ...]) -> Any:
-        import h5py  # noqa: PLC0415 - as above
-
-        pieces = []
-        for part in self._parts:
-            with h5py.File(part, "r") as file:
-                pieces.append(file[stored_name(self._name)][...])
-        return np.concatenate(pieces)[: self.shape[0]][key]
-
-
-def open_recording(folder: Path) -> xr.Dataset:
-    """What an unfinished recording holds, also while it grows; signals are read when they are used.
-
-    Raises
-    ------
-    InputError
-        If there is none, or a file of it is missing or cannot be read.
-    """
-    import h5py  # noqa: PLC0415 - as above
-
-    parts = parts_of(folder)
-    if not parts:
-        raise InputError(f"{folder}: nothing was recorded yet")
-    attributes: Mapping[str, Any] = {}
-    units: dict[str, dict[str, Any]] = {}
-    rows = 0
-    for part in parts:
-        if int(part.stem) != rows:
-            raise InputError(f"{folder}: the rows from number {rows} on are missing; the run has to be made again")
-        try:
-            with h5py.File(part, "r") as file:
-                rows += len(file["time"])
-                if part == parts[0]:
-                    attributes = dict(file.attrs)
-                    units = {
-                        name_of(kept): {k: file[kept].attrs[k] for k in ("units", "long_name") if k in file[kept].attrs}
-                        for kept in file
-                    }
-        except (OSError, KeyError) as error:
-            raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
-    data = {
-        name: ("time", xr.core.indexing.LazilyIndexedArray(_Column(parts, name, rows)), found)
-        for name, found in units.items()
-    }
-    time = _Column(parts, "time", rows)._all((slice(None),))
-    data.pop("time")
-    return xr.Dataset(data, coords={"time": ("time", time, units["time"])}, attrs=attributes)
-
-
-def open_whole(path: Path) -> xr.Dataset:
-    """A finished recording: in memory if it is of moderate size, else with signals that are read when they are used."""
-    found = xr.open_dataset(path, cache=False)
-    dataset = found.rename({name: name_of(str(name)) for name in found.data_vars})
-    dataset.set_close(found.close)
-    if dataset.nbytes > IN_MEMORY:
-        return dataset
-    with dataset:
-        return dataset.load()
-
-
-def warn_of_early_end(dataset: xr.Dataset, label: str) -> None:
-    """Warn, where the caller of the caller stands, about a run that ended before its stop time."""
-    reason = dataset.attrs.get(ENDED_EARLY)
-    if reason is not None:
-        times = dataset["time"].values
-        reached = f", at t = {float(times[-1]):.6g} s" if len(times) else ""
-        warnings.warn(f"{label}: its run ended early{reached}: {reason}", ResultsWarning, stacklevel=3)

@@ -11,7 +11,8 @@ from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
-from orchestrator.results.recording import FOLDER, TRAJECTORY, open_recording, open_whole, parts_of
+from orchestrator.results.recorded import open_recording, open_whole
+from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
 from orchestrator.results.signals import signal
 from orchestrator.results.staging import unfinished
 from orchestrator.safe_files import PARTIAL

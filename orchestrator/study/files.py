@@ -9,7 +9,8 @@ from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.results.mode_json import eigenvalue_json
-from orchestrator.results.recording import TRAJECTORY, open_whole
+from orchestrator.results.recorded import in_memory, open_whole
+from orchestrator.results.recording import TRAJECTORY
 from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
@@ -37,9 +38,9 @@ def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -
     if result.linear is not None:
         save_netcdf(result.linear.assign_attrs(result.dataset.attrs), scenario.path / "linear.nc")
     save_table(_mode_rows([result.modes]), scenario.path / "modes.csv")
-    result.dataset.close()
-    reason = None if result.failure is None else str(result.failure)
-    result.dataset = open_whole(scenario.publish(reason) / TRAJECTORY)
+    place = scenario.publish(None if result.failure is None else str(result.failure))
+    if not in_memory(result.dataset):
+        result.dataset = open_whole(place / TRAJECTORY)
 
 
 def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:

@@ -32,7 +32,8 @@ from orchestrator.federation.pace import Pace
 from orchestrator.fmi.instance import is_isolated, protections_of
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.protection import Protection, missing
-from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder, open_whole
+from orchestrator.results.recorded import open_whole
+from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
 from orchestrator.results.signals import signal
 from orchestrator.results.storage import trajectory_dataset
 from orchestrator.study.checkpoints import Checkpoints

@@ -16,7 +16,8 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.recording import RecordingFolder, open_recording, open_whole, parts_of
+from orchestrator.results.recorded import open_recording, open_whole
+from orchestrator.results.recording import RecordingFolder, parts_of
 from orchestrator.results.storage import save_csv, trajectory_dataset
 
 NAMES = ("gfor.p", "gfor.omega", "grid.v")

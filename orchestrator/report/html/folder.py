@@ -12,7 +12,8 @@ import xarray as xr
 from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import MANIFEST, check_one_run, checked, read_manifest
-from orchestrator.results.recording import TRAJECTORY, open_whole, warn_of_early_end
+from orchestrator.results.recorded import open_whole, warn_of_early_end
+from orchestrator.results.recording import TRAJECTORY
 
 
 @dataclass
