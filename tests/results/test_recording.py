@@ -16,8 +16,10 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError, ResultsError
+from orchestrator.results import recorded
 from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.recording import RecordingFolder, parts_of
+from orchestrator.results.signals import signal as signal_of
 from orchestrator.results.storage import save_csv, trajectory_dataset
 
 NAMES = ("gfor.p", "gfor.omega", "grid.v")
@@ -73,6 +75,34 @@ def test_chunks_are_copied_as_they_are(tmp_path, prepared):
     with h5py.File(tmp_path / "trajectory.nc") as whole:
         assert whole["gfor.p"].id.read_direct_chunk((100,)) == kept
         assert whole["gfor.p"].compression == "gzip"
+
+
+def test_of_a_long_recording_only_the_rows_that_are_asked_for_are_read(tmp_path, prepared, monkeypatch):
+    rows, recording = Rows(950), RecordingFolder(tmp_path / "recording", prepared)
+    keep(recording, rows, 100)
+    grows = open_recording(tmp_path / "recording")
+    recording.join(tmp_path / "elsewhere" / "trajectory.nc")
+    (tmp_path / "recording").mkdir()
+    keep(RecordingFolder(tmp_path / "recording", prepared), rows, 100)
+    monkeypatch.setattr(recorded, "IN_MEMORY", 1000)
+    monkeypatch.setattr(xr, "open_dataset", None)
+    whole = open_whole(tmp_path / "elsewhere" / "trajectory.nc")
+    assert not recorded.in_memory(whole)
+    keys = (0, -1, slice(None), slice(95, 305), slice(None, None, 7), slice(900, 3, -13), slice(5, 5), [3, 700, 101])
+    for found in (grows, whole):
+        assert np.array_equal(found["time"], rows.times)
+        for key in keys:
+            assert np.array_equal(found["gfor.omega"][key], rows.values[key, 1]), key
+    difference = signal_of(whole.isel(time=slice(200, 400)), "gfor.p - gfor.omega")
+    assert np.array_equal(difference, rows.values[200:400, 0] - rows.values[200:400, 1])
+
+
+def test_a_netcdf_file_of_another_form_is_read_as_well(tmp_path):
+    data = xr.Dataset({"a": (("x", "y"), np.eye(3))}, coords={"x": [1.0, 2.0, 3.0]}, attrs={"n": 1})
+    data.to_netcdf(tmp_path / "four.nc", engine="h5netcdf")
+    data.to_netcdf(tmp_path / "three.nc", engine="scipy")
+    for name in ("four.nc", "three.nc"):
+        assert np.array_equal(open_whole(tmp_path / name)["a"], np.eye(3))
 
 
 def test_no_rows_at_all(tmp_path, prepared):
