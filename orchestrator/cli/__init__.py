@@ -74,8 +74,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: Sequence[str]) -> int:
+    """Run; where it returns, no signal changes the exit code any more."""
     try:
-        options = _parser(next((word for word in words if not word.startswith("-")), None)).parse_args(words)
+        code = _done(words)
+        calls.over = True
+    except KeyboardInterrupt:
+        calls.over = True
+        print(calls.how, file=sys.stderr)
+        code = INTERRUPTED
+    return code
+
+
+def _done(words: Sequence[str]) -> int:
+    try:
+        with calls:  # libraries take an interrupt in their import for an error of their own
+            parser = _parser(next((word for word in words if not word.startswith("-")), None))
+        options = parser.parse_args(words)
         return int(options.command(options))
     except CosimError as error:
         _print_error(str(error))
@@ -88,9 +102,6 @@ def _run(words: Sequence[str]) -> int:
     except OSError as error:  # of a file that no command expected to fail with
         _print_error(_os_error(error))
         return CosimError.exit_code
-    except KeyboardInterrupt:
-        print(calls.how, file=sys.stderr)
-        return INTERRUPTED
 
 
 def _print_anything() -> None:

@@ -16,7 +16,7 @@ from orchestrator.cli.terminal import make_errors, warn
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import CHECKPOINTS
 from orchestrator.results.recording import TRAJECTORY, RecordingFolder
-from orchestrator.results.staging import ScenarioFolder, new_run_id, unfinished
+from orchestrator.results.staging import ScenarioFolder, new_run_id, remove_at_once, unfinished
 from orchestrator.safe_files import PARTIAL, write_text
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 
@@ -182,7 +182,7 @@ class StudyCheckpoints:
     def end(self, *, whole: bool) -> None:
         """After a study that came to its end nothing is left; else say how it goes on."""
         if whole:
-            rmtree(self._folder, ignore_errors=True)
+            remove_at_once(self._folder, self.run)
         elif any(one.exist for one in self._of.values()):
             _say(f"gfor run --resume {self._results} goes on from there")
 

@@ -140,6 +140,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         code = _end(*stopped, folder)
         kept.end(whole=False)
         return code
+    calls.over = True
     kept.end(whole=True)
     gone_bad = options.fail_unstable and any(r.went_unstable for r in results)
     return int(gone_bad) or exit_code(options, [r.modes.stability for r in results])

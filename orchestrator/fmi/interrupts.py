@@ -22,6 +22,9 @@ class _Calls:
     ----------
     terminated
         Whether a SIGTERM was taken since the command began.
+    over
+        Whether all is done: then the exit code says how, and no signal changes it any more. It is set, not called,
+        because Python takes signals where a function begins.
     """
 
     def __init__(self) -> None:
@@ -29,7 +32,7 @@ class _Calls:
         self._depth = 0
         self._asked = ctypes.c_int(0)  # C that waits for another process looks at it as well
         self._kind: type[BaseException] = KeyboardInterrupt
-        self.terminated = False
+        self.terminated = self.over = False
 
     @property
     def asked_address(self) -> int:
@@ -54,18 +57,25 @@ class _Calls:
         Parameters
         ----------
         ending
-            Whether the process ends afterwards. A SIGTERM is ignored then: all is done, and the exit code says how.
+            Whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
         """
-        self.terminated = False
+        self.terminated = self.over = False
         if threading.current_thread() is not threading.main_thread():
-            yield
+            try:
+                yield
+            finally:
+                self.over = False
             return
+        self.watch()
         before, unraisable = signal.signal(signal.SIGTERM, self._take), sys.unraisablehook
         sys.unraisablehook = self._swallowed(unraisable)
         try:
             yield
         finally:
             signal.signal(signal.SIGTERM, signal.SIG_IGN if ending else before)
+            if ending:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+            self.over = ending
             sys.unraisablehook = unraisable
 
     def _swallowed(self, otherwise: Callable[[Any], Any]) -> Callable[[Any], None]:
@@ -85,6 +95,8 @@ class _Calls:
         self._ask()
 
     def _take(self, number: int, frame: FrameType | None) -> None:
+        if self.over:
+            return
         if number == signal.SIGTERM:
             if self.terminated:
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -14,6 +14,7 @@ from orchestrator.results.recording import ENDED_EARLY
 from orchestrator.safe_files import PARTIAL, flush, not_written
 
 _OLD = ".old-"
+_DONE_WITH = ".done-with"
 _TRIES = 20
 
 
@@ -92,7 +93,11 @@ def _exchange(new: Path, place: Path, run: str) -> None:
 
 
 def mend(folder: Path) -> None:
-    """Bring back what a process that was killed had just put aside for its own results."""
+    """Bring back what a process that was killed had just put aside for its own results, and remove what it had done
+    with.
+    """
+    for left in folder.glob(f"{PARTIAL}*{_DONE_WITH}"):
+        rmtree(left, ignore_errors=True)
     for old in folder.glob(f"*{_OLD}*"):
         place = old.with_name(old.name.partition(_OLD)[0])
         with suppress(OSError):
@@ -100,6 +105,15 @@ def mend(folder: Path) -> None:
                 rmtree(old, ignore_errors=True)
             else:
                 old.rename(place)
+
+
+def remove_at_once(path: Path, run: str) -> None:
+    """Remove a folder so that at no moment, whatever ends the process, a part of it is left in its place."""
+    away = path.with_name(f"{PARTIAL}{run}{_DONE_WITH}")
+    with suppress(OSError):
+        path.rename(away)
+    rmtree(away, ignore_errors=True)
+    rmtree(path, ignore_errors=True)
 
 
 def unfinished(folder: Path) -> list[Path]:
@@ -126,6 +140,7 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         If they cannot be written; then none is put there.
     """
     path = folder / f"{PARTIAL}{run}"
+    rmtree(path, ignore_errors=True)  # a resumed run has the id of the one that was killed
     try:
         path.mkdir(parents=True)
         yield path

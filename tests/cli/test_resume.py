@@ -25,23 +25,29 @@ scale = {scale}
 """
 
 
-@pytest.fixture(scope="module")
-def case(tmp_path_factory):
-    """The two areas, five events, one scenario with an FMU in a process of its own."""
+TIMES = (0.5, 1.7, 1.7005, 2.3333, 2.6)
+SCALES = (1.05, 0.98, 0.97, 1.0, 1.02)
+
+
+def write_case(path, stop=3.0, times=TIMES):
+    """The two areas, five events, short, to be ended at any moment."""
     text = (BUILT_IN / "two_area" / "case.toml").read_text(encoding="utf-8")
     head, _, tail = text.partition("[[events]]")
     tail = tail[tail.index("\n[") :]
-    times = ((0.5, 1.05), (1.7, 0.98), (1.7005, 0.97), (2.3333, 1.0), (2.6, 1.02))
-    events = "".join(EVENT.format(time=t, scale=s) for t, s in times)
-    head = head.replace('stop_time = "20 s"', 'stop_time = "3 s"')
-    path = tmp_path_factory.mktemp("case") / "events.toml"
+    events = "".join(EVENT.format(time=t, scale=s) for t, s in zip(times, SCALES, strict=True))
+    head = head.replace('stop_time = "20 s"', f'stop_time = "{stop:g} s"')
     path.write_text(f"{head}{events}{tail}", encoding="utf-8")
     return path
 
 
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    return write_case(tmp_path_factory.mktemp("case") / "events.toml")
+
+
 def started(tmp, *words):
     call = [sys.executable, "-m", "orchestrator.cli", "run", *map(str, words)]
-    tmp.mkdir(exist_ok=True)
+    tmp.mkdir(parents=True, exist_ok=True)
     return subprocess.Popen(
         call, env=os.environ | {"TMPDIR": str(tmp)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
