@@ -1,6 +1,7 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -19,6 +20,7 @@ from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
+from orchestrator.results.lock import held
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -233,7 +235,7 @@ class Case:
         executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
         planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
         question(planned.scenarios)
-        with shown_progress("Points", shown=progress) as report:
+        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
             return compute(planned, executor, kept, report)
 
     def design(

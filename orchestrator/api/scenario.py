@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
+from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
@@ -213,23 +215,26 @@ class Scenario:
         _check_observers(observers)
         if checkpoints is not None and federates is not None:
             raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
-        kept = checkpoints if isinstance(checkpoints, Checkpoints) else None
-        if isinstance(checkpoints, str | Path):
-            kept = _checkpoints(prepared, Path(checkpoints), in_seconds(checkpoint_every, "checkpoint_every") or EVERY)
-        if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
-            recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
-        with shown_progress(self.title, shown=progress) as report:
-            bars = [Progress(report)] if progress else []
-            result = run_scenario(
-                prepared,
-                observers=[*bars, *observers],
-                linear=linear,
-                recording=recording,
-                checkpoints=kept,
-                federates=federates,
-            )
-        if kept is not None and kept is not checkpoints and result.failure is None:
-            kept.clear()
+        with ExitStack() as stack:
+            kept = checkpoints if isinstance(checkpoints, Checkpoints) else None
+            if isinstance(checkpoints, str | Path):
+                every = in_seconds(checkpoint_every, "checkpoint_every") or EVERY
+                stack.enter_context(held(Path(checkpoints)))
+                kept = _checkpoints(prepared, Path(checkpoints), every)
+            if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
+                recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
+            with shown_progress(self.title, shown=progress) as report:
+                bars = [Progress(report)] if progress else []
+                result = run_scenario(
+                    prepared,
+                    observers=[*bars, *observers],
+                    linear=linear,
+                    recording=recording,
+                    checkpoints=kept,
+                    federates=federates,
+                )
+            if kept is not None and kept is not checkpoints and result.failure is None:
+                kept.clear()
         if result.failure is not None:
             warnings.warn(f"scenario {self.name!r}: {result.failure}", RunEndedWarning, stacklevel=2)
         return Run(result)

@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.analysis.modes import damping_ratio
-from orchestrator.certification.acceptance import read_checks, run_checks
+from orchestrator.certification.acceptance import Acceptance, read_checks, run_checks
 from orchestrator.certification.details import TEMPLATE, Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest
@@ -20,6 +20,7 @@ from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import INTERRUPTED, InputError
 from orchestrator.report.tables import PlainTable
+from orchestrator.results.lock import held
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -87,6 +88,32 @@ def run(options: argparse.Namespace) -> int:
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
+    with held(folder):
+        return _certified(request, details, acceptance, folder, options)
+
+
+def _certified(
+    request: CertificationRequest,
+    details: Details,
+    acceptance: Acceptance | None,
+    folder: Path,
+    options: argparse.Namespace,
+) -> int:
+    """See `run`.
+
+    Parameters
+    ----------
+    request
+        What is tested.
+    details
+        For the report.
+    acceptance
+        Acceptance tests of the FMU, where they are there already.
+    folder
+        For the results, which no other command works in.
+    options
+        Of the command.
+    """
     console = make_console(stderr=options.json)
     executor = choose_executor(options, ["orchestrator.certification.point"])
     result = compute_points(lambda report: certify(request, executor, folder, report), executor, folder, console)

@@ -2,12 +2,14 @@
 
 import argparse
 import json
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.scenario import Scenario
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
@@ -20,6 +22,7 @@ from orchestrator.cli.terminal import (
 )
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
+from orchestrator.results.lock import held
 from orchestrator.study import tables
 from orchestrator.study.modes import modes_json
 
@@ -58,13 +61,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute, print, and write what is asked for."""
+    """Compute, print, and write what is asked for, while no other command works in the folder of the results."""
     scenarios = chosen(options)
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
-    folder = made_folder(options.out) if options.out else None
     if options.black_box and options.directional:
         raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
+    folder = made_folder(options.out) if options.out else None
+    with held(folder) if folder else nullcontext():
+        return _compute(scenarios, options, folder)
+
+
+def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
+    """See `run`.
+
+    Parameters
+    ----------
+    scenarios
+        All of them.
+    options
+        Of the command.
+    folder
+        For the results, if they are wanted.
+    """
     with said_stages() if options.black_box else nullcontext() as report:
         results = [
             scenario.modes(

@@ -17,6 +17,7 @@ from orchestrator.cli.points import compute_points
 from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.errors import INTERRUPTED
+from orchestrator.results.lock import held
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
 
@@ -63,10 +64,11 @@ def run(options: argparse.Namespace) -> int:
     print_questions(planned.scenarios)
     folder = made_folder(options.out or Path("results") / f"{case.name}_sweep")
     console = make_console(stderr=options.json)
-    sweep = compute_points(lambda report: compute(planned, executor, folder, report), executor, folder, console)
-    if sweep is None:
-        return INTERRUPTED
-    failed = _present(sweep, folder, console, as_json=options.json)
+    with held(folder):
+        sweep = compute_points(lambda report: compute(planned, executor, folder, report), executor, folder, console)
+        if sweep is None:
+            return INTERRUPTED
+        failed = _present(sweep, folder, console, as_json=options.json)
     return failed or int(options.fail_unstable and not all(s.stable for s in sweep.result.scenarios))
 
 

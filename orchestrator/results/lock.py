@@ -19,15 +19,21 @@ LOCK = ".lock"
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Hold a folder that exists; the lock ends with the process, whatever ends that.
+    """Hold a folder, which is made where it is missing; the lock ends with the process, whatever ends that.
 
     Windows, and network drives without locks, have no such lock: there nobody is refused.
 
     Raises
     ------
     InputError
-        If another command holds it, or the file cannot be made.
+        If another command holds it, or the folder or the file cannot be made.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: results cannot be written there: {error.strerror}; choose another folder"
+        ) from error
     if fcntl is None:
         yield
         return
@@ -58,8 +64,8 @@ def _locked(path: Path) -> int:
             holder = _holder(lock)
             os.close(lock)
             raise InputError(
-                f"{path.parent}: {holder} works in this folder, and two runs would destroy each other's results; wait "
-                "until it has ended, or choose another folder with --out"
+                f"{path.parent}: {holder} works in this folder, and two commands would destroy each other's "
+                "results; wait until it has ended, or choose another folder"
             ) from error
         except OSError:  # some network drives have no locks
             return lock

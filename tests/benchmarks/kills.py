@@ -2,8 +2,9 @@
 
 Runs the two areas with five events, two scenarios and a checkpoint every 0.05 s, as a process of its own. Ends it by
 SIGKILL (50 times) or SIGTERM (20 times) at a moment that is spread evenly over the whole life of an undisturbed run,
-resumes it, and compares every value of every file with the undisturbed run's. Two runs go on at a time. Prints a line
-for each, and a table of where they were ended.
+in the processor's time, so that other work on the machine does not matter (Linux). Resumes it, and compares every value
+of every file with the undisturbed run's. Two runs go on at a time. Prints a line for each, and a table of where they
+were ended. Where nothing had begun, there is nothing to resume, and the folder has to be empty.
 
 After SIGTERM the exit code is 143, or 0 where all was done, and no temporary file and no process is left. Before Python
 has come to the command, SIGTERM ends it by itself (-15), and nothing is there yet.
@@ -28,6 +29,7 @@ TIMES = (0.5, 1.1, 1.1005, 1.3333, 1.6)
 AT_A_TIME = 2
 TRIES = {signal.SIGKILL: 50, signal.SIGTERM: 20}
 SEED = 1
+TICK = os.sysconf("SC_CLK_TCK")
 CODES = {signal.SIGKILL: {-9, 0}, signal.SIGTERM: {143, -15, 0}}
 
 
@@ -62,7 +64,8 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
     out, tmp = folder / "out", folder / "tmp"
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
     process = started(tmp, *words)
-    time.sleep(moment)
+    while process.poll() is None and processor_time(process.pid) < moment:
+        time.sleep(0.005)
     process.send_signal(kind)
     _, error = process.communicate(timeout=300)
     code, wrong = process.returncode, []
@@ -71,25 +74,38 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
     if kind == signal.SIGTERM and code != -signal.SIGTERM:
         wrong += [f"left behind: {left}" for left in left_behind(process.pid, tmp)]
     where = ended(out, code)
+    if where == "before it began":
+        there = out.rglob("*") if out.exists() else []
+        return where, [
+            *wrong,
+            *(f"it is there: {path.name}" for path in there if path.name not in (".lock", ".checkpoints")),
+        ]
     if code != 0 and where != "when all was done":
-        anew = where == "before it began"
-        again = started(tmp, *(words if anew else ("--resume", out)))
+        again = started(tmp, "--resume", out)
         _, error = again.communicate(timeout=300)
         if again.returncode != 0:
-            wrong.append(f"{'again' if anew else 'resumed'}: exit code {again.returncode}: {error[-3000:]}")
+            wrong.append(f"resumed: exit code {again.returncode}: {error[-3000:]}")
     found = values_of(out)
     names = [name for name in {*found, *wanted} if found.get(name) != wanted.get(name)]
     return where, [*wrong, *(f"other values: {name}" for name in sorted(names))]
 
 
 def undisturbed(case: Path, folder: Path) -> tuple[dict[str, Any], float]:
-    """Values of a run that nothing ends, and how long it lives [s]."""
-    begun = time.monotonic()
-    process = started(folder / "tmp", case, *WORDS, "--out", folder / "out")
+    """Values of a run that nothing ends, and how long it lives, in the processor's time [s]."""
+    process, life = started(folder / "tmp", case, *WORDS, "--out", folder / "out"), 0.0
+    while process.poll() is None:
+        life = max(life, processor_time(process.pid))
+        time.sleep(0.005)
     _, error = process.communicate(timeout=300)
     if process.returncode != 0:
         raise SystemExit(f"the undisturbed run failed: {error}")
-    return values_of(folder / "out"), time.monotonic() - begun
+    return values_of(folder / "out"), life
+
+
+def processor_time(process: int) -> float:
+    """What a living process has used of the processors [s]."""
+    words = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / TICK
 
 
 def main() -> None:
@@ -102,7 +118,7 @@ def main() -> None:
         wholes = list(pool.map(lambda k: undisturbed(case, Path(top) / f"whole_{k}"), range(AT_A_TIME)))
         wanted, life = wholes[0][0], max(seconds for _, seconds in wholes)
         assert all(values == wanted for values, _ in wholes)
-        print(f"seed {seed}; an undisturbed run lives {life:.1f} s", flush=True)
+        print(f"seed {seed}; an undisturbed run takes {life:.1f} s of a processor", flush=True)
         moments = [(kind, chance.uniform(0, life)) for kind, count in tries.items() for _ in range(count)]
         found: Counter[tuple[str, str]] = Counter()
         wrong = 0
