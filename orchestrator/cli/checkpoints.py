@@ -18,7 +18,7 @@ from orchestrator.results.checkpoint_file import CHECKPOINTS
 from orchestrator.results.recording import TRAJECTORY, RecordingFolder
 from orchestrator.results.staging import ScenarioFolder, new_run_id, remove_at_once, unfinished
 from orchestrator.safe_files import PARTIAL, write_text
-from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
+from orchestrator.study.checkpoints import CASE, EVERY, Checkpoints, not_kept
 
 _REQUEST = "request.json"
 _OF_THE_RUN: Mapping[str, Any] = {
@@ -130,7 +130,7 @@ class StudyCheckpoints:
         self.run = str(options.run) if options.resume else new_run_id()
         _name_those_not_kept(scenarios, options)
         if options.resume is None:
-            self._begin(options)
+            self._begin(scenarios, options)
         if not self._every:
             return
         for prepared in scenarios:
@@ -141,8 +141,16 @@ class StudyCheckpoints:
                 done = "it was done" if one.time >= prepared.stop_time else f"it goes on from t = {one.time:.6g} s"
                 _say(f"scenario {prepared.name!r}: {done}")
 
-    def _begin(self, options: argparse.Namespace) -> None:
-        """Forget an earlier run, and keep what is asked of this one."""
+    def _begin(self, scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> None:
+        """Forget an earlier run, and keep what is asked of this one.
+
+        Parameters
+        ----------
+        scenarios
+            All of them.
+        options
+            Of the command.
+        """
         if self._interrupted():
             _say(f"{self._results} holds an interrupted run, which is given up: it would have gone on with --resume")
         rmtree(self._folder, ignore_errors=True)
@@ -152,6 +160,7 @@ class StudyCheckpoints:
         content["run"] = self.run
         content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
         content["parameters"] = [str(path.resolve()) for path in options.parameters]
+        write_text(self._folder / CASE, scenarios[0].case.text)
         write_text(self._folder / _REQUEST, json.dumps(content, indent=1))
 
     def _interrupted(self) -> bool:

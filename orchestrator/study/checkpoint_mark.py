@@ -1,16 +1,20 @@
 """What a run is made of, item by item: a checkpoint is worth nothing to a run that is made of something else."""
 
 import hashlib
+import json
 import os
 import platform
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.points.key import code_hash, component_content, library_versions
 
+_CASE = "the case"
 _KERNEL = "GFOR_COSIM_KERNEL"
 _SHOWN = 4
 """So many differences are named."""
@@ -25,7 +29,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         "the code of gfor-cosim": code_hash(),
         "machine": f"{sys.platform} {platform.machine()}",
         f"the environment variable {_KERNEL}": os.environ.get(_KERNEL, ""),
-        "the text of the case": hashlib.sha256(prepared.case.text.encode()).hexdigest(),
+        _CASE: _digest(prepared.case.text),
         "the communication step": f"{prepared.step_size!r} s",
         "the stop time": f"{prepared.stop_time!r} s",
         "the schedule": f"{prepared.schedule.name}: {groups}",
@@ -48,9 +52,47 @@ def _shown(path: Path) -> str:
     return path.name
 
 
-def differences(then: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """What is not as it was, in words; empty where all is."""
-    found = list(_differences(then, now))
+def _digest(text: str) -> str:
+    """Of all that a case file says; comments do not count."""
+    return hashlib.sha256(json.dumps(_read(text), default=str).encode()).hexdigest()
+
+
+def _read(text: str) -> Any:
+    """What a case file says, without its comments."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:  # nothing that was run; a file that somebody damaged
+        return text
+
+
+def _entries(content: Any, name: str) -> Iterator[tuple[str, str]]:
+    """Every value of a case by its keys, such as ``events.0.time``."""
+    if isinstance(content, dict):
+        for key, inner in content.items():
+            yield from _entries(inner, f"{name}.{key}")
+    elif isinstance(content, list) and any(isinstance(inner, dict | list) for inner in content):
+        for index, inner in enumerate(content):
+            yield from _entries(inner, f"{name}.{index}")
+    else:
+        yield name.removeprefix("."), json.dumps(content, default=str, ensure_ascii=False)
+
+
+def differences(then: Mapping[str, str], now: Mapping[str, str], texts: tuple[str, str] | None = None) -> str:
+    """What is not as it was, in words; empty where all is.
+
+    Parameters
+    ----------
+    then, now
+        Marks of a run.
+    texts
+        Of the case, then and now; what differs there is named first, as the rest may come of it. A text that is not
+        the mark's is left out.
+    """
+    found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
+    if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
+        was, is_now = (dict(_entries(_read(text), "")) for text in texts)
+        said = [f"in the case, {words}" for words in _differences(was, is_now)]
+        found = [*(said or [f"{_CASE} has its tables in another order"]), *found[1:]]
     return "; ".join(found[:_SHOWN]) + (f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else "")
 
 
@@ -61,7 +103,7 @@ def _differences(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[st
             continue
         if was is None or is_now is None:
             yield f"{name} {'is new' if was is None else 'is gone'}"
-        elif max(len(was), len(is_now)) > 30:
+        elif max(len(was), len(is_now)) > 60:
             yield f"{name} has changed"
         else:
             yield f"{name} was {was or 'not there'} and is {is_now or 'not there'}"

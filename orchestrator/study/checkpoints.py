@@ -18,7 +18,11 @@ from orchestrator.results.checkpoint_file import (
 )
 from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
 from orchestrator.results.taken_back import take_back
+from orchestrator.safe_files import write_text
 from orchestrator.study.checkpoint_mark import differences, mark_of
+
+CASE = "case.toml"
+"""Among the checkpoints: the case's text when the run began."""
 
 EVERY = 60.0
 """Wall-clock time between two checkpoints [s]."""
@@ -70,6 +74,7 @@ class Checkpoints:
         self._name, self._say, self._every = prepared.name, say, every
         self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
         self._path = folder / f"{quote(prepared.name, safe='')}.checkpoint"
+        self._case, self._text = folder / CASE, prepared.case.text
         self._written = False
         self._kept: RunState | None = None
         self._unable = bool(not_kept(prepared))
@@ -134,6 +139,8 @@ class Checkpoints:
         """Remove what is there."""
         for path in (self._path, previous(self._path)):
             path.unlink(missing_ok=True)
+        if not any(path.suffix == self._path.suffix for path in self._path.parent.glob("*")):
+            self._case.unlink(missing_ok=True)
 
     # -- what the master asks --------------------------------------------------------------------
 
@@ -163,6 +170,8 @@ class Checkpoints:
             self._give_up(str(error))  # an isolated FMU that died says so itself, at its next step
             return
         try:
+            if not (self._written or self._case.exists()):
+                write_text(self._case, self._text)
             write_checkpoint(self._path, {"mark": self._mark}, arrays)
             self._written = True
         except ResultsError as error:
@@ -206,7 +215,11 @@ class Checkpoints:
         return None
 
     def _compare(self, then: dict[str, str]) -> None:
-        said = differences(then, self._mark)
+        try:
+            was: str | None = self._case.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            was = None
+        said = differences(then, self._mark, None if was is None else (was, self._text))
         if said:
             raise InputError(
                 f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "

@@ -65,7 +65,7 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
     process = started(tmp, *words)
     while process.poll() is None and processor_time(process.pid) < moment:
-        time.sleep(0.005)
+        time.sleep(0.02)
     process.send_signal(kind)
     _, error = process.communicate(timeout=300)
     code, wrong = process.returncode, []
@@ -95,7 +95,7 @@ def undisturbed(case: Path, folder: Path) -> tuple[dict[str, Any], float]:
     process, life = started(folder / "tmp", case, *WORDS, "--out", folder / "out"), 0.0
     while process.poll() is None:
         life = max(life, processor_time(process.pid))
-        time.sleep(0.005)
+        time.sleep(0.02)
     _, error = process.communicate(timeout=300)
     if process.returncode != 0:
         raise SystemExit(f"the undisturbed run failed: {error}")
@@ -120,6 +120,7 @@ def main() -> None:
         assert all(values == wanted for values, _ in wholes)
         print(f"seed {seed}; an undisturbed run takes {life:.1f} s of a processor", flush=True)
         moments = [(kind, chance.uniform(0, life)) for kind, count in tries.items() for _ in range(count)]
+        chance.shuffle(moments)
         found: Counter[tuple[str, str]] = Counter()
         wrong = 0
 

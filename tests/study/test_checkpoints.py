@@ -210,11 +210,32 @@ def test_another_fmu_of_the_same_name_is_named(tmp_path, said, monkeypatch):
         resumed(prepared_scenario(), tmp_path, said)
 
 
-def test_another_text_of_the_case_is_named(tmp_path, said):
+def with_text(prepared, old, new):
+    assert old in prepared.case.text
+    return replace(prepared, case=replace(prepared.case, text=prepared.case.text.replace(old, new)))
+
+
+def test_a_comment_in_the_case_changes_nothing(tmp_path, said):
     prepared = prepared_scenario()
     interrupted(prepared, tmp_path, said, 0.4)
-    other = replace(prepared, case=replace(prepared.case, text=prepared.case.text + "\n# remark"))
-    with pytest.raises(InputError, match="the text of the case has changed"):
+    result = resumed(
+        with_text(prepared, 'name = "infinite_bus"', 'name   =   "infinite_bus"  # remark'), tmp_path, said
+    )
+    assert result.failure is None
+    assert not said
+
+
+def test_what_has_changed_in_the_case_is_named_with_both_values(tmp_path, said):
+    prepared = prepared_scenario()
+    interrupted(prepared, tmp_path, said, 0.4)
+    other = with_text(prepared, "P_0 = 0.6", "P_0 = 0.7")
+    with pytest.raises(InputError) as caught:
+        resumed(other, tmp_path, said)
+    assert "'dip' cannot be resumed: in the case, components.gfor.parameters.P_0 was 0.6 and is 0.7" in str(
+        caught.value
+    )
+    (tmp_path / "case.toml").unlink()
+    with pytest.raises(InputError, match="the case has changed; bring that back"):
         resumed(other, tmp_path, said)
 
 
