@@ -11,6 +11,7 @@ import time
 import pytest
 import xarray as xr
 
+from orchestrator.api.case import load
 from orchestrator.cli import run as command
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import InputError
@@ -143,3 +144,27 @@ def test_a_new_run_says_that_it_gives_up_an_interrupted_one(gfor, tmp_path, left
     code, _, error = gfor(*SHORT, "--out", tmp_path)
     assert code == 0
     assert error.count("holds an interrupted run, which is given up") == bool(left)
+
+
+def test_other_commands_hold_the_folder_of_their_results_as_well(gfor, tmp_path):
+    commands = {
+        "modes": ("modes", "infinite_bus", "--scenario", "dip"),
+        "sweep": ("sweep", "infinite_bus", "--scenario", "dip", "--vary", "gfor.P_0=0.4,0.6"),
+    }
+    with held(tmp_path):
+        for name, words in commands.items():
+            code, _, error = gfor(*words, "--out", tmp_path)
+            assert code == 2, name
+            assert f"process {os.getpid()} works in this folder" in error, name
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_python_holds_the_folder_of_checkpoints_and_points(tmp_path):
+    case = load("infinite_bus")
+    with held(tmp_path):
+        with pytest.raises(InputError, match="works in this folder"):
+            case.scenario("dip").run(stop=0.1, checkpoints=tmp_path)
+        with pytest.raises(InputError, match="works in this folder"):
+            case.sweep({"gfor.P_0": [0.4, 0.6]}, ["dip"], folder=tmp_path)
+    case.scenario("dip").run(stop=0.1, checkpoints=tmp_path / "new")
+    assert list((tmp_path / "new").iterdir()) == []
