@@ -7,6 +7,7 @@ import platform
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,7 @@ def _shown(path: Path) -> str:
     return path.name
 
 
+@lru_cache(maxsize=4)
 def _digest(text: str) -> str:
     """Of all that a case file says; comments do not count."""
     return hashlib.sha256(json.dumps(_read(text), default=str).encode()).hexdigest()

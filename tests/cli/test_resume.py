@@ -12,6 +12,8 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import BUILT_IN
+from orchestrator.cli.checkpoints import StudyCheckpoints
+from orchestrator.results.staging import mend, staged
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can be sent these signals there")
 
@@ -200,3 +202,27 @@ def test_a_sigterm_after_all_was_done_does_not_change_the_exit_code():
     end = "import atexit, os, sys; from orchestrator.cli import main; atexit.register(os.kill, os.getpid(), 15)"
     call = [sys.executable, "-c", f"{end}; sys.argv[1:] = ['--version']; sys.exit(main())"]
     assert subprocess.run(call, check=False, capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_while_the_checkpoints_go_finds_the_run_done(gfor, tmp_path, monkeypatch, number):
+    end = StudyCheckpoints.end
+
+    def interrupted(self, *, whole):
+        os.kill(os.getpid(), number)
+        end(self, whole=whole)
+
+    monkeypatch.setattr(StudyCheckpoints, "end", interrupted)
+    code, _, error = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    assert code == 0, error
+    assert not [path.name for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_results_that_a_kill_left_half_written_give_way(tmp_path):
+    (tmp_path / ".part-r1").mkdir()
+    (tmp_path / ".part-r1" / "half.csv").write_text("a")
+    (tmp_path / ".part-r0.done-with").mkdir()
+    mend(tmp_path)
+    with staged(tmp_path, "r1") as folder:
+        (folder / "whole.csv").write_text("a")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["manifest.json", "whole.csv"]
