@@ -54,14 +54,12 @@ class _Column(xr.backends.BackendArray):
         return self._rows(begin, end)[:: asked.step]
 
     def _rows(self, begin: int, end: int) -> NDArray[np.float64]:
-        found = np.empty(end - begin)
+        found, stored = np.empty(end - begin), stored_name(self._name)
         for piece in self._pieces:
             first, last = max(begin, piece.first), min(end, piece.first + piece.rows)
             if first < last:
                 with _opened(piece.path) as file:
-                    found[first - begin : last - begin] = file[stored_name(self._name)][
-                        first - piece.first : last - piece.first
-                    ]
+                    found[first - begin : last - begin] = file[stored][first - piece.first : last - piece.first]
         return found
 
 
@@ -110,7 +108,9 @@ def open_whole(path: Path) -> xr.Dataset:
     """
     found = _of_ours(path)
     if found is None:
-        found = xr.open_dataset(path, cache=False)
+        stored = xr.open_dataset(path, cache=False)
+        found = stored.rename({name: name_of(str(name)) for name in stored.data_vars})
+        found.set_close(stored.close)
     if found.nbytes > IN_MEMORY:
         return found
     with found:

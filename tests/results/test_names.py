@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.results.netcdf import join_netcdf, name_of, netcdf_image, stored_name
-from orchestrator.results.recording import open_recording, open_whole
+from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.storage import save_dataset, save_netcdf
 
 NAMES = ("unit.bus/1/v", "unit.share%", "unit.a%2Fb", "unit.plain")
