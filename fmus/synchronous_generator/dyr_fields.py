@@ -111,7 +111,8 @@ DYR_RECORDS: dict[str, DyrRecord] = {
         "gensal",
         _fields(
             "machine",
-            "T'do:T_d10 T''do:T_d20 T''qo:T_q20 H:H D:D Xd:X_d Xq:X_q X'd:X_d1 X''d:X_d2 Xl:X_l S(1.0):s_10 S(1.2):s_12",
+            "T'do:T_d10 T''do:T_d20 T''qo:T_q20 H:H D:D Xd:X_d Xq:X_q X'd:X_d1 X''d:X_d2 Xl:X_l "
+            "S(1.0):s_10 S(1.2):s_12",
         ),
     ),
     "SEXS": DyrRecord(
@@ -170,9 +171,15 @@ DYR_RECORDS: dict[str, DyrRecord] = {
     "ESST4B": DyrRecord(
         "exciter",
         "st4b",
-        _x(
-            "TR:T_R KPR:K_PR KIR:K_IR VRMAX:V_RMAX VRMIN:V_RMIN TA:T_A KPM:K_PM KIM:K_IM VMMAX:V_MMAX VMMIN:V_MMIN "
-            "KG:K_G KP:K_P KI:K_I VBMAX:V_BMAX KC:K_C XL:X_L THETAP:theta_P"
+        (
+            *_x(
+                "TR:T_R KPR:K_PR KIR:K_IR VRMAX:V_RMAX VRMIN:V_RMIN TA:T_A KPM:K_PM KIM:K_IM VMMAX:V_MMAX "
+                "VMMIN:V_MMIN KG:K_G KP:K_P"
+            ),
+            DyrField("KI", only=(0.0,)),
+            *_x("VBMAX:V_BMAX KC:K_C"),
+            DyrField("XL", only=(0.0,)),
+            DyrField("THETAP", only=(0.0,)),
         ),
     ),
     "TGOV1": DyrRecord("governor", "tgov1", _g("R:R T1:T_1 VMAX:V_MAX VMIN:V_MIN T2:T_2 T3:T_3 Dt:D_t")),

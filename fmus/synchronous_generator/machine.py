@@ -14,74 +14,15 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches, convert
 from fmus.synchronous_generator.data import STAMP, MachineData
-from fmus.toolchain.frames import Phasor
+from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import BREAKER_TIME, DevicePort
+from fmus.toolchain.port import DevicePort
 
 FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]
 """Declares a flux by its name, start value and description."""
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis: magnetising and leakage reactance, rotor branches, states, and quantities that follow from them.
-
-    ``emf`` is the flux behind the subtransient reactance; stator current and air-gap flux are
-    linear in it and in the stator flux.
-    """
-
-    X_m: ca.SX
-    branches: RotorBranches
-    psi: ca.SX
-    psi_1: ca.SX
-    psi_2: ca.SX
-    X_subtransient: ca.SX
-    X_between: ca.SX
-
-    @property
-    def weight_1(self) -> ca.SX:
-        """Part of the first rotor branch's flux in the subtransient flux."""
-        return self.X_subtransient / self.branches.X_1
-
-    @property
-    def weight_2(self) -> ca.SX:
-        """Part of the second rotor branch's flux in the subtransient flux."""
-        return self.X_subtransient / self.branches.X_2
-
-    @property
-    def emf(self) -> ca.SX:
-        """Subtransient flux of the rotor [pu]."""
-        return self.weight_1 * self.psi_1 + self.weight_2 * self.psi_2
-
-    @property
-    def i(self) -> ca.SX:
-        """Stator current of this axis [pu]."""
-        return (self.emf - self.psi) / self.X_between
-
-    @property
-    def psi_airgap(self) -> ca.SX:
-        """Flux in the air gap [pu]."""
-        return self.emf - self.X_subtransient * self.i
-
-    @property
-    def i_1(self) -> ca.SX:
-        """Current of the first rotor branch [pu]."""
-        return (self.psi_1 - self.psi_airgap) / self.branches.X_1
-
-    @property
-    def i_2(self) -> ca.SX:
-        """Current of the second rotor branch [pu]."""
-        return (self.psi_2 - self.psi_airgap) / self.branches.X_2
-
-    def current_rate(self, psi_rate: ca.SX, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
-        """di/dt from the rates of the three fluxes."""
-        return (self.weight_1 * psi_1_rate + self.weight_2 * psi_2_rate - psi_rate) / self.X_between
-
-    def open_rate(self, psi_1_rate: ca.SX, psi_2_rate: ca.SX) -> ca.SX:
-        """Rate of the stator flux for which di/dt = −i/τ, as behind an open breaker."""
-        return self.weight_1 * psi_1_rate + self.weight_2 * psi_2_rate + self.X_between * self.i / BREAKER_TIME
 
 
 @dataclass(frozen=True)
@@ -124,8 +65,10 @@ class Machine:
 
     @property
     def field_current(self) -> ca.SX:
-        """X_md·i_f: 1 pu gives 1 pu open-circuit voltage."""
-        return self.d.X_m * self.d.i_1
+        """X_md·i_f: 1 pu gives 1 pu open-circuit voltage; the constant emf where there is no field winding."""
+        if self.d.fixed_emf is not None:
+            return self.d.fixed_emf
+        return self.d.X_m * self.d.current(0)
 
 
 def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
@@ -211,43 +154,60 @@ def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, 
     g
         The machine as it is declared.
     """
-    rates = _rotor_flux_rates(g, port, E_fd)
-    for psi, rate in zip((g.d.psi_1, g.d.psi_2, g.q.psi_1, g.q.psi_2), rates, strict=True):
-        m.derivative(psi, rate)
+    for axis, rates in zip((g.d, g.q), _rotor_flux_rates(g, port, E_fd), strict=True):
+        for winding, rate in zip(axis.windings, rates, strict=True):
+            m.derivative(winding.psi, rate)
     m.derivative(g.w, (P_m / g.w - g.torque - g.D * (g.w - 1)) / (2 * g.H))
     m.derivative(g.delta, port.omega_b * (g.w - 1))
 
 
 def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
     """|v_t| at the machine's terminal: the bus voltage plus the transformer's drop, di/dt included."""
-    psi_q, psi_d, psi_f, psi_1d, psi_1q, psi_2q = _flux_rates(g, port, E_fd)
-    rate = Phasor(g.q.current_rate(psi_q, psi_1q, psi_2q), -g.d.current_rate(psi_d, psi_f, psi_1d))
+    psi_q, psi_d, d_rotor, q_rotor = _flux_rates(g, port, E_fd)
+    rate = Phasor(g.q.current_rate(psi_q, q_rotor), -g.d.current_rate(psi_d, d_rotor))
     drop = Phasor(g.R_t, g.w * g.X_t) * g.current + rate * (g.X_t / port.omega_b)
     opened = Phasor(psi_q, -psi_d) / port.omega_b - g.current * g.R + Phasor(g.w * g.d.psi, g.w * g.q.psi)
     return (port.through_breaker(port.v.rotated(-g.delta), opened) + drop).magnitude()
 
 
-def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
-    """Rates of ψ_q, ψ_d, ψ_f, ψ_1d, ψ_1q, ψ_2q.
+def terminal_power(g: Machine, port: DevicePort) -> tuple[ca.SX, ca.SX]:
+    """Electrical power at the machine's terminal [pu, S_n], that at the bus and the transformer's losses; and the same
+    at the operating point.
+    """
+    losses = g.R_t * g.current.magnitude() ** 2
+    P_e = power(port.v.rotated(-g.delta), g.current).re + losses
+    P_e_0 = power(port.v_0, port.i_0).re + g.R_t * port.i_0.magnitude() ** 2
+    return ca.SX(P_e), ca.SX(P_e_0)
+
+
+RotorRates = tuple[ca.SX, ...]
+"""Rates of the fluxes of one axis' rotor windings."""
+
+
+def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ca.SX, RotorRates, RotorRates]:
+    """Rates of ψ_q, ψ_d and of the rotor's fluxes, d and q axis.
 
     Behind an open breaker the stator's flux follows the rotor's such that the current fades like that of every open
     breaker. The voltage at the breaker then follows from the stator's equation.
     """
-    psi_f, psi_1d, psi_1q, psi_2q = _rotor_flux_rates(g, port, E_fd)
+    d_rotor, q_rotor = _rotor_flux_rates(g, port, E_fd)
     v = port.v.rotated(-g.delta)
     closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
-    opened = Phasor(g.q.open_rate(psi_1q, psi_2q), g.d.open_rate(psi_f, psi_1d))
+    opened = Phasor(g.q.open_rate(q_rotor), g.d.open_rate(d_rotor))
     psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
-    return ca.SX(psi.re), ca.SX(psi.im), psi_f, psi_1d, psi_1q, psi_2q
+    return ca.SX(psi.re), ca.SX(psi.im), d_rotor, q_rotor
 
 
-def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ...]:
-    """Rates of ψ_f, ψ_1d, ψ_1q, ψ_2q."""
-    psi_f = port.omega_b * g.d.branches.R_1 * (E_fd / g.d.X_m - g.d.i_1)
-    psi_1d = -port.omega_b * g.d.branches.R_2 * g.d.i_2
-    psi_1q = -port.omega_b * g.q.branches.R_1 * g.q.i_1
-    psi_2q = -port.omega_b * g.q.branches.R_2 * g.q.i_2
-    return psi_f, psi_1d, psi_1q, psi_2q
+def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[RotorRates, RotorRates]:
+    """Rates of the rotor's fluxes, d and q axis; the first winding of the d axis is the field."""
+    d_rotor, q_rotor = (
+        tuple(-port.omega_b * winding.R * axis.current(k) for k, winding in enumerate(axis.windings))
+        for axis in (g.d, g.q)
+    )
+    if d_rotor:
+        field = port.omega_b * g.d.windings[0].R * (E_fd / g.d.X_m - g.d.current(0))
+        d_rotor = (field, *d_rotor[1:])
+    return d_rotor, q_rotor
 
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:
@@ -354,18 +314,28 @@ def _operating_point(
     airgap_d, airgap_q = E_fd - X_md * i_d, -X_mq * i_q
     psi_f = airgap_d + reactances["d"][1].X_1 * E_fd / X_md
 
+    stator_d = stator_flux(m, "psi_d", psi_d, "Flux of stator and transformer, d axis")
+    X_md, b_d, X_sub, X_between = reactances["d"]
     d = Axis(
-        *reactances["d"][:2],
-        stator_flux(m, "psi_d", psi_d, "Flux of stator and transformer, d axis"),
-        flux_state(m, "psi_f", psi_f, "Field flux"),
-        flux_state(m, "psi_1d", airgap_d, "Damper flux, d axis"),
-        *reactances["d"][2:],
+        X_md,
+        (
+            Winding(b_d.X_1, b_d.R_1, flux_state(m, "psi_f", psi_f, "Field flux")),
+            Winding(b_d.X_2, b_d.R_2, flux_state(m, "psi_1d", airgap_d, "Damper flux, d axis")),
+        ),
+        stator_d,
+        X_sub,
+        X_between,
     )
+    X_mq, b_q, X_sub, X_between = reactances["q"]
+    stator_q = stator_flux(m, "psi_q", psi_q, "Flux of stator and transformer, q axis")
     q = Axis(
-        *reactances["q"][:2],
-        stator_flux(m, "psi_q", psi_q, "Flux of stator and transformer, q axis"),
-        flux_state(m, "psi_1q", airgap_q, "First damper flux, q axis"),
-        flux_state(m, "psi_2q", airgap_q, "Second damper flux, q axis"),
-        *reactances["q"][2:],
+        X_mq,
+        (
+            Winding(b_q.X_1, b_q.R_1, flux_state(m, "psi_1q", airgap_q, "First damper flux, q axis")),
+            Winding(b_q.X_2, b_q.R_2, flux_state(m, "psi_2q", airgap_q, "Second damper flux, q axis")),
+        ),
+        stator_q,
+        X_sub,
+        X_between,
     )
     return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

@@ -44,21 +44,38 @@ def _generator(variant: Variant) -> Model:
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     g = declare_machine(m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name))
     emf = Phasor(g.d.emf, g.q.emf) * g.w
-    _close_stator(m, g, port, emf)
-    v_t = _terminal_voltage(g, port, emf)
+    close_stator(m, g, port, emf)
+    v_t = phasor_terminal_voltage(g, port, emf)
     E_fd, _ = variant.exciter(m, g.start, lambda E: v_t, g.field_current)
     P_m = ieeeg1(m, g.w, g.start.T_e, variant.governor)
     rotor_equations(m, g, port, E_fd, P_m)
 
-    impedance = Phasor(g.R, g.d.X_between)
-    start = g.start.v + impedance * g.start.i
-    source = source_emf(m, emf - _saliency(m, g), start, g.delta, port.omega_b * (g.w - 1))
-    declare_phasor_outputs(m, port, source, impedance)
+    declare_phasor_port(m, g, port, emf)
     declare_generator_outputs(m, g, v_t, E_fd, P_m)
     return m.build()
 
 
-def _close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
+def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
+    """Declare emf and admittance, and the lag for what saliency the admittance cannot show.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    g
+        The machine.
+    port
+        Of the generator.
+    emf
+        Behind the subtransient reactance, rotor frame [pu].
+    """
+    impedance = Phasor(g.R, g.d.X_between)
+    start = g.start.v + impedance * g.start.i
+    source = source_emf(m, emf - _saliency(m, g), start, g.delta, port.omega_b * (g.w - 1))
+    declare_phasor_outputs(m, port, source, impedance)
+
+
+def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i."""
     over = (emf - port.v.rotated(-g.delta)) * port.connected
     R, X_d, X_q = g.R, g.d.X_between, g.q.X_between
@@ -69,7 +86,7 @@ def _close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) ->
     m.close(g.q.psi, g.q.emf - X_q * i_q)
 
 
-def _terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> ca.SX:
+def phasor_terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> ca.SX:
     """|v_t|: the bus voltage plus the transformer's drop; the emf behind an open breaker."""
     at_port = port.through_breaker(port.v.rotated(-g.delta), emf)
     return (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()

@@ -14,6 +14,9 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 BYPASS_TIME = 0.01
 """Time constant [s] with which the unused state of a left-out block follows its input."""
 
+RETURN_TIME = 1e-3
+"""Time constant [s] with which a state returns to the limit that a step of integration carried it over."""
+
 
 def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """s·T_W/(1 + s·T_W); its output is 0 in steady state.
@@ -73,6 +76,20 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial
     return ca.if_else(left_out, u, x)
 
 
+def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial: Scalar = 0.0) -> ca.SX:
+    """s·T_W/(1 + s·T_W); passed through where T_W = 0, and then ``initial`` must be 0 or be taken off later.
+
+    Parameters
+    ----------
+    m, name, u, initial
+        As `washout`.
+    T_W
+        Time constant [s], 0 or more.
+    """
+    left_out = _is_zero(T_W)
+    return ca.if_else(left_out, u, washout(m, name, u, ca.if_else(left_out, BYPASS_TIME, T_W), initial))
+
+
 def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
 
@@ -116,6 +133,90 @@ def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar,
 def limit(u: ca.SX, magnitude: Scalar) -> ca.SX:
     """Clamp to ±magnitude."""
     return ca.fmin(ca.fmax(u, -magnitude), magnitude)
+
+
+def clamp(u: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+    """The value, or the limit that it is beyond."""
+    return ca.fmin(ca.fmax(u, low), high)
+
+
+def limited_low_pass(
+    m: ModelBuilder, name: str, u: ca.SX, T: Scalar, low: Scalar, high: Scalar, initial: Scalar = 0.0
+) -> ca.SX:
+    """1/(1 + s·T) that stops at its limits and leaves them as soon as its input does (non-windup); T = 0: a limiter.
+
+    Parameters
+    ----------
+    m, name, u, initial
+        As `low_pass`.
+    T
+        Time constant [s], 0 or more.
+    low, high
+        Limits of the output.
+    """
+    x = m.state(name, initial, "pu", "first-order lag with limits", base="S_n")
+    return close_limited_low_pass(m, x, u, T, low, high)
+
+
+def close_limited_low_pass(m: ModelBuilder, x: ca.SX, u: ca.SX, T: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+    """`limited_low_pass` with a state that is declared already, for what the input is fed back from.
+
+    Parameters
+    ----------
+    m, u, T, low, high
+        As `limited_low_pass`.
+    x
+        The state.
+    """
+    left_out = _is_zero(T)
+    rate = (u - x) / ca.if_else(left_out, BYPASS_TIME, T)
+    m.derivative(x, ca.if_else(left_out, rate, held_at_limits(x, rate, low, high)))
+    return clamp(ca.if_else(left_out, u, x), low, high)
+
+
+def limited_proportional_integral(
+    m: ModelBuilder,
+    name: str,
+    error: ca.SX,
+    K_P: Scalar,
+    K_I: Scalar,
+    low: Scalar,
+    high: Scalar,
+    initial: Scalar,
+) -> ca.SX:
+    """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
+
+    Parameters
+    ----------
+    m, name, error, K_P, K_I
+        As `proportional_integral`.
+    low, high
+        Limits of the output.
+    initial
+        Of the integrator, in steady state.
+    """
+    x = m.state(name, initial, "pu", "integrator with limits", base="S_n")
+    u = K_P * error + x
+    outward = ca.logic_or(ca.logic_and(u > high, error > 0), ca.logic_and(u < low, error < 0))
+    m.derivative(x, ca.if_else(outward, 0, K_I * error))
+    return clamp(u, low, high)
+
+
+def held_at_limits(x: ca.SX, rate: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+    """The rate of a state with non-windup limits: what lies beyond a limit after a step returns to it at once.
+
+    Parameters
+    ----------
+    x
+        The state.
+    rate
+        Its rate without limits.
+    low, high
+        The limits; use the state through `clamp`.
+    """
+    above = ca.logic_and(x > high, ca.SX(rate) > 0)
+    below = ca.logic_and(x < low, ca.SX(rate) < 0)
+    return ca.if_else(above, (high - x) / RETURN_TIME, ca.if_else(below, (low - x) / RETURN_TIME, rate))
 
 
 def _is_zero(T: Scalar) -> ca.SX:

@@ -51,7 +51,11 @@ class DevicePort:
 
 def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     """Declare rating, power-flow start values and the voltage input of a device."""
-    rating = declare_rating(m, S_n)
+    return device_port_of(m, declare_rating(m, S_n), P_0)
+
+
+def device_port_of(m: ModelBuilder, rating: ca.SX, P_0: float) -> DevicePort:
+    """`device_port` of a device that has declared its rating [MVA], because its data depend on it."""
     system = m.declare(port_variables.S_BASE)
     v = Phasor(m.declare(port_variables.V_RE), m.declare(port_variables.V_IM))
     return port_at(m, v, P_0, rating / system)

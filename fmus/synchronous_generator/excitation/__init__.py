@@ -1,0 +1,1 @@
+"""Excitation systems with ceilings that `synchronous_generator` can be made of (IEEE 421.5)."""

@@ -1,0 +1,63 @@
+"""AC1A: a field-controlled alternator with a rotating rectifier, uncontrolled, and rate feedback.
+
+V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A), held within V_AMIN and V_AMAX → V_RMIN ≤ V_R ≤ V_RMAX
+T_E·dV_E/dt = V_R − V_FE,  V_E ≥ 0,  V_FE = (K_E + S_E(V_E))·V_E + K_D·I_FD
+E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE
+"""
+
+import casadi as ca
+
+from fmus.synchronous_generator.excitation.common import (
+    Measurement,
+    exciter_saturation,
+    gain,
+    lead_lag_stage,
+    rate_feedback,
+    rectifier,
+    require_within,
+    time,
+    voltage_before_rectifier,
+)
+from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.machine import Start
+from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
+
+_MOST = 1e9
+"""No upper limit of V_E [pu]."""
+
+_LEAST = 1e-3
+"""Smallest V_E [pu] that the rectifier's loading is divided by."""
+
+
+def ac1a(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+) -> tuple[ca.SX, ca.SX]:
+    """Declare it and return (E_fd, |v_t|) [pu].
+
+    Parameters
+    ----------
+    m, start, terminal_voltage, I_fd, v_s
+        As `exciters.ac4a`.
+    """
+    with m.scope("exciter"):
+        K_A, T_A = gain(m, "K_A", 400.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out")
+        A_high, A_low = gain(m, "V_AMAX", 14.5, "Upper limit of V_A"), gain(m, "V_AMIN", -14.5, "Lower limit of V_A")
+        R_high, R_low = gain(m, "V_RMAX", 6.03, "Upper limit of V_R"), gain(m, "V_RMIN", -5.43, "Lower limit of V_R")
+        K_E, T_E = gain(m, "K_E", 1.0, "Exciter constant"), time(m, "T_E", 0.8, "Exciter's field", 1e-3)
+        K_C = gain(m, "K_C", 0.2, "Rectifier loading factor", 0)
+        K_D = gain(m, "K_D", 0.38, "Demagnetising factor", 0)
+        curve = exciter_saturation(m, 4.18, 0.1, 3.14, 0.03)
+        V_E0 = voltage_before_rectifier(start.E_fd, K_C * start.E_fd)
+        V_R0 = K_E * V_E0 + curve.part(V_E0) + K_D * start.E_fd
+        require_within(m, V_R0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
+        require_within(m, V_R0, R_low, R_high, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        x = m.state("V_E", V_E0, "pu", "Voltage before the rectifier", base="E_fd")
+        V_E = ca.fmax(x, 0)
+        V_FE = K_E * V_E + curve.part(V_E) + K_D * I_fd
+        V_F, _ = rate_feedback(m, V_FE, V_R0, 0.03, 1.0)
+        measured = Measurement(m, start, terminal_voltage, I_fd)
+        error = lead_lag_stage(m, measured.error(V_R0 / K_A, v_s) - V_F, V_R0 / K_A)
+        V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, V_R0)
+        m.derivative(x, held_at_limits(x, (clamp(V_A, R_low, R_high) - V_FE) / T_E, 0.0, _MOST))
+        return measured.close(V_E * rectifier(K_C * I_fd / ca.fmax(V_E, _LEAST)))

@@ -1,0 +1,169 @@
+"""What excitation systems have in common: parameters, the measured voltage, a rate feedback, rectifier and saturation.
+
+Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it.
+"""
+
+import casadi as ca
+
+from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.machine import Start
+from fmus.synchronous_generator.saturation import require_rising, saturated_part
+from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
+
+SOURCE = "typical data, IEEE 421.5"
+
+E_FD = "E_fd"
+
+
+def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
+    """Declare a gain or limit per unit of the field voltage."""
+    return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
+
+
+def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
+    """Declare a time constant [s]. One that may be 0 leaves its block out there and is not between 0 and the step."""
+    T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
+    if minimum == 0:
+        m.require(
+            ca.if_else(T <= 0, 1, T - m.internal_step / 2),
+            f"exciter.{name} must be 0 or longer than half of internal_step",
+        )
+    return T
+
+
+class Measurement:
+    """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
+
+    Parameters
+    ----------
+    m
+        The generator's model, in the exciter's scope.
+    start
+        The machine's operating point.
+    terminal_voltage
+        Gives |v_t| [pu, S_n] for an E_fd [pu].
+    I_fd
+        Field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
+    """
+
+    def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> None:
+        self._m, self._v_t, self._start = m, terminal_voltage, start
+        T_R = time(m, "T_R", 0.01, "Voltage measurement; 0 leaves it out")
+        self._left_out = T_R <= 0
+        self._T_R = ca.if_else(self._left_out, BYPASS_TIME, T_R)
+        self._state = m.state("v_m", start.v_t, "pu", "Measured terminal voltage", base="S_n")
+        self.nearly = terminal_voltage(I_fd)
+        """|v_t| [pu] for an E_fd that equals the field current, as it does in steady state."""
+
+    def error(self, at_start: Scalar, v_s: Scalar) -> ca.SX:
+        """Reference and stabiliser's signal less the measured voltage [pu, S_n]; ``at_start`` in steady state."""
+        m = self._m
+        V_ref = m.calculated(
+            "V_ref", self._start.v_t + at_start, "pu", "Voltage reference of the operating point", base="S_n"
+        )
+        delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
+        return V_ref + delta + v_s - ca.if_else(self._left_out, self.nearly, self._state)
+
+    def close(self, E_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """(E_fd, |v_t|) of the exciter."""
+        v_t = self._v_t(E_fd)
+        self._m.derivative(self._state, (v_t - self._state) / self._T_R)
+        return E_fd, v_t
+
+
+def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", lead: float = 0.0) -> ca.SX:
+    """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0; ``mark`` follows C and B."""
+    T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
+    T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
+    m.require(
+        ca.if_else(ca.logic_and(T_B <= 0, T_C > 0), -1, 1), f"exciter.T_B{mark} = 0 needs exciter.T_C{mark} = 0 as well"
+    )
+    return lead_lag(m, f"lead_lag{mark}", u, T_C, T_B, initial)
+
+
+def rate_feedback(
+    m: ModelBuilder, u: ca.SX, initial: Scalar, K_F: float = 0.0, T_F: float = 1.0, name: str = "feedback"
+) -> tuple[ca.SX, ca.SX]:
+    """s·K_F/(1 + s·T_F) of a signal, and K_F.
+
+    Parameters
+    ----------
+    m
+        The model.
+    u, initial
+        The signal, and its value in steady state.
+    K_F, T_F
+        Defaults.
+    name
+        Of the state.
+    """
+    gain_F = gain(m, "K_F", K_F, "Rate feedback; 0 leaves it out", 0)
+    lag = m.parameter("T_F", T_F, "s", "Lag of the rate feedback", minimum=1e-3, source=SOURCE)
+    x = m.state(name, initial, "pu", "rate feedback, slow part of the signal", base=E_FD)
+    m.derivative(x, (u - x) / lag)
+    return gain_F / lag * (u - x), gain_F
+
+
+def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str]) -> None:
+    """Refuse an operating point at or beyond a limit.
+
+    Parameters
+    ----------
+    m
+        The model.
+    value
+        Of the limited signal in steady state.
+    low, high
+        Its limits.
+    names
+        Of the two limits, such as ``exciter.V_RMIN``.
+    """
+    for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
+        m.require(
+            margin,
+            f"{name}: the operating point of the power flow lies at or {side} this limit, so the generator cannot "
+            "hold its voltage; change the limit, the gain, or the generator's voltage and reactive power",
+        )
+
+
+def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":
+    """Declare two points (E, S_E(E)) of the exciter's saturation curve."""
+    E = [
+        m.parameter(f"E_{k}", value, "pu", f"Point {k} of the saturation curve", base=E_FD, minimum=0, source=SOURCE)
+        for k, value in ((1, E_1), (2, E_2))
+    ]
+    S = [
+        m.parameter(f"S_E{k}", value, "1", f"Saturation S_E(E_{k}); both 0: none", minimum=0, source=SOURCE)
+        for k, value in ((1, S_E1), (2, S_E2))
+    ]
+    points = ((E[0], S[0]), (E[1], S[1]))
+    require_rising(m, *points, "exciter.E_1, S_E1, E_2, S_E2")
+    return ExciterSaturation(points)
+
+
+class ExciterSaturation:
+    """S_E(E)·E through two points."""
+
+    def __init__(self, points: tuple[tuple[ca.SX, ca.SX], tuple[ca.SX, ca.SX]]) -> None:
+        self._points = points
+
+    def part(self, E: ca.SX) -> ca.SX:
+        """S_E(E)·E [pu]; 0 for a negative voltage."""
+        return saturated_part(E, *self._points)
+
+
+def rectifier(I_N: ca.SX) -> ca.SX:
+    """F_EX(I_N) of a rectifier bridge (IEEE 421.5, annex D), I_N = K_C·I_FD/V_E."""
+    middle = ca.sqrt(ca.fmax(0.75 - I_N**2, 0))
+    upper = ca.if_else(I_N < 0.75, middle, ca.fmax(1.732 * (1 - I_N), 0))
+    return ca.if_else(I_N <= 0, 1, ca.if_else(I_N <= 0.433, 1 - 0.577 * I_N, upper))
+
+
+def voltage_before_rectifier(E: ca.SX, loading: ca.SX) -> ca.SX:
+    """V_E [pu] for which V_E·F_EX(loading/V_E) = E, loading = K_C·I_FD."""
+    first = E + 0.577 * loading
+    second = ca.sqrt((E**2 + loading**2) / 0.75)
+    third = E / 1.732 + loading
+    later = ca.if_else(loading < 0.75 * second, second, third)
+    return ca.if_else(loading <= 0.433 * first, first, later)

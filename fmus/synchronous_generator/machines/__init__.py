@@ -1,0 +1,1 @@
+"""Machines that `synchronous_generator` can be made of."""

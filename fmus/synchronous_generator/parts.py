@@ -1,0 +1,107 @@
+"""Machines, exciters, governors and stabilisers by name: what `synchronous_generator` can be made of."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from fmus.synchronous_generator.excitation.ac1a import ac1a
+from fmus.synchronous_generator.excitation.ac4a import ac4a
+from fmus.synchronous_generator.excitation.dc1a import dc1a, ieeet1
+from fmus.synchronous_generator.excitation.manual import manual
+from fmus.synchronous_generator.excitation.sexs import sexs
+from fmus.synchronous_generator.excitation.st1a import st1a
+from fmus.synchronous_generator.excitation.st4b import st4b
+from fmus.synchronous_generator.exciters import Exciter
+from fmus.synchronous_generator.machine import FluxDeclaration, Machine
+from fmus.synchronous_generator.machines.classical import classical
+from fmus.synchronous_generator.machines.standard import genrou, gensal, two_axis
+from fmus.synchronous_generator.stabilization.pss1a import pss1a
+from fmus.synchronous_generator.stabilization.pss2 import pss2a, pss2b
+from fmus.synchronous_generator.turbines.constant import constant_power, constant_torque
+from fmus.synchronous_generator.turbines.gast import gast
+from fmus.synchronous_generator.turbines.hygov import hygov
+from fmus.synchronous_generator.turbines.ieeeg1 import ieeeg1
+from fmus.synchronous_generator.turbines.tgov1 import tgov1
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port import DevicePort
+
+MachinePart = Callable[[ModelBuilder, DevicePort, ca.SX, FluxDeclaration], Machine]
+"""Declares a machine at its port: builder, port, rating [MVA], declaration of the stator's fluxes."""
+
+GovernorPart = Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]
+"""Mechanical power [pu, S_n] from speed and the power of the operating point."""
+
+StabilizerPart = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
+"""Signal [pu] from w − 1, electrical power and the power of the operating point."""
+
+NONE = "none"
+"""The stabiliser of a generator that has none."""
+
+MACHINES: dict[str, MachinePart] = {"classical": classical, "two_axis": two_axis, "gensal": gensal, "genrou": genrou}
+EXCITERS: dict[str, Exciter] = {
+    "manual": manual, "sexs": sexs, "ieeet1": ieeet1, "dc1a": dc1a, "ac1a": ac1a, "ac4a": ac4a, "st1a": st1a,
+    "st4b": st4b,
+}  # fmt: skip
+GOVERNORS: dict[str, GovernorPart] = {
+    "constant_power": constant_power, "constant_torque": constant_torque, "tgov1": tgov1, "hygov": hygov, "gast": gast,
+    "ieeeg1": ieeeg1,
+}  # fmt: skip
+STABILIZERS: dict[str, StabilizerPart | None] = {NONE: None, "pss1a": pss1a, "pss2a": pss2a, "pss2b": pss2b}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The parts of one generator, and its name."""
+
+    machine: MachinePart
+    exciter: Exciter
+    governor: GovernorPart
+    stabilizer: StabilizerPart | None
+    names: tuple[str, ...]
+
+    def model_name(self, suffix: str = "") -> str:
+        """``synchronous_generator_<machine>_<exciter>_<governor>[_<stabiliser>]``, with a suffix."""
+        return "_".join(["synchronous_generator", *self.names, *([suffix] if suffix else [])])
+
+    def title(self, kind: str) -> str:
+        """The model's title; ``kind`` says how its stator is modelled."""
+        return f"Synchronous generator of {', '.join(self.names)} and a step-up transformer ({kind})"
+
+
+def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:
+    """The parts of these names.
+
+    Raises
+    ------
+    ValueError
+        If there is no such part, or the parts do not fit each other.
+    """
+    found = Parts(
+        _part("machine", MACHINES, machine),
+        _part("exciter", EXCITERS, exciter),
+        _part("governor", GOVERNORS, governor),
+        _part("stabilizer", STABILIZERS, stabilizer),
+        (machine, exciter, governor, *([stabilizer] if stabilizer != NONE else [])),
+    )
+    if machine == "classical" and exciter != "manual":
+        raise ValueError(
+            f"exciter = {exciter!r}: the classical machine has no field winding that it could act on; take "
+            "exciter = 'manual', or machine = 'two_axis', 'gensal' or 'genrou'"
+        )
+    if exciter == "manual" and stabilizer != NONE:
+        raise ValueError(
+            f"stabilizer = {stabilizer!r}: it acts on a voltage regulator, and manual excitation has none; leave the "
+            "stabilizer out, or take another exciter"
+        )
+    return found
+
+
+def _part(kind: str, parts: Mapping[str, Any], name: str) -> Any:
+    if name not in parts:
+        close = difflib.get_close_matches(name.lower(), parts, 1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise ValueError(f"there is no {kind} {name!r}; {hint}there are: {', '.join(parts)}")
+    return parts[name]

@@ -1,0 +1,1 @@
+"""Governors and turbines that `synchronous_generator` can be made of."""
