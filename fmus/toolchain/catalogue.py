@@ -22,6 +22,14 @@ def needs_arguments(name: str) -> bool:
     return any(p.default is inspect.Parameter.empty for p in parameters)
 
 
+def parts_of(name: str) -> dict[str, str]:
+    """What a model can be made of, such as ``machine`` and ``exciter``, each with the part that it is made of if
+    nothing is chosen; empty for a model without parts.
+    """
+    parameters = inspect.signature(_factory(name)).parameters.values()
+    return {p.name: p.default for p in parameters if isinstance(p.default, str)}
+
+
 def build_model(name: str, **arguments: Any) -> Model:
     """Build one model of the catalogue.
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, parts_of
 from fmus.toolchain.extras import require
 from fmus.toolchain.model import FmiVersion, Model
 from orchestrator.api.values import flag, names
@@ -12,13 +12,21 @@ from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
 
 
-def catalogue_model(name: str) -> Model:
+def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
     """A model of the catalogue that needs no further data.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    parts
+        What a model with parts is made of, such as ``{"machine": "genrou", "exciter": "sexs"}``.
 
     Raises
     ------
     InputError
-        If there is none of that name, it needs a network, or its equations break a rule of the model builder.
+        If there is none of that name, it needs a network, has no such part, or its equations break a rule of the model
+        builder.
     """
     if name not in model_names():
         raise InputError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
@@ -26,8 +34,13 @@ def catalogue_model(name: str) -> Model:
         raise InputError(
             f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
         )
+    chosen, known = dict(parts or {}), parts_of(name)
+    unknown = [part for part in chosen if part not in known]
+    if unknown:
+        has = f"it is made of {', '.join(known)}" if known else "'synchronous_generator' has some"
+        raise InputError(f"model {name!r} has no part {unknown[0]!r} to choose; {has}")
     try:
-        return build_model(name)
+        return build_model(name, **chosen)
     except ValueError as error:
         raise InputError(f"model {name!r} cannot be built: {error}") from error
 
@@ -40,6 +53,7 @@ def build(
     fmi: FmiVersion = "2.0",
     platforms: Sequence[str] | None = None,
     extra: Mapping[str, bytes] | None = None,
+    parts: Mapping[str, str] | None = None,
 ) -> Path:
     """Build the FMU of a model; returns its path.
 
@@ -57,6 +71,8 @@ def build(
         Compile for these; by default for this machine's, native ones for all.
     extra
         Members for the FMU's ``extra/`` folder, by path, such as ``{"extra/notes.txt": b"..."}``.
+    parts
+        What a generator is made of, such as ``{"machine": "genrou", "exciter": "sexs"}``.
 
     Raises
     ------
@@ -84,7 +100,7 @@ def build(
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    made = catalogue_model(model) if isinstance(model, str) else model
+    made = catalogue_model(model, parts) if isinstance(model, str) else model
     chosen = None if platforms is None else _platforms(platforms, TARGETS)
     members, place = _members(extra), _folder(folder)
     recipe = NativeFmu(made, fmi) if native else PythonFmu(made)

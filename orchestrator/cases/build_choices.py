@@ -1,7 +1,8 @@
 """Choices of what a scenario is built of; a case file, a parameter file and ``--set`` write them among the values.
 
-``<component>.native`` chooses the kind of FMU, ``units.alpha`` the converters' share of the units. No FMU has such a
-variable. They are taken out where a layer of values is made, and the preparation reads them before it knows the FMUs.
+``<component>.native`` chooses the kind of FMU, ``<component>.exciter`` and the other `PARTS` what a generator is made
+of, ``units.alpha`` the converters' share of the units. No FMU has such a variable. They are taken out where a layer of
+values is made, and the preparation reads them before it knows the FMUs.
 """
 
 import fnmatch
@@ -14,6 +15,9 @@ ALPHA = "units.alpha"
 """Key of the share that all converters have; ``units.alpha.<label>`` is that of one unit."""
 
 _NATIVE = "native"
+
+PARTS = ("machine", "exciter", "governor", "stabilizer")
+"""Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
 Place = Callable[[str], str]
 """Key → where it is written."""
@@ -52,6 +56,45 @@ class NativeChoice:
         """
         if not isinstance(self.given, bool):
             raise ValueError(f"native = {self.given!r}; it must be true or false")
+        return self.given
+
+
+@dataclass(frozen=True)
+class PartChoice:
+    """A part of some components.
+
+    Attributes
+    ----------
+    pattern
+        Name of a component, or a pattern such as ``g*``.
+    part
+        One of `PARTS`.
+    given
+        As it is written.
+    place
+        Where it is written.
+    """
+
+    pattern: str
+    part: str
+    given: Value
+    place: str
+
+    def fits(self, component: str, *, has_part: bool) -> bool:
+        """Whether the choice is for a component; a pattern leaves out those that have no such part."""
+        return component == self.pattern or (has_part and fnmatch.fnmatch(component, self.pattern))
+
+    @property
+    def name(self) -> str:
+        """The choice.
+
+        Raises
+        ------
+        ValueError
+            If something else than a name is written.
+        """
+        if not isinstance(self.given, str):
+            raise ValueError(f"{self.part} = {self.given!r}; it must be the name of a part, in quotes")
         return self.given
 
 
@@ -97,6 +140,8 @@ class Layer:
         Of the components' variables, by ``component.variable``.
     natives
         Kinds of FMU, in the source's order.
+    parts
+        Parts of generators, in the source's order.
     shares
         Converters' shares; the one for all units comes first, so that those for one unit override it.
     place
@@ -105,6 +150,7 @@ class Layer:
 
     values: Mapping[str, Value]
     natives: tuple[NativeChoice, ...]
+    parts: tuple[PartChoice, ...]
     shares: tuple[ShareChoice, ...]
     place: Place
 
@@ -123,6 +169,7 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
     """
     values: dict[str, Value] = {}
     natives: list[NativeChoice] = []
+    parts: list[PartChoice] = []
     shares: list[ShareChoice] = []
     for key, value in given.items():
         pattern, _, variable = key.partition(".")
@@ -130,7 +177,9 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
             shares.append(ShareChoice(key.removeprefix(ALPHA).removeprefix("."), value, place(key)))
         elif variable == _NATIVE:
             natives.append(NativeChoice(pattern, value, place(key)))
+        elif variable in PARTS:
+            parts.append(PartChoice(pattern, variable, value, place(key)))
         else:
             values[key] = value
     shares.sort(key=lambda choice: choice.label != "")
-    return Layer(values, tuple(natives), tuple(shares), place)
+    return Layer(values, tuple(natives), tuple(parts), tuple(shares), place)

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fmus.grid.network import Network, Port
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of, parts_of
 from fmus.toolchain.extras import require
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
+from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.draft import Draft
@@ -91,8 +92,21 @@ def _takes_network(table: ComponentTable) -> bool:
 
 
 @cache
-def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
+def catalogue_fmu(
+    model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
+) -> FmuDescription:
     """FMU of a catalogue's model, built once on each machine.
+
+    Parameters
+    ----------
+    model
+        Its name.
+    network
+        That a grid is built for.
+    native
+        Whether it is compiled, with no Python in it.
+    parts
+        What a model with parts is made of, as pairs of a key and a part's name.
 
     Raises
     ------
@@ -104,7 +118,7 @@ def catalogue_fmu(model: str, network: Network | None = None, native: bool = Fal
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    arguments = {"network": network} if network is not None else {}
+    arguments = dict(parts) | ({"network": network} if network is not None else {})
     recipe = NativeFmu if native else PythonFmu
     return read_description(cached(recipe(build_model(model, **arguments))))
 
@@ -270,7 +284,7 @@ class Preparer:
             self.draft.note(where, "'binding' is for an FMU of others; give its path as 'fmu', or remove 'binding'")
             return
         try:
-            description = self._description(table, self._is_native(name, table))
+            description = self._description(table, self._is_native(name, table), self._parts(name, table))
             self._check_trust(name, table)
             self.draft.system.add(name, description, isolated=table.isolated)
         except (InputError, ValueError) as error:  # ValueError: the model does not fit the network
@@ -300,7 +314,27 @@ class Preparer:
                 "'isolated = false', and it runs in a process that is closed off",
             )
 
-    def _description(self, table: ComponentTable, native: bool) -> FmuDescription:
+    def _parts(self, name: str, table: ComponentTable) -> tuple[tuple[str, str], ...]:
+        """What a component of the catalogue is made of; the strongest layer decides on each part."""
+        known = parts_of(table.model) if table.model in model_names() and not _takes_network(table) else {}
+        chosen = {part: found for part in PARTS if (found := getattr(table, part)) is not None}
+        choices = [choice for layer in self.draft.layers for choice in layer.parts]
+        for choice in (c for c in choices if c.fits(name, has_part=c.part in known)):
+            try:
+                chosen[choice.part] = choice.name
+            except ValueError as error:
+                self.draft.note(choice.place, str(error))
+        for part in (
+            part for part in chosen if part not in known and (table.model is None or table.model in model_names())
+        ):
+            what = f"the model {table.model!r}" if table.model else "an FMU file"
+            raise InputError(
+                f"{part} = {chosen[part]!r}: {what} has no such part to choose; remove the key, or take the model "
+                "'synchronous_generator' or 'synchronous_generator_phasor'"
+            )
+        return tuple(chosen.items())
+
+    def _description(self, table: ComponentTable, native: bool, parts: tuple[tuple[str, str], ...]) -> FmuDescription:
         if table.fmu is not None:
             directory = self.draft.directory
             return bound_fmu(directory / table.fmu, directory / table.binding if table.binding else None)
@@ -309,7 +343,7 @@ class Preparer:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
-        return catalogue_fmu(table.model or "", self.draft.network if own else None, native)
+        return catalogue_fmu(table.model or "", self.draft.network if own else None, native, parts)
 
     # -- operating point -------------------------------------------------------------------------
 

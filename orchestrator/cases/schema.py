@@ -58,6 +58,10 @@ class ComponentTable(Table):
     isolated: bool | None = None
     bus: str | None = None
     native: bool = False
+    machine: str | None = None
+    exciter: str | None = None
+    governor: str | None = None
+    stabilizer: str | None = None
     parameters: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
 
@@ -124,6 +128,10 @@ class UnitsTable(Table):
     alpha: Number = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str
+    machine: str | None = None
+    exciter: str | None = None
+    governor: str | None = None
+    stabilizer: str | None = None
     generator_parameters: dict[str, Any] = {}
     converter_parameters: dict[str, Any] = {}
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.csv_rows import Row, optional_number, place_of, rows_of
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
@@ -35,6 +36,8 @@ class UnitRow:
         Parameters of the generator and of the converter, by kind.
     place
         File and line of the row; empty where the unit comes from the network's source.
+    parts
+        Parts of the generator that the row itself chooses.
     """
 
     label: str
@@ -45,6 +48,7 @@ class UnitRow:
     alpha: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     place: str = ""
+    parts: Mapping[str, str] = field(default_factory=dict)
 
 
 def unit_components(draft: Draft) -> dict[str, ComponentTable]:
@@ -78,7 +82,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
-                components[name] = ComponentTable(model=model, bus=row.bus, parameters=values)
+                parts = {**_parts_of(table), **row.parts} if kind == "sg" else {}
+                components[name] = ComponentTable(model=model, bus=row.bus, parameters=values, **parts)
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
                 draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key)
     return components
@@ -115,7 +120,9 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         if alpha is not None and not 0 <= alpha <= 1:
             raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
-        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry))  # type: ignore[arg-type]
+        unit = UnitRow(
+            entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry), parts=_parts_in(entry)
+        )  # type: ignore[arg-type]
         rows.append(_checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:
@@ -150,6 +157,16 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
             name, plain = column.removeprefix(f"{kind}."), text.strip()
             values[name] = {"true": True, "false": False}.get(plain.lower(), plain)
     return values
+
+
+def _parts_in(entry: Row) -> dict[str, str]:
+    """Parts that this row chooses in columns such as ``exciter``."""
+    return {part: text.strip() for part in PARTS if (text := entry.get(part) or "").strip()}
+
+
+def _parts_of(table: UnitsTable) -> dict[str, str]:
+    """Parts that all units have in common."""
+    return {part: name for part in PARTS if (name := getattr(table, part)) is not None}
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:

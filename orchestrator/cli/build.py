@@ -7,9 +7,12 @@ from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.extras import require
 from orchestrator.api.models import build, catalogue_model
+from orchestrator.cases.build_choices import PARTS
 from orchestrator.cli import linear_model
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
+
+_SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabilizer": "pss1a"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=sorted(TARGETS),
         help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
     )
+    for part in PARTS:
+        parser.add_argument(
+            f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
+        )
     linear_model.add_arguments(parser)
 
 
@@ -33,7 +40,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
-    models = [catalogue_model(name) for name in names]
+    parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
+    if parts and not options.names:
+        raise InputError(f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator")
+    models = [catalogue_model(name, parts) for name in names]
     extra = linear_model.extra_members(options, [model.name for model in models])
     kind = "native" if options.native else "Python-backed"
     with said_stages() as report:
