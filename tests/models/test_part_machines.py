@@ -1,0 +1,229 @@
+"""Machines of `synchronous_generator` against equations of the literature written by hand."""
+
+import numpy as np
+import pytest
+
+from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
+from fmus.synchronous_generator.parts import MACHINES
+from tests.models.parts import AT_BUS, BUS, refused
+from tests.support.evaluated import Evaluated
+
+WOUND = ("two_axis", "gensal", "genrou")
+DATA = {
+    "R_s": 0.003, "H": 4.3, "D": 1.7, "X_l": 0.16, "X_d": 1.9, "X_d1": 0.36, "X_d2": 0.25, "T_d10": 6.1,
+    "T_d20": 0.031, "X_q": 1.75, "X_q1": 0.52, "T_q10": 0.8, "T_q20": 0.052, "s_10": 0.11, "s_12": 0.42,
+}  # fmt: skip
+
+
+def machine(name, factory=synchronous_generator, **values):
+    model = factory(machine=name)
+    known = {v.name for v in model.parameters}
+    data = {f"machine.{key}": value for key, value in DATA.items() if f"machine.{key}" in known}
+    return Evaluated(model, AT_BUS | data | values)
+
+
+def S(x):
+    """Saturation through (1.0, 0.11) and (1.2, 0.42), by the two points."""
+    ratio = np.sqrt(DATA["s_10"] / (1.2 * DATA["s_12"]))
+    A = (1 - 1.2 * ratio) / (1 - ratio)
+    return DATA["s_10"] / (1 - A) ** 2 * max(x - A, 0) ** 2 / x
+
+
+# -- the published equations --------------------------------------------------------------------
+
+
+def shifted(device, seed):
+    rng = np.random.default_rng(seed)
+    return {name: value + 0.03 * rng.standard_normal() for name, value in device.states.items()}
+
+
+def current(device, x):
+    """(i_d, i_q) of the stator [pu, S_n] from the port's current."""
+    y = device.outputs([BUS.real, BUS.imag], device.vector(x))
+    in_frame = complex(y["i_re"], y["i_im"]) * np.exp(-1j * x["machine.delta"])
+    return -in_frame.imag, in_frame.real
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_genrou_is_the_model_of_stability_programs_with_saturation(seed):
+    """Sauer and Pai's two-winding axes in E'_q, ψ_1d, E'_d, ψ_2q; saturation as PSS/E's diagram adds it."""
+    device, p = machine("genrou"), DATA
+    x = shifted(device, seed)
+    i_d, i_q = current(device, x)
+    X_md, X_mq = p["X_d"] - p["X_l"], p["X_q"] - p["X_l"]
+    to_E, to_E_d = (p["X_d"] - p["X_d1"]) / X_md, (p["X_q"] - p["X_q1"]) / X_mq  # X_m/(X_m + X_1)
+    E_q, E_d = x["machine.psi_f"] * to_E, -x["machine.psi_1q"] * to_E_d
+    psi_1d, psi_2q = x["machine.psi_1d"], x["machine.psi_2q"]
+    d1, d2 = p["X_d1"] - p["X_l"], p["X_d2"] - p["X_l"]
+    q1, q2 = p["X_q1"] - p["X_l"], p["X_d2"] - p["X_l"]
+    psi_d = E_q * d2 / d1 + psi_1d * (d1 - d2) / d1
+    psi_q = -E_d * q2 / q1 + psi_2q * (q1 - q2) / q1
+    S_now = S(np.hypot(psi_d, psi_q))
+    E_fd = device.outputs([BUS.real, BUS.imag], device.vector(x))["E_fd"]
+    wanted = {
+        "machine.psi_f": (
+            E_fd
+            - E_q
+            - (p["X_d"] - p["X_d1"]) * (i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q))
+            - S_now * psi_d
+        )
+        / p["T_d10"]
+        / to_E,
+        "machine.psi_1d": (-psi_1d + E_q - d1 * i_d) / p["T_d20"],
+        "machine.psi_1q": -(
+            -E_d
+            + (p["X_q"] - p["X_q1"]) * (i_q - (q1 - q2) / q1**2 * (psi_2q + q1 * i_q + E_d))
+            + S_now * psi_q * X_mq / X_md
+        )
+        / p["T_q10"]
+        / to_E_d,
+        "machine.psi_2q": (-psi_2q - E_d - q1 * i_q) / p["T_q20"],
+    }
+    found = device.rates([BUS.real, BUS.imag], device.vector(x))
+    assert {name: found[name] for name in wanted} == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gensal_saturates_the_d_axis_by_its_transient_emf(seed):
+    device, p = machine("gensal"), DATA
+    x = shifted(device, seed)
+    i_d, i_q = current(device, x)
+    d1, d2 = p["X_d1"] - p["X_l"], p["X_d2"] - p["X_l"]
+    ratio = (p["X_d"] - p["X_d1"]) / (p["X_d"] - p["X_l"])  # X_md/(X_md + X_f)
+    E_q, psi_1d = x["machine.psi_f"] * ratio, x["machine.psi_1d"]
+    E_fd = device.outputs([BUS.real, BUS.imag], device.vector(x))["E_fd"]
+    excited = i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q)
+    found = device.rates([BUS.real, BUS.imag], device.vector(x))
+    wanted = (E_fd - E_q - (p["X_d"] - p["X_d1"]) * excited - S(E_q) * E_q) / p["T_d10"] / ratio
+    assert found["machine.psi_f"] == pytest.approx(wanted, rel=1e-9)
+    to_last = (p["X_q"] - p["X_d2"]) / (p["X_q"] - p["X_l"])  # X_mq/(X_mq + X_1q)
+    last = x["machine.psi_1q"] * to_last
+    wanted = (-last - (p["X_q"] - p["X_d2"]) * i_q) / p["T_q20"] / to_last
+    assert found["machine.psi_1q"] == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_two_axis_machine_is_sauer_and_pais(seed):
+    device, p = machine("two_axis"), DATA
+    x = shifted(device, seed)
+    i_d, i_q = current(device, x)
+    to_d, to_q = (p["X_d"] - p["X_d1"]) / p["X_d"], (p["X_q"] - p["X_q1"]) / p["X_q"]
+    E_q, E_d = x["machine.psi_f"] * to_d, -x["machine.psi_1q"] * to_q
+    y = device.outputs([BUS.real, BUS.imag], device.vector(x))
+    found = device.rates([BUS.real, BUS.imag], device.vector(x))
+    wanted = (y["E_fd"] - E_q - (p["X_d"] - p["X_d1"]) * i_d) / p["T_d10"]
+    assert found["machine.psi_f"] * to_d == pytest.approx(wanted, rel=1e-9)
+    wanted = (-E_d + (p["X_q"] - p["X_q1"]) * i_q) / p["T_q10"]
+    assert -found["machine.psi_1q"] * to_q == pytest.approx(wanted, rel=1e-9)
+    psi_d, psi_q = x["machine.psi_d"], x["machine.psi_q"]
+    assert psi_d == pytest.approx(E_q - p["X_d1"] * i_d, rel=1e-9)
+    assert psi_q == pytest.approx(-E_d - p["X_q1"] * i_q, rel=1e-9)
+    motion = (y["P_m"] / x["machine.omega"] - y["T_e"] - p["D"] * (x["machine.omega"] - 1)) / (2 * p["H"])
+    assert found["machine.omega"] == pytest.approx(motion, rel=1e-9)
+
+
+@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
+def test_the_classical_machine_swings_as_the_textbooks_formula_says(factory):
+    """√(K_s·ω_b/2H) with K_s = E'·v·cos δ/X'."""
+    values = {"machine.D": 0.0, "machine.R_s": 0.0, "machine.X_d1": 0.3}
+    device = machine("classical", factory, **values)
+    i = np.conj(complex(AT_BUS["P_0"], AT_BUS["Q_0"]) / BUS)
+    E = BUS + 0.3j * i
+    stiffness = abs(E) * abs(BUS) * np.cos(np.angle(E / BUS)) / 0.3
+    wanted = np.sqrt(stiffness * 100 * np.pi / (2 * DATA["H"]))
+    poles = np.linalg.eigvals(device.blocks([BUS.real, BUS.imag])[0])
+    swing = min((z for z in poles if z.imag > 0), key=lambda z: abs(z - 1j * wanted))
+    assert swing.imag == pytest.approx(wanted, rel=3e-3)
+    assert abs(swing.real) < 0.02
+    assert device.outputs([BUS.real, BUS.imag])["E_fd"] == pytest.approx(abs(E), rel=1e-12)
+
+
+# -- steady states ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_machine_starts_in_its_steady_state_with_the_power_flows_power(name, factory):
+    device = machine(name, factory, **{"transformer.R_t": 0.004, "transformer.X_t": 0.13})
+    assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-10
+    y = device.outputs([BUS.real, BUS.imag])
+    assert (y["p"], y["q"]) == pytest.approx((0.7, 0.15), abs=1e-12)
+    assert not refused(device)
+
+
+@pytest.mark.parametrize("v", [0.7, 1.0, 1.2])
+@pytest.mark.parametrize("name", ["gensal", "genrou"])
+def test_saturation_is_that_of_the_open_circuit_curve(name, v):
+    """A data sheet's S(1.0) and S(1.2): the field's share beyond the air-gap line."""
+    device = machine(name, P_0=0.0, Q_0=0.0, v_0=v)
+    E_fd = device.outputs([BUS.real, BUS.imag])["E_fd"]
+    share = {1.0: DATA["s_10"], 1.2: DATA["s_12"]}.get(v, 0.0)
+    assert E_fd == pytest.approx(v * (1 + share), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", WOUND)
+def test_without_saturation_the_steady_state_is_the_phasor_diagrams(name):
+    device = machine(name, **({"machine.s_10": 0.0, "machine.s_12": 0.0} if name != "two_axis" else {}))
+    i = np.conj(complex(AT_BUS["P_0"], AT_BUS["Q_0"]) / BUS)
+    delta = np.angle(BUS + (DATA["R_s"] + 1j * DATA["X_q"]) * i)
+    v_q, i_d, i_q = (BUS * np.exp(-1j * delta)).real, -(i * np.exp(-1j * delta)).imag, (i * np.exp(-1j * delta)).real
+    y = device.outputs([BUS.real, BUS.imag])
+    assert y["delta"] == pytest.approx(delta, rel=1e-12)
+    assert y["E_fd"] == pytest.approx(v_q + DATA["R_s"] * i_q + DATA["X_d"] * i_d, rel=1e-12)
+
+
+# -- bases and special data ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_data_on_another_base_are_the_same_machine(name):
+    """S_n = 247.5 MVA and data on 100 MVA, as textbooks print them."""
+    own = machine(name, S_n=247.5)
+    scaled = {}
+    for key, value in DATA.items():
+        if key.startswith("X_") or key == "R_s":
+            scaled[f"machine.{key}"] = value * 100 / 247.5
+        elif key in ("H", "D"):
+            scaled[f"machine.{key}"] = value * 247.5 / 100
+    known = {v.name for v in own.model.parameters}
+    given = {key: value for key, value in scaled.items() if key in known}
+    other = machine(name, S_n=247.5, **given, **{"machine.S_data": 100.0})
+    assert other.states == pytest.approx(own.states, rel=1e-12)
+    x = shifted(own, 1)
+    u = [BUS.real, BUS.imag]
+    assert other.rates(u, own.vector(x)) == pytest.approx(own.rates(u, own.vector(x)), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["two_axis", "genrou"])
+def test_a_q_axis_without_a_slow_winding_is_allowed(name):
+    device = machine(name, **{"machine.X_q1": DATA["X_q"]})
+    assert not refused(device)
+    assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-6
+    poles = np.linalg.eigvals(device.blocks([BUS.real, BUS.imag])[0])
+    assert max(pole.real for pole in poles) < 0
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "rule"),
+    [
+        ("genrou", {"machine.X_q1": 1.8}, "machine.X_q1 must not exceed machine.X_q"),
+        ("genrou", {"machine.X_d2": 0.15}, "machine.X_d2 must exceed machine.X_l"),
+        ("gensal", {"machine.X_d": 0.3}, "machine.X_d must exceed machine.X_d1"),
+        ("two_axis", {"machine.X_d1": 1.9}, "machine.X_d must exceed machine.X_d1"),
+        ("gensal", {"machine.s_12": 0.05}, "saturation must rise"),
+    ],
+)
+def test_data_that_are_no_machine_are_refused(name, values, rule):
+    assert any(rule in text for text in refused(machine(name, **values)))
+
+
+def test_constant_torque_and_constant_power_differ_by_the_power_over_2H():
+    """∂ẇ/∂w is 0 with a constant torque and −P_0/2H with a constant power."""
+    slopes = {}
+    for governor in ("constant_torque", "constant_power"):
+        device = Evaluated(synchronous_generator(machine="classical", governor=governor), AT_BUS)
+        k = [s.name for s in device.model.states].index("machine.omega")
+        slopes[governor] = device.blocks([BUS.real, BUS.imag])[0][k, k]
+    H, P = 6.5, device.outputs([BUS.real, BUS.imag])["P_m"]
+    assert slopes["constant_torque"] == pytest.approx(0.0, abs=1e-12)
+    assert slopes["constant_power"] == pytest.approx(-P / (2 * H), rel=1e-9)
