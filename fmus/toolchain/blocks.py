@@ -14,8 +14,9 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 BYPASS_TIME = 0.01
 """Time constant [s] with which the unused state of a left-out block follows its input."""
 
-RETURN_TIME = 1e-3
-"""Time constant [s] with which a state returns to the limit that a step of integration carried it over."""
+RETURN_TIME = 2e-3
+"""Time constant [s] with which a state returns to the limit that a step of integration carried it over: as long as the
+longest internal step of any model, so that no stage of Runge-Kutta's method lands below the limit again."""
 
 
 def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:

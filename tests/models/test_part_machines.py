@@ -62,10 +62,7 @@ def test_genrou_is_the_model_of_stability_programs_with_saturation(seed):
     E_fd = device.outputs([BUS.real, BUS.imag], device.vector(x))["E_fd"]
     wanted = {
         "machine.psi_f": (
-            E_fd
-            - E_q
-            - (p["X_d"] - p["X_d1"]) * (i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q))
-            - S_now * psi_d
+            E_fd - E_q - (p["X_d"] - p["X_d1"]) * (i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q)) - S_now * psi_d
         )
         / p["T_d10"]
         / to_E,
