@@ -215,8 +215,8 @@ def held_at_limits(x: ca.SX, rate: Scalar, low: Scalar, high: Scalar) -> ca.SX:
     low, high
         The limits; use the state through `clamp`.
     """
-    above = ca.logic_and(x > high, ca.SX(rate) > 0)
-    below = ca.logic_and(x < low, ca.SX(rate) < 0)
+    above = ca.logic_and(x >= high, ca.SX(rate) > 0)
+    below = ca.logic_and(x <= low, ca.SX(rate) < 0)
     return ca.if_else(above, (high - x) / RETURN_TIME, ca.if_else(below, (low - x) / RETURN_TIME, rate))
 
 

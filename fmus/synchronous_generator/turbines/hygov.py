@@ -1,7 +1,8 @@
 """HYGOV: a hydro governor with a transient droop, and a penstock with inelastic water.
 
-    R·(c_ref − c) − (w − 1) → 1/(1+sT_f) → (1+sT_r)/(r·T_r·s) = c, at most VELM per second, G_MIN ≤ c ≤ G_MAX
-    g = c/(1+sT_g),  h = (q/g)²,  T_W·dq/dt = 1 − h,  P_m = A_t·h·(q − q_NL) − D_turb·g·(w − 1)
+    R·(c_ref − c) − (w − 1) → 1/(1+sT_f) → (1+sT_r)/(r·T_r·s) = c, held within G_MIN and G_MAX
+    T_g·dg/dt = c − g, at most VELM per second
+    h = (q/g)²,  T_W·dq/dt = 1 − h,  P_m = A_t·h·(q − q_NL) − D_turb·g·(w − 1)
 
 In steady state h = 1 and g = q = P_m/A_t + q_NL.
 """
@@ -9,7 +10,7 @@ In steady state h = 1 and g = q = P_m/A_t + q_NL.
 import casadi as ca
 
 from fmus.synchronous_generator.turbines.common import SOURCE, power, power_reference, require_within, time
-from fmus.toolchain.blocks import clamp, held_at_limits, low_pass_or_nothing
+from fmus.toolchain.blocks import clamp, limited_proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder
 
 _LEAST_GATE = 1e-3
@@ -29,7 +30,7 @@ def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
         r = power(m, "r", 0.3, "Transient droop", 1e-4)
         T_r = time(m, "T_r", 5.0, "Reset of the transient droop", 1e-2)
         T_f = time(m, "T_f", 0.05, "Filter", 1e-3)
-        T_g = time(m, "T_g", 0.5, "Gate's servo; 0 leaves the lag out")
+        T_g = time(m, "T_g", 0.5, "Gate's servo", 1e-3)
         VELM = m.parameter("VELM", 0.2, "pu/s", "Fastest movement of the gate", minimum=1e-6, source=SOURCE)
         high, low = power(m, "G_MAX", 1.0, "Gate, fully open"), power(m, "G_MIN", 0.0, "Gate, closed", 0)
         T_W = time(m, "T_W", 1.0, "Water's inertia", 1e-2)
@@ -43,14 +44,13 @@ def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
         g_0 = gate_for(P_m_0)
         require_within(m, g_0, low, high, ("governor.G_MIN", "governor.G_MAX"))
         wanted = gate_for(power_reference(m, P_m_0))
-        c = m.state("c", g_0, "pu", "Desired gate", base="S_n")
-        limited = clamp(c, low, high)
-        error = R * (wanted - limited) - (w - 1)
+        c = m.algebraic("c")
         filtered = m.state("filtered", 0.0, "pu", "Error through the filter", base="S_n")
-        rate = (error - filtered) / T_f
-        m.derivative(filtered, rate)
-        m.derivative(c, held_at_limits(c, clamp(filtered / (r * T_r) + rate / r, -VELM, VELM), low, high))
-        gate = ca.fmax(low_pass_or_nothing(m, "gate", limited, T_g, g_0), _LEAST_GATE)
+        m.derivative(filtered, (R * (wanted - c) - (w - 1) - filtered) / T_f)
+        m.close(c, limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
+        x = m.state("gate", g_0, "pu", "Gate", base="S_n")
+        m.derivative(x, clamp((c - x) / T_g, -VELM, VELM))
+        gate = ca.fmax(x, _LEAST_GATE)
         q = m.state("q", g_0, "pu", "Flow", base="S_n")
         h = (q / gate) ** 2
         m.derivative(q, (1 - h) / T_W)
