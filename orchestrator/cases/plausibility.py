@@ -75,7 +75,7 @@ def _doubts(draft: Draft) -> Iterator[_Doubt]:
         for variable in plan.description.parameters:
             wanted, value = RANGES.get(variable), _value(plan, variable)
             if wanted is not None and value is not None and _unit(plan, variable) == wanted.unit:
-                yield from _outside(draft, name, variable, value, wanted)
+                yield from _outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
         for resistance, reactance in RESISTANCES:
             R, X = _value(plan, resistance), _value(plan, reactance)
             if R is not None and X is not None and R > X > 0:
@@ -111,9 +111,26 @@ def _overloaded(draft: Draft) -> Iterator[_Doubt]:
 # -- one value ---------------------------------------------------------------------------------------
 
 
+def _to_rating(plan: ComponentPlan, variable: str) -> float:
+    """What carries a machine's value from the base of its data, ``machine.S_data``, to the rating; otherwise 1."""
+    S_data, S_n = _value(plan, "machine.S_data"), _value(plan, "S_n")
+    if not S_data or not S_n:
+        return 1.0
+    if variable == "machine.H":
+        return S_data / S_n
+    return S_n / S_data if variable == "machine.R_s" or variable.startswith("machine.X_") else 1.0
+
+
 def _outside(
-    draft: Draft, component: str, variable: str, value: float, wanted: Plausible, where: str | None = None
+    draft: Draft,
+    component: str,
+    variable: str,
+    value: float,
+    wanted: Plausible,
+    where: str | None = None,
+    scale: float = 1.0,
 ) -> Iterator[_Doubt]:
+    given, value = value, value * scale
     if wanted.fits(value):
         return
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
@@ -124,7 +141,8 @@ def _outside(
     ):
         if far and wanted.low <= value * factor <= wanted.high:
             slip = f"; it is {text}, and usual by a factor of 1000: check its unit and base"
-    text = f"{variable} = {value:g}{unit} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
+    shown = f"{given:g}{unit}" if scale == 1 else f"{given:g}{unit} on machine.S_data, {value:.4g}{unit} on S_n,"
+    text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield _Doubt(f"{component}.{variable}", where or _place(draft, component, variable), text)
 
 
