@@ -40,7 +40,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Machine:
-    """Parameters, states and operating point of the machine."""
+    """Parameters, states and operating point of the machine; ``salient`` where its last reactances may differ."""
 
     R: ca.SX
     R_t: ca.SX
@@ -52,6 +52,7 @@ class Machine:
     w: ca.SX
     delta: ca.SX
     start: Start
+    salient: bool = True
 
     @property
     def current(self) -> Phasor:

@@ -74,6 +74,11 @@ class Parts:
 def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:
     """The parts of these names.
 
+    Parameters
+    ----------
+    machine, exciter, governor, stabilizer
+        Names of `MACHINES`, `EXCITERS`, `GOVERNORS` and `STABILIZERS`.
+
     Raises
     ------
     ValueError

@@ -71,12 +71,24 @@ def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phas
     """
     impedance = Phasor(g.R, g.d.X_between)
     start = g.start.v + impedance * g.start.i
-    source = source_emf(m, emf - _saliency(m, g), start, g.delta, port.omega_b * (g.w - 1))
+    source = source_emf(m, emf - _saliency(m, g) if g.salient else emf, start, g.delta, port.omega_b * (g.w - 1))
     declare_phasor_outputs(m, port, source, impedance)
 
 
 def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
-    """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i."""
+    """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    g
+        The machine, its stator's fluxes as open signals.
+    port
+        Gives the bus voltage.
+    emf
+        Behind the subtransient reactance, rotor frame [pu].
+    """
     over = (emf - port.v.rotated(-g.delta)) * port.connected
     R, X_d, X_q = g.R, g.d.X_between, g.q.X_between
     determinant = R**2 + X_d * X_q

@@ -32,10 +32,12 @@ ALL_PATHS_OPEN = {
     "gfor_abc": _CONVERTER_OPEN,
     "gfor_pod_input": _CONVERTER_OPEN,
     "gfor_phasor": _CONVERTER_OPEN | {"communication_step": 5e-3},
+    "synchronous_generator": {"transformer.X_t": 0.1},  # without it v_t is the bus voltage
+    "synchronous_generator_phasor": {"communication_step": 5e-3, "transformer.X_t": 0.1},
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.
 FED = {
-    "two_area_phasor_grid": {f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))}
+    "two_area_phasor_grid": {f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))},
 }
 # Outputs that reach some listed states only where a block is left out (time constant 0).
 BEHIND_LEFT_OUT_BLOCKS = {"P_m"}

@@ -17,12 +17,28 @@ E_FD = "E_fd"
 
 
 def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit of the field voltage."""
+    """Declare a gain or limit per unit of the field voltage.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text, minimum
+        Of the parameter, as `ModelBuilder.parameter` has them.
+    """
     return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]. One that may be 0 leaves its block out there and is not between 0 and the step."""
+    """Declare a time constant [s]; where it may be 0, 0 leaves its block out.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text, minimum
+        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
+    """
     T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
     if minimum == 0:
         m.require(
@@ -73,7 +89,19 @@ class Measurement:
 
 
 def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", lead: float = 0.0) -> ca.SX:
-    """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0; ``mark`` follows C and B."""
+    """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    u, initial
+        What goes in, and its value in steady state.
+    mark
+        Follows C and B in the parameters' names.
+    lead
+        Default of T_C [s]; T_B is ten seconds then, otherwise 0.
+    """
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
     m.require(
@@ -128,7 +156,15 @@ def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, na
 
 
 def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":
-    """Declare two points (E, S_E(E)) of the exciter's saturation curve."""
+    """Declare two points (E, S_E(E)) of the exciter's saturation curve.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    E_1, S_E1, E_2, S_E2
+        Defaults of the two points, in either order.
+    """
     E = [
         m.parameter(f"E_{k}", value, "pu", f"Point {k} of the saturation curve", base=E_FD, minimum=0, source=SOURCE)
         for k, value in ((1, E_1), (2, E_2))

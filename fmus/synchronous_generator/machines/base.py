@@ -53,10 +53,26 @@ def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
 
 
 def reactance(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a reactance on the data's base."""
+    """Declare a reactance on the data's base.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text
+        Of the parameter, as `ModelBuilder.parameter` has them.
+    """
     return m.parameter(name, value, "pu", text, base="S_data", minimum=1e-4, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare an open-circuit time constant [s]."""
+    """Declare an open-circuit time constant [s].
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text
+        Of the parameter, as `ModelBuilder.parameter` has them.
+    """
     return m.parameter(name, value, "s", text, minimum=1e-3, source=SOURCE)

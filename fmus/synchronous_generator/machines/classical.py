@@ -47,4 +47,4 @@ def classical(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDe
         delta = m.state("delta", delta_0, "rad", "Angle of the emf in the network frame")
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), emf, psi_d * i.re + psi_q * i.im, v, i)
-    return Machine(R, common.R_t, common.X_t, common.H, common.D, d, q, w, delta, start)
+    return Machine(R, common.R_t, common.X_t, common.H, common.D, d, q, w, delta, start, salient=False)

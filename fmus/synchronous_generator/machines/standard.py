@@ -29,7 +29,13 @@ _NO_TIME = 1e-3
 
 
 def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of fourth order (Sauer and Pai); parameters as `genrou`. It has no saturation."""
+    """Declare the machine of fourth order (Sauer and Pai). It has no saturation.
+
+    Parameters
+    ----------
+    m, port, S_n, stator_flux
+        As `genrou`.
+    """
     common = declare_common(m, S_n)
     with m.scope("machine"):
         d, q = (
@@ -37,11 +43,17 @@ def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDec
             for axis, winding in (("d", _FIELD), ("q", _FIRST_Q))
         )
         _require_order(m, d.data, q.data, "X_q1")
-    return declare_wound_machine(m, port, common, d, q, stator_flux)
+    return declare_wound_machine(m, port, common, d, q, stator_flux, salient=True)
 
 
 def gensal(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of fifth order, a salient-pole one; parameters as `genrou`. E'_q saturates the d axis."""
+    """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis.
+
+    Parameters
+    ----------
+    m, port, S_n, stator_flux
+        As `genrou`.
+    """
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)

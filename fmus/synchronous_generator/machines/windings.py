@@ -62,6 +62,8 @@ def declare_wound_machine(
     q: WoundAxis,
     stator_flux: FluxDeclaration,
     saturation: Saturation | None = None,
+    *,
+    salient: bool = False,
 ) -> Machine:
     """Declare windings, speed and angle in the steady state of the operating point.
 
@@ -79,6 +81,8 @@ def declare_wound_machine(
         As `declare_machine`.
     saturation
         Of the iron; None for none.
+    salient
+        Whether the last reactances of the axes, X'' or X', may differ.
     """
     with m.scope("machine"):
         circuits = {name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))}
@@ -114,7 +118,7 @@ def declare_wound_machine(
         delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i)
-    return Machine(R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start)
+    return Machine(R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start, salient)
 
 
 def _circuit(m: ModelBuilder, port: DevicePort, name: str, axis: WoundAxis, X_t: ca.SX) -> _Circuit:

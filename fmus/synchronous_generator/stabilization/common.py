@@ -9,12 +9,28 @@ SOURCE = "typical data, IEEE 421.5"
 
 
 def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit."""
+    """Declare a gain or limit per unit.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text, minimum
+        Of the parameter, as `ModelBuilder.parameter` has them.
+    """
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a time constant [s] that is 0, which leaves its block out, or longer than half of the internal step."""
+    """Declare a time constant [s]; 0 leaves its block out.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text
+        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
+    """
     T = m.parameter(name, value, "s", text, minimum=0, source=SOURCE)
     m.require(
         ca.if_else(T <= 0, 1, T - m.internal_step / 2), f"pss.{name} must be 0 or longer than half of internal_step"

@@ -8,12 +8,28 @@ SOURCE = "typical data, IEEE PES-TR1"
 
 
 def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit of the rating."""
+    """Declare a gain or limit per unit of the rating.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text, minimum
+        Of the parameter, as `ModelBuilder.parameter` has them.
+    """
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]. One that may be 0 leaves its block out there and is not between 0 and the step."""
+    """Declare a time constant [s]; where it may be 0, 0 leaves its block out.
+
+    Parameters
+    ----------
+    m
+        The generator's model.
+    name, value, text, minimum
+        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
+    """
     T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
     if minimum == 0:
         m.require(
