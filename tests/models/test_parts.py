@@ -1,0 +1,89 @@
+"""Parts of a generator by name: which fit each other, what DYR records they are, and their defaults."""
+
+import re
+
+import pytest
+
+from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, MACHINES, STABILIZERS
+from fmus.toolchain.catalogue import parts_of
+from orchestrator.cases.plausible_ranges import RANGES
+
+ONE_BY_ONE = [
+    *({"machine": name} for name in MACHINES),
+    *({"exciter": name} for name in EXCITERS),
+    *({"governor": name} for name in GOVERNORS),
+    *({"exciter": "st1a", "stabilizer": name} for name in STABILIZERS),
+]
+
+
+def with_part(kind, name):
+    """A generator with a part, beside others that it fits."""
+    return synchronous_generator(**({"exciter": "st1a"} if kind == "stabilizer" else {}) | {kind: name})
+
+
+@pytest.mark.parametrize("parts", ONE_BY_ONE, ids=lambda parts: "-".join(parts.values()))
+def test_the_defaults_of_every_part_are_plausible(parts):
+    for factory in (synchronous_generator, synchronous_generator_phasor):
+        for variable in factory(**parts).parameters:
+            wanted = RANGES.get(variable.name)
+            if wanted is not None and wanted.unit == variable.unit:
+                assert wanted.fits(variable.start), variable.name
+
+
+def test_a_generator_is_named_after_its_parts():
+    made = synchronous_generator("genrou", "st1a", "tgov1", "pss1a")
+    assert made.name == "synchronous_generator_genrou_st1a_tgov1_pss1a"
+    assert synchronous_generator().name == "synchronous_generator_genrou_manual_constant_torque"
+    assert synchronous_generator_phasor("gensal", "sexs").name.endswith("gensal_sexs_constant_torque_phasor")
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"machine": "genru"}, "there is no machine 'genru'; did you mean 'genrou'? there are: classical, two_axis"),
+        ({"exciter": "EXST1"}, "there is no exciter 'EXST1'; "),
+        ({"governor": "x"}, "there is no governor 'x'; there are: constant_power, constant_torque, tgov1"),
+        ({"stabilizer": "PSS1A"}, "there is no stabilizer 'PSS1A'; did you mean 'pss1a'?"),
+        ({"machine": "classical", "exciter": "sexs"}, "the classical machine has no field winding"),
+        ({"stabilizer": "pss1a"}, "manual excitation has none"),
+    ],
+)
+def test_parts_that_are_not_there_or_do_not_fit_are_named(parts, said):
+    for factory in (synchronous_generator, synchronous_generator_phasor):
+        with pytest.raises(ValueError, match=re.escape(said)):
+            factory(**parts)
+
+
+def test_the_catalogue_knows_which_models_have_parts():
+    expected = {"machine": "genrou", "exciter": "manual", "governor": "constant_torque", "stabilizer": "none"}
+    assert parts_of("synchronous_generator") == parts_of("synchronous_generator_phasor") == expected
+    assert parts_of("gfor") == {}
+
+
+@pytest.mark.parametrize("name", DYR_RECORDS)
+def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
+    record = DYR_RECORDS[name]
+    known = {v.name for v in with_part(record.kind, record.part).parameters}
+    names = [field.name for field in record.fields]
+    assert len(set(names)) == len(names)
+    for field in record.fields:
+        assert {*field.parameters, *field.negated} <= known, field.name
+        assert not field.times or field.times in names
+        assert not field.same_as or field.same_as in names
+    given = {p for field in record.fields for p in (*field.parameters, *field.negated)}
+    assert len(given) == sum(len(field.parameters) + len(field.negated) for field in record.fields)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("GENROU", 14), ("GENSAL", 12), ("GENCLS", 2), ("SEXS", 6), ("IEEET1", 14), ("IEEEX1", 16), ("EXAC1", 17),
+        ("ESAC1A", 19), ("EXAC4", 10), ("EXST1", 12), ("ESST1A", 20), ("ESST4B", 17), ("TGOV1", 7), ("HYGOV", 12),
+        ("GAST", 9), ("IEEEG1", 22), ("STAB1", 7), ("IEEEST", 19), ("PSS2A", 23), ("PSS2B", 29),
+    ],
+)  # fmt: skip
+def test_a_record_has_as_many_fields_as_pss_e_has(name, count):
+    """CONs and ICONs of PSS/E's model library."""
+    assert len(DYR_RECORDS[name].fields) == count
