@@ -22,8 +22,10 @@ def assign_values(draft: Draft) -> None:
             for path, value in flat:
                 _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
     for layer in draft.layers:
-        for choice in (*layer.natives, *layer.parts):  # made when the components were added
-            _check_component(draft, choice.pattern, choice.place)
+        chosen = [(choice.pattern, choice.place) for choice in layer.natives]  # made when the components were added
+        chosen += [(choice.pattern, choice.place) for choice in layer.parts]
+        for pattern, place in chosen:
+            _check_component(draft, pattern, place)
         for key, value in layer.values.items():
             _assign_key(draft, key, value, layer.place(key))
 

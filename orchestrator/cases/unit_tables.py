@@ -82,7 +82,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
-                parts = {**_parts_of(table), **row.parts} if kind == "sg" else {}
+                parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
                 components[name] = ComponentTable(model=model, bus=row.bus, parameters=values, **parts)
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
                 draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key)
@@ -120,9 +120,8 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         if alpha is not None and not 0 <= alpha <= 1:
             raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
-        unit = UnitRow(
-            entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry), parts=_parts_in(entry)
-        )  # type: ignore[arg-type]
+        parts = _parts_in(entry)
+        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(_checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:
