@@ -143,3 +143,20 @@ def test_a_part_is_a_choice_and_a_parameter_of_it_a_value():
     assert [(c.pattern, c.part, c.name) for c in layer.parts] == [("g1", "exciter", "sexs")]
     assert dict(layer.values) == {"g1.exciter.K": 90.0}
     assert set(PARTS) == {"machine", "exciter", "governor", "stabilizer"}
+
+
+@pytest.mark.parametrize(("S_data", "asked"), [(0, True), (1000, False)])
+def test_machine_data_are_judged_on_the_rating(write, S_data, asked):
+    """X'_d = 2 pu on 1000 MVA is 0.2 pu on the rating of 100 MVA."""
+    values = f"parameters = {{ P_0 = 0.3, machine.S_data = {S_data}, machine.X_d1 = 2.0, machine.H = 0.6 }}"
+    (prepared,) = write(("parameters = { P_0 = 0.3 }", values)).prepare(["plain"])
+    texts = [question.text for question in prepared.questions]
+    assert any("machine.X_d1 = 2 pu is outside of" in text for text in texts) == asked
+    assert not any("on machine.S_data" in text for text in texts)
+
+
+def test_a_question_shows_machine_data_on_both_bases(write):
+    values = "parameters = { P_0 = 0.3, machine.S_data = 1000, machine.X_d1 = 30.0, machine.H = 0.6 }"
+    (prepared,) = write(("parameters = { P_0 = 0.3 }", values)).prepare(["plain"])
+    (text,) = [question.text for question in prepared.questions]
+    assert "machine.X_d1 = 30 pu on machine.S_data, 3 pu on S_n, is outside of 0.05 to 1 pu" in text
