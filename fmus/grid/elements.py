@@ -51,9 +51,21 @@ class Branch:
 
 @dataclass(frozen=True)
 class DeclaredLoad:
-    """A load's conductance at scale 1 [pu, 100 MVA], its ``scale``, and its inductor where it has one."""
+    """A load at scale 1 [pu, 100 MVA], and its ``scale``.
 
-    G: ca.SX
+    Attributes
+    ----------
+    G_0, B_0
+        Conductance, and susceptance (capacitors positive), that draw its power at the power flow's voltage.
+    G
+        The conductance that it is at all times.
+    branches
+        Its inductor, where it has one.
+    """
+
+    G_0: Scalar
+    B_0: Scalar
+    G: Scalar
     scale: ca.SX
     branches: list[Branch]
 
@@ -162,7 +174,7 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
 def declare_load(
     m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool, inductor: Inductor = inductor_state
 ) -> DeclaredLoad:
-    """Declare a constant impedance.
+    """Declare a load, and put the part of it that is a constant impedance to its bus.
 
     Parameters
     ----------
@@ -184,21 +196,27 @@ def declare_load(
         text = "Load step: factor on G and 1/X; not 0, because nothing else determines the voltage of this bus"
     with m.scope(load.name):
         scale = m.parameter("scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True)
-        P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage", minimum=0)
+        P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage",
+                        minimum=None if load.p_mw < 0 else 0, maximum=0 if load.p_mw < 0 else None)  # fmt: skip
         G = P / SYSTEM_BASE_MVA / v_squared
-        bus.G += scale * G
+        if load.conductance_mw or not load.p_mw:
+            bus.G += scale * G
+        own_G = G if load.conductance_mw else 0.0
         if load.q_mvar == 0:
-            return DeclaredLoad(G, scale, [])
+            return DeclaredLoad(G, 0.0, own_G, scale, [])
         inductive = load.q_mvar > 0
         Q = m.parameter(
             "Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage",
             minimum=1e-6 if inductive else None, maximum=None if inductive else -1e-6,
         )  # fmt: skip
+        B = -Q / SYSTEM_BASE_MVA / v_squared
+        if not load.susceptance_mvar:
+            return DeclaredLoad(G, B, own_G, scale, [])
         if not inductive:
             bus.B += -scale * Q / SYSTEM_BASE_MVA / v_squared
-            return DeclaredLoad(G, scale, [])
+            return DeclaredLoad(G, B, own_G, scale, [])
         X = v_squared / (Q / SYSTEM_BASE_MVA)
-        return DeclaredLoad(G, scale, inductor(m, bus, load.bus, X, scale))
+        return DeclaredLoad(G, B, own_G, scale, inductor(m, bus, load.bus, X, scale))
 
 
 def declare_shunt(

@@ -1,5 +1,4 @@
-"""An EMT network in the frame that turns at ω_b: dynamic lines, loads of constant impedance or current,
-bus capacitances.
+"""An EMT network in the frame that turns at ω_b: dynamic lines, loads, bus capacitances.
 
 A bus with capacitance has its voltage as a state. A bus without capacitance has v = Σ i / G, directly from the currents
 that the devices inject: the FMU has direct feed-through there, and declares it.
@@ -7,7 +6,6 @@ that the devices inject: the FMU has direct feed-through there, and declares it.
 
 import casadi as ca
 
-from fmus.grid.current_load import CurrentLoad, current_load_equation, declare_current_load
 from fmus.grid.elements import (
     Branch,
     Bus,
@@ -20,6 +18,7 @@ from fmus.grid.elements import (
     declare_port,
     declare_shunt,
 )
+from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Network
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -35,12 +34,12 @@ def grid(network: Network) -> Model:
     fed = [declare_port(m, port, buses) for port in network.ports]
     lines = [declare_line(m, line, buses) for line in network.lines]
     others: list[Branch] = []
-    currents: list[CurrentLoad] = []
+    following: list[FollowingLoad] = []
     for load in network.loads:
         declared = declare_load(m, load, buses, alone=network.hangs_on(load))
         others += declared.branches
-        if load.active == "current":
-            currents.append(declare_current_load(m, load, declared, buses))
+        if load.follows:
+            following.append(declare_following_load(m, load, declared, buses, omega_b))
     for shunt in network.shunts:
         others += declare_shunt(m, shunt, buses)
     add_stray(m, network, buses)
@@ -48,8 +47,8 @@ def grid(network: Network) -> Model:
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
         branch_equation(m, branch, buses, omega_b)
-    for current_load in currents:
-        current_load_equation(m, current_load)
+    for following_load in following:
+        following_load_equations(m, following_load)
     declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
     # Bus capacitances against small line reactances are far faster than any communication step: such a
     # network needs an integrator that is stable at any step and damps the ringing after a switching.

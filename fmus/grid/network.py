@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 
-from fmus.grid.names import line_variable
+from fmus.grid.element_data import LEAST_LOW_VOLTAGE, Line, Load, Port, Shunt, Zip
+
+__all__ = ["OPEN_CHARGING", "SMALLEST_REACTANCE", "Line", "Load", "Network", "Port", "Shunt", "Zip"]
 
 SMALLEST_REACTANCE = 1e-5
 """Smallest reactance of a line [pu, 100 MVA]."""
@@ -12,69 +13,6 @@ SMALLEST_REACTANCE = 1e-5
 OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
 voltage."""
-
-ActivePower = Literal["impedance", "current"]
-"""How a load's active power follows its voltage: with its square, or in proportion."""
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A π section; R, X, B [pu, 100 MVA], B the charging of the whole line.
-
-    ``tap``·e^{j·``shift``} is an ideal ratio at the from side, ``shift`` in rad: MATPOWER's convention, in which
-    series impedance and charging lie behind the ratio.
-    """
-
-    name: str
-    from_bus: str
-    to_bus: str
-    X: float
-    R: float = 0.0
-    B: float = 0.0
-    tap: float = 1.0
-    shift: float = 0.0
-
-    @property
-    def has_ratio(self) -> bool:
-        """Whether an ideal ratio stands at the from side."""
-        return self.tap != 1.0 or self.shift != 0.0
-
-    def variable(self, quantity: str) -> str:
-        """Name of one of its variables in the grid's FMU, such as ``X`` or ``connected``."""
-        return line_variable(self.name, quantity)
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """A load that draws P + jQ [MW, Mvar] at the power flow's voltage. Its power varies with |v|², unless ``active``
-    gives another law for P.
-    """
-
-    name: str
-    bus: str
-    p_mw: float
-    q_mvar: float = 0.0
-    active: ActivePower = "impedance"
-
-
-@dataclass(frozen=True, slots=True)
-class Shunt:
-    """An admittance to earth, by the power that it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an
-    inductor.
-    """
-
-    name: str
-    bus: str
-    g_mw: float = 0.0
-    b_mvar: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Port:
-    """Where one device injects its current."""
-
-    name: str
-    bus: str
 
 
 @dataclass(frozen=True)
@@ -125,12 +63,14 @@ class Network:
             return False
         if capacitive := self._capacitive_loads(load.bus):
             return capacitive == [load]
-        return load.p_mw > 0 and not self._has_conductance(load.bus, without=load)
+        return load.conductance_mw > 0 and not self._has_conductance(load.bus, without=load)
 
     def loads_decide(self, bus: str) -> bool:
         """Whether only switchable loads determine the bus's voltage."""
         return not (self._has_fixed_capacitance(bus) or self.needs_stray(bus)) and (
-            bool(self._capacitive_loads(bus)) or not any(s.bus == bus and s.g_mw > 0 for s in self.shunts)
+            bool(self._capacitive_loads(bus))
+            or not any(s.bus == bus and s.g_mw > 0 for s in self.shunts)
+            or any(load.bus == bus and load.conductance_mw < 0 for load in self.loads)
         )
 
     def _has_fixed_capacitance(self, bus: str) -> bool:
@@ -139,10 +79,10 @@ class Network:
         )
 
     def _capacitive_loads(self, bus: str) -> list[Load]:
-        return [load for load in self.loads if load.bus == bus and load.q_mvar < 0]
+        return [load for load in self.loads if load.bus == bus and load.susceptance_mvar < 0]
 
     def _has_conductance(self, bus: str, without: Load | None = None) -> bool:
-        return any(x.bus == bus and x.p_mw > 0 and x is not without for x in self.loads) or any(
+        return any(x.bus == bus and x.conductance_mw > 0 and x is not without for x in self.loads) or any(
             x.bus == bus and x.g_mw > 0 for x in self.shunts
         )
 
@@ -183,15 +123,20 @@ class Network:
 
     def _bad_loads(self) -> Iterable[str]:
         for load in self.loads:
-            if load.active == "current":
-                if not load.p_mw > 0:
-                    yield f"load {load.name!r} of constant current draws {load.p_mw:g} MW; it must exceed 0"
-                if any(self.has_capacitance(bus) for bus in self.buses):
+            for which, law in (("active", load.active), ("reactive", load.reactive)):
+                total = law.z + law.i + law.p
+                if not abs(total - 1) <= 1e-6:
                     yield (
-                        f"load {load.name!r} is of constant current, which needs a network without bus capacitances "
-                        "(line charging, capacitors, stray_B): their integrator takes linear loads only; leave the "
-                        "capacitances out, or make the load a constant impedance"
+                        f"load {load.name!r}: the shares of its {which} power are z = {law.z:g}, i = {law.i:g}, "
+                        f"p = {law.p:g}, {total:g} together; they must sum to 1"
                     )
+            if (load.active.p or load.reactive.p) and not load.low_voltage >= LEAST_LOW_VOLTAGE:
+                yield (
+                    f"load {load.name!r} has a share of constant power down to v_min = {load.low_voltage:g} pu; its "
+                    f"current would grow without bound, so v_min must be at least {LEAST_LOW_VOLTAGE:g} pu"
+                )
+            elif not 0 <= load.low_voltage < 1:
+                yield f"load {load.name!r} has v_min = {load.low_voltage:g} pu; it must be from 0 to below 1"
 
     def _floating_buses(self) -> Iterable[str]:
         floating = [b for b in self.buses if not self.has_capacitance(b) and not self._has_conductance(b)]

@@ -19,6 +19,7 @@ from fmus.grid.elements import (
     declare_network_outputs,
     declare_shunt,
 )
+from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve
 from fmus.toolchain.frames import Phasor
@@ -29,26 +30,20 @@ from fmus.toolchain.port_variables import SYSTEM_BASE
 
 
 def phasor_grid(network: Network) -> Model:
-    """Build the model of a network; parameters are named after its elements, as in `grid`.
-
-    Raises
-    ------
-    ValueError
-        If a load is of constant current: the voltages are solved for as a linear system.
-    """
-    currents = [load.name for load in network.loads if load.active == "current"]
-    if currents:
-        raise ValueError(
-            f"network {network.name!r}: load {', '.join(currents)} is of constant current, which the phasor grid does "
-            "not have; make it a constant impedance, or take the model 'grid'"
-        )
+    """Build the model of a network; parameters are named after its elements, as in `grid`."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency")
+    following: list[FollowingLoad] = []
+    omega_b: ca.SX | None = None
+    if any(load.follows and (load.k_pf or load.k_qf) for load in network.loads):
+        omega_b = 2 * ca.pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     buses = {bus: declare_bus(m, bus) for bus in network.buses}
     Y: Admittances = {bus: {} for bus in buses}
     sources = [_declare_source(m, port, buses, Y) for port in network.ports]
     lines = [declare_line_values(m, line, buses) for line in network.lines]
     for load in network.loads:
-        declare_load(m, load, buses, alone=False, inductor=_susceptance)
+        declared = declare_load(m, load, buses, alone=False, inductor=_susceptance)
+        if load.follows:
+            following.append(declare_following_load(m, load, declared, buses, omega_b, phasors=True))
     for shunt in network.shunts:
         declare_shunt(m, shunt, buses, inductor=_susceptance)
     add_stray(m, network, buses)
@@ -59,6 +54,8 @@ def phasor_grid(network: Network) -> Model:
     voltages = solve(Y, {name: bus.injected for name, bus in buses.items()})
     for name, bus in buses.items():
         bus.v = voltages[name]
+    for following_load in following:
+        following_load_equations(m, following_load)
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
     fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
     declare_network_outputs(m, network, buses, drawn, fed)

@@ -36,17 +36,17 @@ class Elimination:
 
 
 def plan_elimination(model: Model) -> Elimination:
-    """Plan the factorisation of a model that is linear in its states.
+    """Plan the factorisation of a model whose implicit part is linear in its states.
 
     Raises
     ------
     ValueError
-        If ∂f/∂x depends on states or inputs.
+        If the Jacobian of that part depends on states or inputs.
     """
     n = len(model.states)
     x, u = ca.SX.sym("x", n), ca.SX.sym("u", len(model.inputs))
     p, c = ca.SX.sym("p", len(model.parameters)), ca.SX.sym("c", len(model.calculated))
-    A = ca.jacobian(model.derivatives(x, u, p, c), x)
+    A = ca.jacobian((model.implicit or model.derivatives)(x, u, p, c), x)
     if ca.depends_on(A, ca.vertcat(x, u)):
         raise ValueError(f"model {model.name} is not linear in its states; the implicit integrator needs that")
     gh = ca.SX.sym("gh")

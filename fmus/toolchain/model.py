@@ -35,7 +35,9 @@ class Model:
         The rule behind each r, with its remedy.
     integrator
         ``runge_kutta`` (explicit, order 4) or ``sdirk`` (L-stable, order 2, for stiff models that
-        are linear in x).
+        are linear in x but for what ``implicit`` leaves out).
+    implicit
+        (x, u, p, c) → the part of ẋ that an implicit step solves for; None for all of ẋ.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Model:
     requirements: Function
     requirement_texts: tuple[str, ...]
     integrator: Integrator = "runge_kutta"
+    implicit: Function | None = None
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:

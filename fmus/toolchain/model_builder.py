@@ -45,6 +45,7 @@ class ModelBuilder:
         self._declared: dict[str, tuple[Variable, ca.SX]] = {}
         self._expressions: dict[str, ca.SX] = {}
         self._derivatives: dict[str, ca.SX] = {}
+        self._implicit: dict[str, ca.SX] = {}
         self._requirements: list[tuple[ca.SX, str]] = []
         self._opened: list[ca.SX] = []
         self._algebraic: list[tuple[ca.SX, ca.SX]] = []
@@ -200,14 +201,27 @@ class ModelBuilder:
         self._expressions[full] = ca.SX(initial)
         return self._declare(State(full, unit, description, base, stepwise))
 
-    def derivative(self, state: ca.SX, rate: Scalar) -> None:
-        """Give the time derivative [unit of the state per second] of a declared state."""
+    def derivative(self, state: ca.SX, rate: Scalar, implicit: Scalar | None = None) -> None:
+        """Give the time derivative of a declared state.
+
+        Parameters
+        ----------
+        state
+            As `state` returned it.
+        rate
+            [unit of the state per second]
+        implicit
+            The part of the rate that an implicit integrator solves for; it is linear in the states. By default all
+            of it. What is left is evaluated at the stages of a step and must be slow against it.
+        """
         declared = self._declared.get(state.name())
         if declared is None or not isinstance(declared[0], State):
             raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
         if state.name() in self._derivatives:
             raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
         self._derivatives[state.name()] = ca.SX(rate)
+        if implicit is not None:
+            self._implicit[state.name()] = ca.SX(implicit)
 
     def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
         """Declare an output as a function of states, inputs and parameters.
@@ -280,6 +294,10 @@ class ModelBuilder:
         x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
         r_value = _stack([value for value, _ in self._requirements])
         arguments = [x, u, p, c]
+        implicit = None
+        if self._implicit:
+            rates = collect(kinds[State], self._derivatives | self._implicit)
+            implicit = ca.Function("implicit", arguments, [rates])
         return Model(
             name=self.name,
             title=self.title,
@@ -294,6 +312,7 @@ class ModelBuilder:
             requirements=ca.Function("requirements", [p, c], [r_value]),
             requirement_texts=tuple(text for _, text in self._requirements),
             integrator=integrator,
+            implicit=implicit,
         )
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:

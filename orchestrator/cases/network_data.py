@@ -5,6 +5,7 @@ from pathlib import Path
 
 from fmus.grid.network import Line, Load, Shunt
 from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
+from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.schema import NetworkTable
@@ -48,21 +49,22 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     """
     source = _source(table, directory)
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift) for n, t in table.lines.items()]
-    loads = [Load(n, t.bus, t.p, t.q, t.active) for n, t in table.loads.items()]
+    loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
     in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
     lines += [line for line, _ in in_file]
     if table.loads_file is not None:
         for row in rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
             bus = bus_name(row["bus"])
-            loads.append(Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar")))
+            load = Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar"))
+            loads.append(with_laws(load, table))
     buses = dict.fromkeys((*source.buses, *table.buses))
     if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
         buses = dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
-        (*source.loads, *loads),
+        (*(with_laws(load, table) for load in source.loads), *loads),
         (*source.shunts, *shunts),
         source.generation,
         source.slack,

@@ -60,7 +60,7 @@ def import_network(source: SourceTables) -> ImportedNetwork:
     labels = {number: source.labels[number] for number in rows}
     lines, to_earth = _lines(source, labels)
     at_bus = _generators(source, labels)
-    loads, problems = _loads(source, rows, at_bus)
+    loads = _loads(source, rows, at_bus)
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
     shunts = [
@@ -68,8 +68,8 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         for n, y in ((n, y * source.base_mva) for n, y in to_earth.items())
         if abs(y) > _NEGLIGIBLE
     ]
-    problems += [f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
-                 for s in shunts if s.g_mw < 0]  # fmt: skip
+    problems = [f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
+                for s in shunts if s.g_mw < 0]  # fmt: skip
     if problems:
         more = f" and {len(problems) - 5} more like these" if len(problems) > 5 else ""
         raise InputError(f"{source.name}: {'; '.join(problems[:5])}{more}; the grid model has no such element")
@@ -138,20 +138,16 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
     return at_bus
 
 
-def _loads(
-    source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]
-) -> tuple[list[Load], list[str]]:
-    """Loads, and their problems. A negative load at a generator's bus is added to the generators there."""
-    loads, problems = [], []
+def _loads(source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]) -> list[Load]:
+    """Loads; a negative one is static generation. At a generator's bus it is added to the generators there."""
+    loads = []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])
         if p < -_NEGLIGIBLE and number in at_bus:
             at_bus[number].append(_Member(-p, at_bus[number][0].v_pu, -p / _POWER_FACTOR))
-        elif p < -_NEGLIGIBLE:
-            problems.append(f"the load at bus {label} is {p:g} MW, so that it feeds; make it a generator in the source")
-        elif p > _NEGLIGIBLE or abs(q) > _NEGLIGIBLE:
-            loads.append(Load(f"load_{label}", bus_of(label), max(0.0, p), _clean(q)))
-    return loads, problems
+        elif abs(p) > _NEGLIGIBLE or abs(q) > _NEGLIGIBLE:
+            loads.append(Load(f"load_{label}", bus_of(label), _clean(p), _clean(q)))
+    return loads
 
 
 def _generation(label: str, members: list[_Member]) -> Generation:

@@ -85,13 +85,34 @@ class LineTable(Table):
     shift: Radian = 0.0
 
 
-class LoadTable(Table):
-    """A load of the network."""
+class ZipTable(Table):
+    """Shares of constant impedance, current and power; they sum to 1."""
+
+    z: Number = 0.0
+    i: Number = 0.0
+    p: Number = 0.0
+
+
+LoadLaw = Literal["impedance", "current", "power"] | ZipTable
+
+
+class LoadModelTable(Table):
+    """How loads follow voltage and frequency."""
+
+    active: LoadLaw | None = None
+    reactive: LoadLaw | None = None
+    k_pf: Number | None = Field(default=None, allow_inf_nan=False)
+    k_qf: Number | None = Field(default=None, allow_inf_nan=False)
+    v_min: PerUnit | None = None
+    tau: Seconds | None = Field(default=None, gt=0)
+
+
+class LoadTable(LoadModelTable):
+    """A load of the network; p < 0 is static generation."""
 
     bus: str
     p: Megawatt
     q: Megavar = 0.0
-    active: Literal["impedance", "current"] = "impedance"
 
 
 class ShuntTable(Table):
@@ -115,6 +136,8 @@ class NetworkTable(Table):
     loads_file: str | None = None
     lines: dict[str, LineTable] = {}
     loads: dict[str, LoadTable] = {}
+    load_model: LoadModelTable = LoadModelTable()
+    generation_model: LoadModelTable = LoadModelTable()
     shunts: dict[str, ShuntTable] = {}
 
 

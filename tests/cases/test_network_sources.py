@@ -10,6 +10,7 @@ import pytest
 from pandapower import networks
 from scipy.io import savemat
 
+from fmus.grid.element_data import Zip
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
@@ -172,7 +173,6 @@ def as_pandapower():
         ({"matpower": "script.m"}, "script.m: it (is not|cannot be read as) a MATPOWER case"),
         ({"matpower": "broken.mat"}, "broken.mat: it cannot be read as a MATPOWER case"),
         ({"matpower": "short.m"}, r"short.m: mpc.branch must be a table of numbers with 11 columns or more"),
-        ({"matpower": "feeding.m"}, "feeding.m: the load at bus 12 is -50 MW, so that it feeds; make it a generator"),
         ({"pandapower": "case93"}, "there is no pandapower network 'case93'; did you mean case9 or"),
         ({"pandapower": "quite_different"}, "'quite_different'; give one of pandapower.networks, or the path"),
         ({"pandapower": "none.json"}, r"none.json: there is no such file; save a network with pandapower.to_json"),
@@ -184,7 +184,6 @@ def test_a_source_that_cannot_be_used(table, words, tmp_path):
     (tmp_path / "script.m").write_text("x = 3;\ndisp(x)\n")
     (tmp_path / "broken.mat").write_bytes(b"no matrices here")
     (tmp_path / "text.json").write_text("[1, 2")
-    (tmp_path / "feeding.m").write_text(SMALL.replace("12  1   90 ", "12  1   -50 "))
     head, _, tail = SMALL.partition("mpc.branch")
     short = "\n".join(
         " ".join(line.split()[:7]) + ";" if line.startswith("    ") else line for line in tail.splitlines()
@@ -192,3 +191,17 @@ def test_a_source_that_cannot_be_used(table, words, tmp_path):
     (tmp_path / "short.m").write_text(f"{head}mpc.branch{short}")
     with pytest.raises(InputError, match=words):
         network_data(NetworkTable(**table), tmp_path)
+
+
+def test_a_negative_load_is_static_generation(tmp_path):
+    """A constant current, unless the case says otherwise of generation; what holds for loads does not hold for it."""
+    (tmp_path / "feeding.m").write_text(SMALL.replace("12  1   90 ", "12  1   -50 "))
+    laws = {"load_model": {"active": "power"}}
+    found = {}
+    told = {"generation_model": {"active": {"z": 0.5, "i": 0.5}, "v_min": 0.5}}
+    for name, more in (("usual", {}), ("told", told)):
+        table = NetworkTable.model_validate({"matpower": "feeding.m"} | laws | more)
+        found[name] = {load.bus: load for load in network_data(table, tmp_path).loads}["bus_12"]
+    assert found["usual"].p_mw == -50
+    assert (found["usual"].active, found["usual"].reactive) == (Zip(i=1.0), Zip(i=1.0))
+    assert (found["told"].active, found["told"].v_min) == (Zip(z=0.5, i=0.5), 0.5)
