@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from fmus.grid.names import line_variable
 
+SMALLEST_REACTANCE = 1e-5
+"""Smallest reactance of a line [pu, 100 MVA]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Line:

@@ -18,6 +18,7 @@ from fmus.grid.elements import (
     declare_port,
     declare_shunt,
 )
+from fmus.grid.fault import declare_fault, declare_fault_outputs
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Network
 from fmus.toolchain.frames import Phasor
@@ -43,6 +44,8 @@ def grid(network: Network) -> Model:
     for shunt in network.shunts:
         others += declare_shunt(m, shunt, buses)
     add_stray(m, network, buses)
+    faults = [declare_fault(m, bus, buses) for bus in network.faults]
+    others += faults
     for name, bus in buses.items():
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
@@ -50,9 +53,12 @@ def grid(network: Network) -> Model:
     for following_load in following:
         following_load_equations(m, following_load)
     declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
+    for fault in faults:
+        declare_fault_outputs(m, fault.from_bus, fault.current)
     # Bus capacitances against small line reactances are far faster than any communication step: such a
     # network needs an integrator that is stable at any step and damps the ringing after a switching.
-    stiff = any(network.has_capacitance(bus) for bus in network.buses)
+    # So does a fault's small reactance.
+    stiff = bool(network.faults) or any(network.has_capacitance(bus) for bus in network.buses)
     return m.build(integrator="sdirk" if stiff else "runge_kutta")
 
 

@@ -3,12 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fmus.grid.element_data import LEAST_LOW_VOLTAGE, Line, Load, Port, Shunt, Zip
+from fmus.grid.element_data import LEAST_LOW_VOLTAGE, SMALLEST_REACTANCE, Line, Load, Port, Shunt, Zip
 
 __all__ = ["OPEN_CHARGING", "SMALLEST_REACTANCE", "Line", "Load", "Network", "Port", "Shunt", "Zip"]
-
-SMALLEST_REACTANCE = 1e-5
-"""Smallest reactance of a line [pu, 100 MVA]."""
 
 OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
@@ -25,6 +22,8 @@ class Network:
         Capacitance to earth [pu, 100 MVA] of every bus without capacitance of its own (charging, capacitor). If it is
         0, such a bus needs a load with P > 0. A unit at a bus with a weak load needs the stray capacitance as well: v =
         Σi/G would jump with the unit's current.
+    faults
+        Buses at which there can be a fault.
 
     Raises
     ------
@@ -40,6 +39,7 @@ class Network:
     ports: tuple[Port, ...]
     shunts: tuple[Shunt, ...] = ()
     stray_B: float = 0.0
+    faults: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
@@ -93,6 +93,7 @@ class Network:
                 yield f"line {line.name!r} ends at bus {bus!r}, which does not exist"
         attached = [("load", x.name, x.bus) for x in self.loads] + [("shunt", x.name, x.bus) for x in self.shunts]
         attached += [("port", x.name, x.bus) for x in self.ports]
+        attached += [("fault", bus, bus) for bus in self.faults]
         for kind, name, bus in attached:
             if bus not in known:
                 yield f"{kind} {name!r} is at bus {bus!r}, which does not exist"

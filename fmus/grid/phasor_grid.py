@@ -19,6 +19,7 @@ from fmus.grid.elements import (
     declare_network_outputs,
     declare_shunt,
 )
+from fmus.grid.fault import declare_fault_outputs, fault_admittance
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve
@@ -49,6 +50,9 @@ def phasor_grid(network: Network) -> Model:
     add_stray(m, network, buses)
     for name, bus in buses.items():
         add_admittance(Y, name, name, Phasor(bus.G, bus.B))
+    faults = {bus: fault_admittance(m, bus) for bus in network.faults}
+    for name, y in faults.items():
+        add_admittance(Y, name, name, y)
     for line, values in zip(network.lines, lines, strict=True):
         _add_line(Y, line, values)
     voltages = solve(Y, {name: bus.injected for name, bus in buses.items()})
@@ -59,6 +63,8 @@ def phasor_grid(network: Network) -> Model:
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
     fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
     declare_network_outputs(m, network, buses, drawn, fed)
+    for name, y in faults.items():
+        declare_fault_outputs(m, name, buses[name].v * y)
     return m.build()
 
 

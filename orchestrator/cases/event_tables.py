@@ -11,6 +11,7 @@ from orchestrator.cases.fault_tables import component_events, note_conflicts, wi
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import (
     BranchChangeTable,
+    BusFaultTable,
     ComponentFaultTable,
     EventTable,
     LineReclosingTable,
@@ -28,6 +29,7 @@ from orchestrator.cases.schema import (
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     BranchChange,
+    BusFault,
     Event,
     Fault,
     LineSwitching,
@@ -131,6 +133,8 @@ def _grid_or_reference_events(table: EventTable, component: str) -> list[Event]:
             if table.reclose_after is None:
                 return [opened]
             return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
+        case BusFaultTable():
+            return _fault(table, component)
         case LineReclosingTable():
             return [LineSwitching(table.time, component, table.line, True)]
         case BranchChangeTable():
@@ -142,6 +146,17 @@ def _grid_or_reference_events(table: EventTable, component: str) -> list[Event]:
             return [ParameterChange(table.time, component, table.parameter, value)]
         case _:
             raise TypeError(f"{type(table).__name__} is no event of the grid or of a component")
+
+
+def _fault(table: BusFaultTable, grid: str) -> list[Event]:
+    """The fault, its end, and the opening of the line that clears it."""
+    events: list[Event] = [BusFault(table.time, grid, table.bus, True, table.R, table.X)]
+    if table.duration is not None:
+        end = table.time + table.duration
+        events.append(BusFault(end, grid, table.bus, False))
+        if table.cleared_by is not None:
+            events.append(LineSwitching(end, grid, table.cleared_by, False))
+    return events
 
 
 def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str) -> Event | None:
@@ -200,11 +215,13 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
             wanted, kind, known = event.line, "line", lines_among(names)
         case LoadChange() | LoadSwitching():
             wanted, kind, known = event.load, "load", _elements(names, "scale")
+        case BusFault():
+            wanted, kind, known = event.bus, "bus", _elements(names, "v_0")
         case UnitSwitching():
             wanted, kind, known = event.unit, "unit", _elements(plan.description.inputs, "i_re")
     if kind and wanted not in known:
         some = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
-        hint = close_names(wanted, known, f"it has: {some}" if known else f"it has no {kind}s")
+        hint = close_names(wanted, known, f"it has: {some}" if known else "it has none")
         return f"component {component!r} has no {kind} {wanted!r}; {hint}"
     return f"component {component!r} has no variable {variable!r} for this event to set"
 

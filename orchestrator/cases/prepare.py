@@ -1,7 +1,7 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from fmus.grid.network import Network, Port
@@ -24,7 +24,7 @@ from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.recording import record_every, recorded
 from orchestrator.cases.references import references_of
-from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
+from orchestrator.cases.schema import BusFaultTable, CaseTable, ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
@@ -89,6 +89,14 @@ class PreparedScenario:
 def _takes_network(table: ComponentTable) -> bool:
     """Whether a component's model is built for the case's network table."""
     return table.model in model_names() and needs_arguments(table.model or "")
+
+
+def _with_faults(network: Network | None, case: CaseTable) -> Network | None:
+    """The network with the faults of all scenarios, which share one FMU. Unknown buses are the events' matter."""
+    tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
+    buses = dict.fromkeys(table.bus for table in tables if isinstance(table, BusFaultTable))
+    known = tuple(bus for bus in buses if network is not None and bus in network.buses)
+    return replace(network, faults=known) if network is not None and known else network
 
 
 @cache
@@ -245,7 +253,7 @@ class Preparer:
         elif _takes_network(grid):
             draft.network = self._network_from_table(grid)
         elif grid.model in model_names():
-            draft.network = network_of(grid.model or "")
+            draft.network = _with_faults(network_of(grid.model or ""), draft.case)
 
     def _network_from_table(self, grid: ComponentTable) -> Network | None:
         draft, data = self.draft, self.draft.data
@@ -268,7 +276,8 @@ class Preparer:
         ports = tuple(Port(n, t.bus) for n, t in draft.tables.items() if t.bus)
         name = f"{draft.case.name}_grid"
         try:
-            return Network(name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
+            network = Network(name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
+            return _with_faults(network, draft.case)
         except ValueError as error:
             draft.note_network(draft.place("network"), str(error))
             return None
@@ -339,6 +348,9 @@ class Preparer:
             directory = self.draft.directory
             return bound_fmu(directory / table.fmu, directory / table.binding if table.binding else None)
         own = _takes_network(table)
+        faulted = self.draft.network is not None and bool(self.draft.network.faults)
+        if faulted and table is self.draft.tables.get(self.draft.grid or ""):
+            own = True  # a model with a network of its own is built anew, with that network's faults
         if own and self.draft.network is None:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"

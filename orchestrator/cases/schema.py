@@ -1,9 +1,9 @@
 """The form of a case file. `case` checks the meaning of the file."""
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from orchestrator.cases.names import file_name
 from orchestrator.toml_files import Table
@@ -321,6 +321,23 @@ class LineReclosingTable(GridEventBase):
     line: str
 
 
+class BusFaultTable(GridEventBase):
+    """A three-phase fault at a bus; where a line clears it, that line opens when the fault ends."""
+
+    type: Literal["bus_fault"]
+    bus: str
+    R: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
+    X: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
+    duration: Seconds | None = Field(default=None, gt=0)
+    cleared_by: str | None = None
+
+    @model_validator(mode="after")
+    def _has_an_end_to_clear(self) -> Self:
+        if self.cleared_by is not None and self.duration is None:
+            raise ValueError("'cleared_by' needs 'duration': the time from the fault to the opening of the line")
+        return self
+
+
 class UnitTripTable(GridEventBase):
     """A unit is disconnected."""
 
@@ -371,6 +388,7 @@ SettingEventTable = (
     | UnitTripTable
     | UnitReconnectionTable
     | BranchChangeTable
+    | BusFaultTable
     | ReferenceChangeTable
     | ParameterChangeTable
 )

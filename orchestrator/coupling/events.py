@@ -10,6 +10,9 @@ from fmus.grid.names import line_variable
 from orchestrator.coupling.imperfections import Imperfection
 from orchestrator.coupling.system import Connection
 
+SMALLEST_FAULT_REACTANCE = 1e-5
+"""X [pu, 100 MVA] of a fault without impedance: what is left of the voltage is 1e-5 pu for each pu of its current."""
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
@@ -105,6 +108,23 @@ class BranchChange(Event):
         """The values that the event sets, by variable."""
         values = {line_variable(self.line, "X"): self.X}
         return values if self.R is None else values | {line_variable(self.line, "R"): self.R}
+
+
+@dataclass(frozen=True, slots=True)
+class BusFault(Event):
+    """A three-phase fault of R + jX [pu, 100 MVA] at a bus begins, or ends."""
+
+    bus: str
+    on: bool
+    R: float = 0.0
+    X: float = 0.0
+
+    def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable; X is at least the grid's smallest reactance."""
+        fault = f"{self.bus}.fault"
+        if not self.on:
+            return {f"{fault}.on": False}
+        return {f"{fault}.R": self.R, f"{fault}.X": max(self.X, SMALLEST_FAULT_REACTANCE), f"{fault}.on": True}
 
 
 @dataclass(frozen=True, slots=True)

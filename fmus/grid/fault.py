@@ -1,0 +1,51 @@
+"""Three-phase faults at buses: an impedance R + jX to earth behind a switch.
+
+In an EMT network its current is a state; once the fault is over the current fades within a millisecond, as that of a
+line which opens. In a network of phasors it is an admittance.
+"""
+
+import casadi as ca
+
+from fmus.grid.element_data import SMALLEST_REACTANCE
+from fmus.grid.elements import Branch, Bus
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port_variables import SYSTEM_BASE
+
+
+def declare_fault(m: ModelBuilder, bus: str, buses: dict[str, Bus]) -> Branch:
+    """Declare a fault at a bus, with its current as a state."""
+    R, X, on = _declare_values(m, bus)
+    text = "Current of the fault"
+    with m.scope(f"{bus}.fault"):
+        current = Phasor(
+            m.state("i_re_state", 0.0, "pu", f"{text}, real part", SYSTEM_BASE),
+            m.state("i_im_state", 0.0, "pu", f"{text}, imaginary part", SYSTEM_BASE),
+        )
+    buses[bus].injected -= current
+    return Branch(current, current, R, X, bus, connected=on)
+
+
+def fault_admittance(m: ModelBuilder, bus: str) -> Phasor:
+    """Declare a fault at a bus; its admittance is 0 while there is none."""
+    R, X, on = _declare_values(m, bus)
+    return Phasor(1.0, 0.0) / Phasor(R, X) * on
+
+
+def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:
+    """Declare the current of a fault as outputs."""
+    with m.scope(f"{bus}.fault"):
+        m.output("i_re", current.re, "pu", "Current into the fault, real part, network frame", base=SYSTEM_BASE)
+        m.output("i_im", current.im, "pu", "Current into the fault, imaginary part, network frame", base=SYSTEM_BASE)
+
+
+def _declare_values(m: ModelBuilder, bus: str) -> tuple[ca.SX, ca.SX, ca.SX]:
+    with m.scope(f"{bus}.fault"):
+        return (
+            m.parameter("R", 0.0, "pu", f"Resistance of a fault at {bus}", base=SYSTEM_BASE, minimum=0, tunable=True),
+            m.parameter(
+                "X", SMALLEST_REACTANCE, "pu", f"Reactance of a fault at {bus}", base=SYSTEM_BASE,
+                minimum=SMALLEST_REACTANCE, maximum=100, tunable=True,
+            ),
+            m.switch("on", False, f"There is a fault at {bus}", tunable=True),
+        )  # fmt: skip
