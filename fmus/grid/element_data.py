@@ -13,7 +13,7 @@ class Line:
     """A π section; R, X, B [pu, 100 MVA], B the charging of the whole line.
 
     ``tap``·e^{j·``shift``} is an ideal ratio at the from side, ``shift`` in rad: MATPOWER's convention, in which
-    series impedance and charging lie behind the ratio.
+    series impedance and charging lie behind the ratio. ``X_C`` is the reactance of a capacitor in series [pu, 100 MVA].
     """
 
     name: str
@@ -24,6 +24,7 @@ class Line:
     B: float = 0.0
     tap: float = 1.0
     shift: float = 0.0
+    X_C: float = 0.0
 
     @property
     def has_ratio(self) -> bool:
@@ -120,13 +121,14 @@ class Load:
 @dataclass(frozen=True, slots=True)
 class Shunt:
     """An admittance to earth, by the power that it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an
-    inductor.
+    inductor. A ``switched`` one has a breaker.
     """
 
     name: str
     bus: str
     g_mw: float = 0.0
     b_mvar: float = 0.0
+    switched: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,8 @@ class Branch:
         Complex ratio at the from side.
     connected
         1 for a connected branch, 0 for an open one; None for a branch that cannot be opened.
+    capacitor
+        Voltage of a capacitor in series, a state, and its reactance.
     """
 
     current: Phasor
@@ -47,6 +49,7 @@ class Branch:
     to_bus: str | None = None
     ratio: Phasor | None = None
     connected: ca.SX | None = None
+    capacitor: tuple[Phasor, ca.SX] | None = None
 
 
 @dataclass(frozen=True)
@@ -76,12 +79,15 @@ Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
 
 @dataclass(frozen=True)
 class LineValues:
-    """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open."""
+    """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open,
+    series capacitor (None without one).
+    """
 
     R: ca.SX
     X: ca.SX
     ratio: Phasor | None
     connected: ca.SX
+    X_C: ca.SX | None = None
 
 
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
@@ -127,7 +133,12 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
         B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (OPEN_CHARGING + (1 - OPEN_CHARGING) * connected)
         start.B += B / 2 / turns**2
         end.B += B / 2
-    return LineValues(R, X, ratio, connected)
+    X_C = None
+    if line.X_C:
+        text = f"Reactance of the series capacitor of line {line.name}"
+        X_C = m.parameter(line.variable("X_C"), line.X_C, "pu", text, base=SYSTEM_BASE, minimum=1e-6, maximum=100)
+        m.require(X - X_C, f"line {line.name}: X must exceed X_C, the reactance of its series capacitor")
+    return LineValues(R, X, ratio, connected, X_C)
 
 
 def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
@@ -135,14 +146,18 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     start, end = buses[line.from_bus], buses[line.to_bus]
     values = declare_line_values(m, line, buses)
     v_from = start.v_0 if values.ratio is None else start.v_0 / values.ratio
-    initial = (v_from - end.v_0) / Phasor(values.R, values.X) * values.connected
+    X = values.X if values.X_C is None else values.X - values.X_C
+    initial = (v_from - end.v_0) / Phasor(values.R, X) * values.connected
     with m.scope(line.name):
         current = _current_state(m, initial, f"Current of line {line.name}")
+        capacitor = None
+        if values.X_C is not None:
+            capacitor = _capacitor_state(m, initial * Phasor(0.0, -values.X_C)), values.X_C
     drawn = current if values.ratio is None else current / values.ratio.conjugate()
     start.injected -= drawn
     end.injected += current
     return Branch(
-        current, drawn, values.R, values.X, line.from_bus, line.to_bus, values.ratio, values.connected
+        current, drawn, values.R, values.X, line.from_bus, line.to_bus, values.ratio, values.connected, capacitor
     )  # fmt: skip
 
 
@@ -237,8 +252,11 @@ def declare_shunt(
     """
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
+        text = "The shunt is connected"
+        connected: Scalar = m.switch("connected", True, text, tunable=True) if shunt.switched else 1.0
         if shunt.g_mw:
-            bus.G += m.parameter("G", shunt.g_mw, "MW", "Active power drawn at 1 pu") / SYSTEM_BASE_MVA
+            G = m.parameter("G", shunt.g_mw, "MW", "Active power drawn at 1 pu") / SYSTEM_BASE_MVA
+            bus.G += G * connected if shunt.switched else G
         if not shunt.b_mvar:
             return []
         capacitive = shunt.b_mvar > 0
@@ -247,9 +265,10 @@ def declare_shunt(
             minimum=1e-6 if capacitive else None, maximum=None if capacitive else -1e-6,
         )  # fmt: skip
         if capacitive:
-            bus.B += B / SYSTEM_BASE_MVA
+            rest = OPEN_CHARGING + (1 - OPEN_CHARGING) * connected
+            bus.B += B / SYSTEM_BASE_MVA * rest if shunt.switched else B / SYSTEM_BASE_MVA
             return []
-        return inductor(m, bus, shunt.bus, -SYSTEM_BASE_MVA / B, 1.0)
+        return inductor(m, bus, shunt.bus, -SYSTEM_BASE_MVA / B, connected)
 
 
 def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
@@ -314,6 +333,9 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
         over = over / branch.ratio
     if branch.to_bus is not None:
         over -= buses[branch.to_bus].v
+    if branch.capacitor is not None:
+        over -= branch.capacitor[0]
+        _capacitor_equation(m, branch, omega_b)
     rate = over - Phasor(branch.R, branch.X) * branch.current
     if branch.connected is None:
         rate *= omega_b / branch.X
@@ -322,6 +344,17 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
         rate = rate * (branch.connected * omega_b / branch.X) - branch.current * fading
     m.derivative(ca.SX(branch.current.re), rate.re)
     m.derivative(ca.SX(branch.current.im), rate.im)
+
+
+def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: ca.SX) -> None:
+    """dv/dt = ω_b·(X_C·i − j·v); where the line is open its capacitor is bypassed, and dv/dt = −v/τ."""
+    assert branch.capacitor is not None
+    assert branch.connected is not None
+    v, X_C = branch.capacitor
+    rate = (branch.current * X_C - v.times_j()) * (omega_b * branch.connected)
+    rate -= v * ((1 - branch.connected) / BREAKER_TIME)
+    m.derivative(ca.SX(v.re), rate.re)
+    m.derivative(ca.SX(v.im), rate.im)
 
 
 def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
@@ -344,6 +377,14 @@ def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active
     with m.scope(name):
         m.output("p", s.re, "pu", active, base=SYSTEM_BASE)
         m.output("q", s.im, "pu", reactive, base=SYSTEM_BASE)
+
+
+def _capacitor_state(m: ModelBuilder, initial: Phasor) -> Phasor:
+    text = "Voltage of the series capacitor"
+    return Phasor(
+        m.state("v_C_re", initial.re, "pu", f"{text}, real part", "bus"),
+        m.state("v_C_im", initial.im, "pu", f"{text}, imaginary part", "bus"),
+    )
 
 
 def _current_state(m: ModelBuilder, initial: Phasor, text: str) -> Phasor:

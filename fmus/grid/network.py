@@ -111,8 +111,13 @@ class Network:
             if not line.X >= SMALLEST_REACTANCE:
                 yield (
                     f"line {line.name!r} has the reactance {line.X:g} pu {ends}; it must be at least "
-                    f"{SMALLEST_REACTANCE:g}: series capacitors are not modelled, so merge it with the line in series "
-                    "with it, and merge buses that nothing separates"
+                    f"{SMALLEST_REACTANCE:g}: give a series capacitor as X_C of the line in series with it, merge the "
+                    "star point of a transformer equivalent, and merge buses that nothing separates"
+                )
+            if not 0 <= line.X_C < max(line.X, SMALLEST_REACTANCE):
+                yield (
+                    f"line {line.name!r} has the series capacitor X_C = {line.X_C:g} pu and the reactance X = "
+                    f"{line.X:g} pu {ends}; X_C must not be negative, and be less than X"
                 )
             for quantity, value in (("resistance", line.R), ("charging", line.B)):
                 if not value >= 0:

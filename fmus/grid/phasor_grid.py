@@ -110,4 +110,5 @@ def _drawn(line: Line, values: LineValues, buses: dict[str, Bus]) -> Phasor:
 
 
 def _series(values: LineValues) -> Phasor:
-    return Phasor(1.0, 0.0) / Phasor(values.R, values.X) * values.connected
+    X = values.X if values.X_C is None else values.X - values.X_C
+    return Phasor(1.0, 0.0) / Phasor(values.R, X) * values.connected

@@ -22,6 +22,8 @@ from orchestrator.cases.schema import (
     ParameterChangeTable,
     ReferenceChangeTable,
     SettingEventTable,
+    ShuntReconnectionTable,
+    ShuntTripTable,
     UnitReconnectionTable,
     UnitTripTable,
     WireEventTable,
@@ -37,6 +39,7 @@ from orchestrator.coupling.events import (
     LoadSwitching,
     ParameterChange,
     ReferenceChange,
+    ShuntSwitching,
     UnitSwitching,
 )
 from orchestrator.coupling.system import ComponentPlan, Endpoint
@@ -133,6 +136,8 @@ def _grid_or_reference_events(table: EventTable, component: str) -> list[Event]:
             if table.reclose_after is None:
                 return [opened]
             return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
+        case ShuntTripTable() | ShuntReconnectionTable():
+            return [ShuntSwitching(table.time, component, table.shunt, isinstance(table, ShuntReconnectionTable))]
         case BusFaultTable():
             return _fault(table, component)
         case LineReclosingTable():
@@ -215,6 +220,8 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
             wanted, kind, known = event.line, "line", lines_among(names)
         case LoadChange() | LoadSwitching():
             wanted, kind, known = event.load, "load", _elements(names, "scale")
+        case ShuntSwitching():
+            wanted, kind, known = event.shunt, "shunt", _elements(names, "connected")
         case BusFault():
             wanted, kind, known = event.bus, "bus", _elements(names, "v_0")
         case UnitSwitching():

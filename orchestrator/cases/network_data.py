@@ -48,7 +48,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         that the grid model does not have.
     """
     source = _source(table, directory)
-    lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift) for n, t in table.lines.items()]
+    lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
     in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []

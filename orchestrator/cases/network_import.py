@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fmus.grid.network import Line, Load, Shunt
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
+from orchestrator.cases.negative_reactances import without_negative_reactances
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.errors import InputError
 
@@ -61,6 +62,9 @@ def import_network(source: SourceTables) -> ImportedNetwork:
     lines, to_earth = _lines(source, labels)
     at_bus = _generators(source, labels)
     loads = _loads(source, rows, at_bus)
+    earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {n for n, r in rows.items() if any(r[4:6])}
+    kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
+    lines, merged = without_negative_reactances(lines, kept)
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
     shunts = [
@@ -75,7 +79,7 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         raise InputError(f"{source.name}: {'; '.join(problems[:5])}{more}; the grid model has no such element")
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
     return ImportedNetwork(
-        tuple(bus_of(label) for label in labels.values()),
+        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),
         tuple(lines),
         tuple(loads),
         tuple(shunts),

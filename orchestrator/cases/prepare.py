@@ -24,7 +24,15 @@ from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.recording import record_every, recorded
 from orchestrator.cases.references import references_of
-from orchestrator.cases.schema import BusFaultTable, CaseTable, ComponentTable, ReferenceModeTable, Value
+from orchestrator.cases.schema import (
+    BusFaultTable,
+    CaseTable,
+    ComponentTable,
+    ReferenceModeTable,
+    ShuntReconnectionTable,
+    ShuntTripTable,
+    Value,
+)
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
@@ -91,12 +99,18 @@ def _takes_network(table: ComponentTable) -> bool:
     return table.model in model_names() and needs_arguments(table.model or "")
 
 
-def _with_faults(network: Network | None, case: CaseTable) -> Network | None:
-    """The network with the faults of all scenarios, which share one FMU. Unknown buses are the events' matter."""
+def _with_switches(network: Network | None, case: CaseTable) -> Network | None:
+    """The network with the faults and switched shunts of all scenarios, which share one FMU.
+
+    Unknown names are the events' matter.
+    """
     tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
-    buses = dict.fromkeys(table.bus for table in tables if isinstance(table, BusFaultTable))
-    known = tuple(bus for bus in buses if network is not None and bus in network.buses)
-    return replace(network, faults=known) if network is not None and known else network
+    faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
+    switched = {table.shunt for table in tables if isinstance(table, ShuntTripTable | ShuntReconnectionTable)}
+    if network is None or not (faults or switched):
+        return network
+    shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
+    return replace(network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts)
 
 
 @cache
@@ -253,7 +267,7 @@ class Preparer:
         elif _takes_network(grid):
             draft.network = self._network_from_table(grid)
         elif grid.model in model_names():
-            draft.network = _with_faults(network_of(grid.model or ""), draft.case)
+            draft.network = _with_switches(network_of(grid.model or ""), draft.case)
 
     def _network_from_table(self, grid: ComponentTable) -> Network | None:
         draft, data = self.draft, self.draft.data
@@ -277,7 +291,7 @@ class Preparer:
         name = f"{draft.case.name}_grid"
         try:
             network = Network(name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
-            return _with_faults(network, draft.case)
+            return _with_switches(network, draft.case)
         except ValueError as error:
             draft.note_network(draft.place("network"), str(error))
             return None

@@ -83,6 +83,7 @@ class LineTable(Table):
     B: PerUnit = 0.0
     tap: Number = 1.0
     shift: Radian = 0.0
+    X_C: PerUnit = 0.0
 
 
 class ZipTable(Table):
@@ -306,6 +307,20 @@ class LoadReconnectionTable(GridEventBase):
     scale: Number = Field(default=1.0, gt=0)
 
 
+class ShuntTripTable(GridEventBase):
+    """A shunt is disconnected."""
+
+    type: Literal["shunt_trip"]
+    shunt: str
+
+
+class ShuntReconnectionTable(GridEventBase):
+    """A shunt is connected, or connected again."""
+
+    type: Literal["shunt_reconnection"]
+    shunt: str
+
+
 class LineTripTable(GridEventBase):
     """A line opens, and may close again."""
 
@@ -389,6 +404,8 @@ SettingEventTable = (
     | UnitReconnectionTable
     | BranchChangeTable
     | BusFaultTable
+    | ShuntTripTable
+    | ShuntReconnectionTable
     | ReferenceChangeTable
     | ParameterChangeTable
 )

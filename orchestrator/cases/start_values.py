@@ -3,7 +3,7 @@
 import cmath
 from collections.abc import Mapping
 
-from fmus.grid.network import Network
+from fmus.grid.network import OPEN_CHARGING, Network, Shunt
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
@@ -69,7 +69,7 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             line.from_bus,
             line.to_bus,
             R=grid.number(line.variable("R")),
-            X=grid.number(line.variable("X")),
+            X=grid.number(line.variable("X")) - (grid.number(line.variable("X_C")) if line.X_C else 0.0),
             B=grid.number(line.variable("B")) if line.B else 0.0,
             tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
             shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
@@ -94,13 +94,20 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
     shunts = [
         FlowShunt(
             shunt.bus,
-            g=grid.number(f"{shunt.name}.G") / SYSTEM_BASE_MVA if shunt.g_mw else 0.0,
-            b=grid.number(f"{shunt.name}.B") / SYSTEM_BASE_MVA if shunt.b_mvar else 0.0,
+            g=grid.number(f"{shunt.name}.G") / SYSTEM_BASE_MVA * closed if shunt.g_mw else 0.0,
+            b=_susceptance(shunt, grid, closed) if shunt.b_mvar else 0.0,
         )
         for shunt in network.shunts
+        for closed in (not shunt.switched or _is_connected(grid, f"{shunt.name}.connected"),)
     ]
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
     return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B")) for bus in stray]
+
+
+def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
+    """Of a shunt [pu, 100 MVA]; of an open capacitor the part that the grid model keeps."""
+    rest = OPEN_CHARGING if shunt.b_mvar > 0 else 0.0
+    return grid.number(f"{shunt.name}.B") / SYSTEM_BASE_MVA * (1.0 if closed else rest)
 
 
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:

@@ -79,6 +79,18 @@ class LineSwitching(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class ShuntSwitching(Event):
+    """A shunt is disconnected, or connected again."""
+
+    shunt: str
+    connected: bool
+
+    def settings(self) -> Mapping[str, float | bool]:
+        """The values that the event sets, by variable."""
+        return {f"{self.shunt}.connected": self.connected}
+
+
+@dataclass(frozen=True, slots=True)
 class UnitSwitching(Event):
     """A unit is taken from the grid, or put back: the grid's port, and the unit's own breaker where it has one."""
 

@@ -41,7 +41,8 @@ def test_it_ends_without_ringing():
     names = ("b.v_re", "b.v_im", "b.fault.i_re", "b.fault.i_im")
     line = Line("ab", "a", "b", X=0.1, R=0.01, B=0.1)
     loads = (Load("stiff", "a", 100 * STIFF), Load("town", "b", 300.0))
-    rows = stepped(grid(feeder(lines=(line,), loads=loads)), {"unit.i_re": STIFF, "unit.i_im": 0.05 * STIFF}, 0.3, names, None,
+    model = grid(feeder(lines=(line,), loads=loads))
+    rows = stepped(model, {"unit.i_re": STIFF, "unit.i_im": 0.05 * STIFF}, 0.3, names, None,
                    {1000: {"b.fault.on": True}, 2000: {"b.fault.on": False}})  # fmt: skip
     v, i = (np.abs(x) for x in phasors(rows, names, "b.v", "b.fault.i"))
     assert v[1010:2000].max() < 3e-4  # 1e-5 pu for each pu of current, some 20 at most

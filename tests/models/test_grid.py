@@ -223,7 +223,7 @@ def test_states_and_parameters_only_where_something_is():
     ("change", "words"),
     [
         ({"lines": (Line("ab", "a", "b", X=0.0),)}, "'ab' has the reactance 0 pu between buses 'a' and 'b'"),
-        ({"lines": (Line("ab", "a", "b", X=-0.1),)}, "series capacitors are not modelled"),
+        ({"lines": (Line("ab", "a", "b", X=-0.1),)}, "give a series capacitor as X_C of the line"),
         ({"lines": (Line("ab", "a", "b", X=0.1, R=-1),)}, "'ab' has the resistance -1 pu between"),
         ({"lines": (Line("ab", "a", "b", X=0.1, tap=0),)}, "has the ratio 0 between buses 'a' and 'b'"),
         ({"loads": ()}, "bus 'b' has neither a load with P > 0 nor line charging.*stray_B = 0.05"),
