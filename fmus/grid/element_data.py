@@ -137,3 +137,36 @@ class Port:
 
     name: str
     bus: str
+
+
+@dataclass(frozen=True, slots=True)
+class ThreeWinding:
+    """A three-winding transformer: three windings that meet at a star point which is no bus.
+
+    Attributes
+    ----------
+    buses
+        Of windings 1, 2 and 3.
+    X, R
+        Of each winding in the star [pu, 100 MVA]. One X may be negative, as long as any two windings together, and
+        all three, have a positive inductance.
+    tap, shift
+        Ideal ratio tap·e^{j·shift} [1, rad] between each bus and its winding.
+    """
+
+    name: str
+    buses: tuple[str, str, str]
+    X: tuple[float, float, float]
+    R: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tap: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether its inductances are those of something that stores energy."""
+        a, b, c = self.X
+        return a + c > 0 and a * b + b * c + c * a > 0
+
+    def has_ratio(self, winding: int) -> bool:
+        """Whether an ideal ratio stands between a winding and its bus."""
+        return self.tap[winding] != 1.0 or self.shift[winding] != 0.0

@@ -21,6 +21,7 @@ from fmus.grid.elements import (
 from fmus.grid.fault import declare_fault, declare_fault_outputs
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Network
+from fmus.grid.three_winding import declare_transformer, declare_winding_powers, transformer_equations
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -34,6 +35,7 @@ def grid(network: Network) -> Model:
     buses = {bus: declare_bus(m, bus) for bus in network.buses}
     fed = [declare_port(m, port, buses) for port in network.ports]
     lines = [declare_line(m, line, buses) for line in network.lines]
+    transformers = [declare_transformer(m, data, buses) for data in network.transformers]
     others: list[Branch] = []
     following: list[FollowingLoad] = []
     for load in network.loads:
@@ -50,9 +52,13 @@ def grid(network: Network) -> Model:
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
         branch_equation(m, branch, buses, omega_b)
+    for transformer in transformers:
+        transformer_equations(m, transformer, buses, omega_b)
     for following_load in following:
         following_load_equations(m, following_load)
     declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
+    for transformer in transformers:
+        declare_winding_powers(m, transformer, buses)
     for fault in faults:
         declare_fault_outputs(m, fault.from_bus, fault.current)
     # Bus capacitances against small line reactances are far faster than any communication step: such a

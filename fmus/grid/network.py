@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fmus.grid.element_data import LEAST_LOW_VOLTAGE, SMALLEST_REACTANCE, Line, Load, Port, Shunt, Zip
+from fmus.grid.element_data import LEAST_LOW_VOLTAGE, SMALLEST_REACTANCE, Line, Load, Port, Shunt, ThreeWinding, Zip
 
-__all__ = ["OPEN_CHARGING", "SMALLEST_REACTANCE", "Line", "Load", "Network", "Port", "Shunt", "Zip"]
+__all__ = ["OPEN_CHARGING", "SMALLEST_REACTANCE", "Line", "Load", "Network", "Port", "Shunt", "ThreeWinding", "Zip"]
 
 OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
@@ -24,6 +24,8 @@ class Network:
         Σi/G would jump with the unit's current.
     faults
         Buses at which there can be a fault.
+    transformers
+        Those with three windings; others are lines with a ratio.
 
     Raises
     ------
@@ -40,6 +42,7 @@ class Network:
     shunts: tuple[Shunt, ...] = ()
     stray_B: float = 0.0
     faults: tuple[str, ...] = ()
+    transformers: tuple[ThreeWinding, ...] = ()
 
     def __post_init__(self) -> None:
         problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
@@ -93,6 +96,7 @@ class Network:
                 yield f"line {line.name!r} ends at bus {bus!r}, which does not exist"
         attached = [("load", x.name, x.bus) for x in self.loads] + [("shunt", x.name, x.bus) for x in self.shunts]
         attached += [("port", x.name, x.bus) for x in self.ports]
+        attached += [("transformer", x.name, bus) for x in self.transformers for bus in x.buses]
         attached += [("fault", bus, bus) for bus in self.faults]
         for kind, name, bus in attached:
             if bus not in known:
@@ -101,6 +105,7 @@ class Network:
     def _repeated_names(self) -> Iterable[str]:
         names = [*self.buses, *(x.name for x in self.lines), *(x.name for x in self.loads)]
         names += [*(x.name for x in self.shunts), *(x.name for x in self.ports)]
+        names += [x.name for x in self.transformers]
         yield from (f"the name {name!r} is used twice" for name in sorted({n for n in names if names.count(n) > 1}))
 
     def _bad_elements(self) -> Iterable[str]:
@@ -124,6 +129,17 @@ class Network:
                     yield f"line {line.name!r} has the {quantity} {value:g} pu {ends}; it must not be negative"
             if not line.tap > 0:
                 yield f"line {line.name!r} has the ratio {line.tap:g} {ends}; it must exceed 0, and is 1 without one"
+        for x in self.transformers:
+            values = ", ".join(f"{value:g}" for value in x.X)
+            if not x.is_passive or not min(abs(value) for value in x.X) >= SMALLEST_REACTANCE:
+                yield (
+                    f"transformer {x.name!r} has the reactances {values} pu of windings 1, 2, 3 in its star; any two "
+                    f"together and all three must be inductive, and none within {SMALLEST_REACTANCE:g} of 0"
+                )
+            if len(set(x.buses)) < 3:
+                yield f"transformer {x.name!r} has two windings at one bus: {', '.join(x.buses)}"
+            if not min(x.tap) > 0:
+                yield f"transformer {x.name!r} has the ratio {min(x.tap):g}; it must exceed 0, and is 1 without one"
         if not self.stray_B >= 0:
             yield f"stray_B = {self.stray_B:g} pu; it must not be negative"
 

@@ -23,6 +23,7 @@ from fmus.grid.fault import declare_fault_outputs, fault_admittance
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve
+from fmus.grid.three_winding import add_windings, declare_winding_powers, declare_windings
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -55,6 +56,9 @@ def phasor_grid(network: Network) -> Model:
         add_admittance(Y, name, name, y)
     for line, values in zip(network.lines, lines, strict=True):
         _add_line(Y, line, values)
+    transformers = [declare_windings(m, data) for data in network.transformers]
+    for transformer in transformers:
+        add_windings(Y, transformer)
     voltages = solve(Y, {name: bus.injected for name, bus in buses.items()})
     for name, bus in buses.items():
         bus.v = voltages[name]
@@ -63,6 +67,8 @@ def phasor_grid(network: Network) -> Model:
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
     fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
     declare_network_outputs(m, network, buses, drawn, fed)
+    for transformer in transformers:
+        declare_winding_powers(m, transformer, buses)
     for name, y in faults.items():
         declare_fault_outputs(m, name, buses[name].v * y)
     return m.build()

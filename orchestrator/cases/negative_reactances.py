@@ -1,10 +1,11 @@
 """Branches of negative reactance, as equivalents of transformers have them: joined with what is in series with them.
 
 A bus with two branches and nothing else carries one current. Both branches, without charging, are then exactly one
-branch with the sum of their impedances.
+branch with the sum of their impedances. A bus with three branches and nothing else is the star point of a three-winding
+transformer, which is an element of its own.
 """
 
-from fmus.grid.network import SMALLEST_REACTANCE, Line
+from fmus.grid.network import SMALLEST_REACTANCE, Line, ThreeWinding
 
 
 def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list[Line], set[str]]:
@@ -40,3 +41,49 @@ def _joined(line: Line, other: Line, bus: str) -> Line | None:
     if ends[0] == ends[1] or (other.has_ratio and other.from_bus == bus):
         return None
     return Line(other.name, *ends, other.X + line.X, other.R + line.R, 0.0, other.tap, other.shift)
+
+
+def without_star_points(lines: list[Line], kept: set[str]) -> tuple[list[Line], list[ThreeWinding], set[str]]:
+    """The lines without those of negative reactance at star points, the transformers in their place, and the buses that
+    are no more.
+
+    Parameters
+    ----------
+    lines
+        All branches.
+    kept
+        Buses with a load, a generator or a shunt.
+    """
+    transformers, gone = [], set[str]()
+    for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
+        for star in {line.from_bus, line.to_bus} - kept - gone:
+            legs = [x for x in lines if star in (x.from_bus, x.to_bus)]
+            found = _transformer(star, legs)
+            if line in legs and found is not None:
+                transformers.append(found)
+                lines = [x for x in lines if x not in legs]
+                gone.add(star)
+                break
+    return lines, transformers, gone
+
+
+def _transformer(star: str, legs: list[Line]) -> ThreeWinding | None:
+    """Three branches that meet at a bus as one transformer; None where that is not exact."""
+    if len(legs) != 3 or any(leg.B for leg in legs):
+        return None
+    ends = [(leg.to_bus if leg.from_bus == star else leg.from_bus) for leg in legs]
+    turned = [leg.from_bus == star for leg in legs]  # the ratio is at the star: taken to the other side
+    square = [leg.tap**2 if inner else 1.0 for leg, inner in zip(legs, turned, strict=True)]
+    found = ThreeWinding(
+        f"transformer_{star.removeprefix('bus_')}",
+        (ends[0], ends[1], ends[2]),
+        _three([leg.X * n for leg, n in zip(legs, square, strict=True)]),
+        _three([leg.R * n for leg, n in zip(legs, square, strict=True)]),
+        _three([1 / leg.tap if inner else leg.tap for leg, inner in zip(legs, turned, strict=True)]),
+        _three([-leg.shift if inner else leg.shift for leg, inner in zip(legs, turned, strict=True)]),
+    )
+    return found if found.is_passive and len(set(ends)) == 3 else None
+
+
+def _three(values: list[float]) -> tuple[float, float, float]:
+    return values[0], values[1], values[2]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fmus.grid.network import Line, Load, Shunt
+from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
@@ -36,6 +36,7 @@ class NetworkData:
     frequency: float | None = None
     stray_B: float = 0.0
     places: dict[str, str] = field(default_factory=dict)
+    transformers: tuple[ThreeWinding, ...] = ()
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -51,6 +52,10 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
+    transformers = [
+        ThreeWinding(n, t.buses, _star(t.X_12, t.X_13, t.X_23), _star(t.R_12, t.R_13, t.R_23), t.tap, t.shift)
+        for n, t in table.three_winding_transformers.items()
+    ]
     in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
     lines += [line for line, _ in in_file]
     if table.loads_file is not None:
@@ -60,7 +65,8 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
             loads.append(with_laws(load, table))
     buses = dict.fromkeys((*source.buses, *table.buses))
     if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
-        buses = dict.fromkeys(bus for line in lines for bus in (line.from_bus, line.to_bus))
+        ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
+        buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
@@ -71,7 +77,14 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         table.frequency if table.frequency is not None else source.frequency,
         table.stray_B,
         {line.name: place for line, place in in_file},
+        (*source.transformers, *transformers),
     )
+
+
+def _star(one_two: float, one_three: float, two_three: float) -> tuple[float, float, float]:
+    """Impedances of the windings in the star, from those between two windings each."""
+    half = (one_two + one_three + two_three) / 2
+    return half - two_three, half - one_three, half - one_two
 
 
 def bus_name(label: str) -> str:

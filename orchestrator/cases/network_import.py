@@ -4,10 +4,10 @@ import math
 from collections import Counter
 from dataclasses import dataclass, field
 
-from fmus.grid.network import Line, Load, Shunt
+from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
-from orchestrator.cases.negative_reactances import without_negative_reactances
+from orchestrator.cases.negative_reactances import without_negative_reactances, without_star_points
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.errors import InputError
 
@@ -47,6 +47,7 @@ class ImportedNetwork:
     generation: dict[str, Generation] = field(default_factory=dict)
     slack: str | None = None
     frequency: float | None = None
+    transformers: tuple[ThreeWinding, ...] = ()
 
 
 def import_network(source: SourceTables) -> ImportedNetwork:
@@ -65,6 +66,8 @@ def import_network(source: SourceTables) -> ImportedNetwork:
     earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {n for n, r in rows.items() if any(r[4:6])}
     kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
     lines, merged = without_negative_reactances(lines, kept)
+    lines, transformers, stars = without_star_points(lines, kept)
+    merged |= stars
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
     shunts = [
@@ -86,6 +89,7 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
         bus_of(labels[reference[0]]) if reference else None,
         source.frequency,
+        tuple(transformers),
     )
 
 

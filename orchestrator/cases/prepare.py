@@ -290,7 +290,9 @@ class Preparer:
         ports = tuple(Port(n, t.bus) for n, t in draft.tables.items() if t.bus)
         name = f"{draft.case.name}_grid"
         try:
-            network = Network(name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
+            network = Network(
+                name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B, (), data.transformers
+            )
             return _with_switches(network, draft.case)
         except ValueError as error:
             draft.note_network(draft.place("network"), str(error))

@@ -86,6 +86,20 @@ class LineTable(Table):
     X_C: PerUnit = 0.0
 
 
+class ThreeWindingTable(Table):
+    """A three-winding transformer, by its short-circuit impedances between two windings each."""
+
+    buses: tuple[str, str, str]
+    X_12: PerUnit
+    X_13: PerUnit
+    X_23: PerUnit
+    R_12: PerUnit = 0.0
+    R_13: PerUnit = 0.0
+    R_23: PerUnit = 0.0
+    tap: tuple[Number, Number, Number] = (1.0, 1.0, 1.0)
+    shift: tuple[Radian, Radian, Radian] = (0.0, 0.0, 0.0)
+
+
 class ZipTable(Table):
     """Shares of constant impedance, current and power; they sum to 1."""
 
@@ -136,6 +150,7 @@ class NetworkTable(Table):
     lines_file: str | None = None
     loads_file: str | None = None
     lines: dict[str, LineTable] = {}
+    three_winding_transformers: dict[str, ThreeWindingTable] = {}
     loads: dict[str, LoadTable] = {}
     load_model: LoadModelTable = LoadModelTable()
     generation_model: LoadModelTable = LoadModelTable()

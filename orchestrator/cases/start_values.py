@@ -2,10 +2,12 @@
 
 import cmath
 from collections.abc import Mapping
+from dataclasses import replace
 
-from fmus.grid.network import OPEN_CHARGING, Network, Shunt
+from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
@@ -48,14 +50,14 @@ def start_from_power_flow(
                 "remove it, and set P_0 and v_0"
             )
     flow = solve_power_flow(
-        network.buses,
-        _lines(network, system.components[grid]),
+        (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
+        [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
         _loads(network, system.components[grid]),
         [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()],
         slack,
         _shunts(network, system.components[grid]),
     )
-    for bus, voltage in flow.voltages.items():
+    for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
     for name, bus in units.items():
         _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
@@ -77,6 +79,27 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
         )
         for line in network.lines
     ]
+
+
+def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:
+    """Legs of the transformers with three windings, as they are set."""
+    return [
+        leg
+        for transformer in network.transformers
+        for leg in legs_of(_as_set(transformer, grid), closed=_is_connected(grid, f"{transformer.name}.connected"))
+    ]
+
+
+def _as_set(x: ThreeWinding, grid: ComponentPlan) -> ThreeWinding:
+    def values(quantity: str, given: tuple[float, float, float] | None = None) -> tuple[float, float, float]:
+        """Of the three windings; those of a ratio are parameters only where there is one."""
+        one, two, three = (
+            grid.number(f"{x.name}.{quantity}_{k + 1}") if given is None or x.has_ratio(k) else given[k]
+            for k in range(3)
+        )
+        return one, two, three
+
+    return replace(x, X=values("X"), R=values("R"), tap=values("tap", x.tap), shift=values("shift", x.shift))
 
 
 def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from fmus.grid.network import Line, Load, Network
+from orchestrator.cases.case import load_case
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
-from orchestrator.cases.negative_reactances import without_negative_reactances
+from orchestrator.cases.flow_transformers import inner_buses, legs_of
+from orchestrator.cases.negative_reactances import without_negative_reactances, without_star_points
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
 from orchestrator.cases.schema import NetworkTable
+from tests.cases.test_switching import RING, watch
 
 
 def two_port(lines, buses, ends):
@@ -48,15 +51,60 @@ def test_two_in_series_become_one_exactly(turned):
         ((Line("am", "a", "m", X=0.6), Line("mb", "m", "b", X=-0.35)), {"a", "m", "b"}),
         ((Line("am", "a", "m", X=0.3), Line("mb", "m", "b", X=-0.35)), {"a", "b"}),
         ((Line("am", "a", "m", X=0.6, B=0.1), Line("mb", "m", "b", X=-0.35)), {"a", "b"}),
-        ((Line("am", "a", "m", X=0.6), Line("mb", "m", "b", X=-0.1), Line("mc", "m", "c", X=0.2)), {"a", "b", "c"}),
+        ((Line("am", "a", "m", X=0.6, B=0.1), Line("mb", "m", "b", X=-0.1), Line("mc", "m", "c", X=0.2)), {"a", "b"}),
+        ((Line("am", "a", "m", X=0.6), Line("mb", "m", "b", X=-0.3), Line("mc", "m", "c", X=0.2)), {"a", "b", "c"}),
     ],
 )
 def test_what_is_not_exact_is_left_and_refused_by_name(lines, kept):
     found, merged = without_negative_reactances(list(lines), kept)
     assert (found, merged) == (list(lines), set())
+    assert without_star_points(list(lines), kept) == (list(lines), [], set())
     buses = tuple(dict.fromkeys(b for x in lines for b in (x.from_bus, x.to_bus)))
     with pytest.raises(ValueError, match=r"line 'mb' has the reactance -0.* pu between buses 'm' and 'b'"):
         Network("n", buses, lines, tuple(Load(f"l{b}", b, 1.0) for b in buses), ())
+
+
+def test_a_star_point_becomes_a_transformer_exactly():
+    """Legs in both directions, each with a ratio; the legs of the power flow are those of the source."""
+    lines = [
+        Line("am", "a", "m", X=0.6, R=0.01, tap=1.05, shift=0.2),
+        Line("mb", "m", "b", X=-0.1, tap=0.9, shift=0.5),
+        Line("mc", "m", "c", X=0.2, R=0.02, tap=1.1),
+    ]
+    found, (transformer,), stars = without_star_points(lines, {"a", "b", "c"})
+    assert (found, stars) == ([], {"m"})
+    assert transformer.name == "transformer_m"
+    legs, inner = legs_of(transformer), inner_buses(transformer)
+    wanted = two_port(lines, ["a", "m", "b", "c"], ["a", "b", "c"])
+    assert two_port(legs, ["a", "b", "c", *inner], ["a", "b", "c"]) == pytest.approx(wanted, abs=1e-12)
+
+
+CASE = """
+[network]
+stray_B = 0.1
+[network.three_winding_transformers.t]
+buses = ["b1", "b2", "b3"]
+X_12 = 0.02
+X_13 = 0.06
+X_23 = 0.03
+tap = [1.0, 1.02, 1.01]
+[network.loads]
+town = { bus = "b3", p = "300 MW", q = "50 Mvar" }
+works = { bus = "b2", p = "200 MW", q = "40 Mvar" }
+house = { bus = "b1", p = "5 MW" }
+"""
+
+
+def test_a_transformer_of_a_case_file_starts_in_steady_state(tmp_path):
+    """X_12 + X_23 < X_13: winding 2 has a negative reactance, and a ratio."""
+    i, j = RING.index("[network]"), RING.index("[components.sg]")
+    (tmp_path / "case.toml").write_text(RING[:i] + CASE + RING[j:], encoding="utf-8")
+    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    (found,) = watch(ready, ("grid.b3.v", "grid.b2.v", "grid.t.winding_3.p"), (0.05,))
+    assert set(ready.power_flow.voltages) >= {"b1", "b2", "b3"}
+    for bus in ("b2", "b3"):
+        assert found[f"grid.{bus}.v"] == pytest.approx(abs(ready.power_flow.voltages[bus]), abs=1e-6)
+    assert found["grid.t.winding_3.p"] == pytest.approx(-3.0, abs=1e-5)
 
 
 @pytest.mark.slow
