@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from fmus.converter_parts.filter import declare_filter, filter_equations
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
-from gfor_fmu.filter import declare_filter, filter_equations
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
 

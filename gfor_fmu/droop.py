@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from fmus.converter_parts.filter import APPENDIX, SteadyState
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
-from gfor_fmu.filter import APPENDIX, SteadyState
 
 
 @dataclass(frozen=True)

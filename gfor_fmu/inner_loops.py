@@ -2,9 +2,10 @@
 
 import casadi as ca
 
+from fmus.converter_parts.current_control import current_control
+from fmus.converter_parts.filter import APPENDIX, Filter, SteadyState
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
-from gfor_fmu.filter import APPENDIX, Filter, SteadyState
 
 LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
@@ -40,14 +41,7 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
         i_ref = demanded.clamped(i_q_max, i_d_max)
         _integrate_unless_clamped(m, x, k_i * error, demanded, i_q_max, i_d_max)
-    with m.scope("current_control"):
-        tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX)
-        L_c = f.X_c / omega_b
-        i_s = f.i_s.value
-        x = qd_state(m, "x", start.v_c - Phasor(0, f.X_c) * start.i_s - start.u, "Integrator of the current loop")
-        error = i_ref - i_s
-        x.set_derivative(m, f.R_c / tau * error)
-        return L_c / tau * error + x.value + Phasor(0, w * f.X_c) * i_s + u_lagged
+    return current_control(m, f, omega_b, w, i_ref, u_lagged)
 
 
 def declare_current_limits(m: ModelBuilder, start: SteadyState) -> tuple[ca.SX, ca.SX]:

@@ -7,6 +7,7 @@ states alone. The current limit is not represented; ``current_limit`` shows when
 
 import casadi as ca
 
+from fmus.converter_parts.filter import FilterData, declare_filter_data
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -14,7 +15,6 @@ from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, s
 from fmus.toolchain.port import device_port
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
 from gfor_fmu.droop import declare_droop
-from gfor_fmu.filter import FilterData, declare_filter_data
 from gfor_fmu.inner_loops import declare_current_limits
 
 

@@ -114,8 +114,14 @@ def test_models_know_neither_the_converter_nor_the_orchestrator():
     assert not breaches(lambda a, b: within(b, "fmus") if within(a, "fmus") else True)
 
 
-def test_the_converter_is_made_from_the_toolchain_alone():
-    assert not breaches(lambda a, b: within(b, "fmus.toolchain", "gfor_fmu") if within(a, "gfor_fmu") else True)
+def test_the_converter_is_made_from_the_toolchain_and_the_parts_of_converters_alone():
+    own = ("fmus.toolchain", "fmus.converter_parts", "gfor_fmu")
+    assert not breaches(lambda a, b: within(b, *own) if within(a, "gfor_fmu") else True)
+
+
+def test_the_parts_of_converters_know_the_toolchain_alone():
+    own = ("fmus.toolchain", "fmus.converter_parts")
+    assert not breaches(lambda a, b: within(b, *own) if within(a, "fmus.converter_parts") else True)
 
 
 def test_the_orchestrator_imports_downwards_only():

@@ -9,11 +9,11 @@ from cmath import exp
 import numpy as np
 import pytest
 
+from fmus.converter_parts.filter import SteadyState
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from gfor_fmu.droop import declare_droop, frequency, voltage_reference
-from gfor_fmu.filter import SteadyState
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent

@@ -1,4 +1,4 @@
-"""Electrical side of the converter: LC filter and step-up transformer, in the converter's frame.
+"""Electrical side of a converter: LC filter and step-up transformer, in the converter's frame.
 
 Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the converter's frequency [pu].
 """

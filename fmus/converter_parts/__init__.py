@@ -1,0 +1,1 @@
+"""Parts that converters share, whatever controls them: filter and transformer, current control, references."""
