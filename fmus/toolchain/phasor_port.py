@@ -35,23 +35,21 @@ class SourceEmf:
     ahead: Phasor
 
 
-def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
-    """Declare the master's step and delay as parameters; return the emf in the middle of the last step and of the next
-    step.
+@dataclass(frozen=True)
+class MasterStep:
+    """Communication step of the master [s], 0 if it is not told, and how many steps its voltages are late."""
 
-    A master holds the bus voltage during a step, and so the voltage is half a step old on average. With the emfs of the
-    middle of the coming step the network's voltages are those of the middle. The emf turns with its frame. A derivative
-    with a short lag gives the motion of its components in that frame. Both emfs therefore follow from states alone.
+    size: ca.SX
+    late: ca.SX
 
-    Parameters
-    ----------
-    m
-        The device's model.
-    emf, start
-        In the device's frame [pu], a function of states; and its value at the operating point.
-    angle, rate
-        Of the device's frame in the network frame [rad], and the rate of that [rad/s].
-    """
+    @property
+    def to_next(self) -> ca.SX:
+        """Time from the last voltage's arrival to the middle of the step for which an emf is given [s]."""
+        return (self.late + 0.5) * self.size
+
+
+def declare_master_step(m: ModelBuilder) -> MasterStep:
+    """Declare the master's step and delay as parameters."""
     step = m.parameter(
         "communication_step",
         0.0,
@@ -71,18 +69,56 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
         tunable=True,
         type="Integer",
     )
+    return MasterStep(step, late)
+
+
+def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) -> Phasor:
+    """Declare ``name_q`` and ``name_d``, the value through a lag; return its rate of change [pu/s] from states alone.
+
+    Parameters
+    ----------
+    m
+        The device's model.
+    name
+        Of both states, before ``_q`` and ``_d``.
+    value, start
+        In the device's frame [pu], a function of states; and its value at the operating point.
+    text
+        What it is.
+    """
     moving = []
+    for part, now, initial in (("q", value.re, start.re), ("d", -value.im, -start.im)):
+        slow = m.state(f"{name}_{part}", initial, "pu", f"{text} through a lag, {part} component", base="S_n")
+        moving.append((now - slow) / DERIVATIVE_LAG)
+        m.derivative(slow, moving[-1])
+    return Phasor(moving[0], -moving[1])
+
+
+def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
+    """Declare the master's step and delay as parameters; return the emf in the middle of the last step and of the next
+    step.
+
+    A master holds the bus voltage during a step, and so the voltage is half a step old on average. With the emfs of the
+    middle of the coming step the network's voltages are those of the middle. The emf turns with its frame. A derivative
+    with a short lag gives the motion of its components in that frame. Both emfs therefore follow from states alone.
+
+    Parameters
+    ----------
+    m
+        The device's model.
+    emf, start
+        In the device's frame [pu], a function of states; and its value at the operating point.
+    angle, rate
+        Of the device's frame in the network frame [rad], and the rate of that [rad/s].
+    """
+    master = declare_master_step(m)
     with m.scope("source"):
-        for name, now, initial in (("e_q", emf.re, start.re), ("e_d", -emf.im, -start.im)):
-            slow = m.state(name, initial, "pu", f"Emf through a lag, {name[-1]} component", base="S_n")
-            moving.append((now - slow) / DERIVATIVE_LAG)
-            m.derivative(slow, moving[-1])
-    change = Phasor(moving[0], -moving[1])
+        change = motion(m, "e", emf, start, "Emf")
 
     def moved(time: ca.SX) -> Phasor:
         return (emf + change * time).rotated(angle + rate * time)
 
-    return SourceEmf(behind=moved(-step / 2), ahead=moved((late + 0.5) * step))
+    return SourceEmf(behind=moved(-master.size / 2), ahead=moved(master.to_next))
 
 
 def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor) -> None:

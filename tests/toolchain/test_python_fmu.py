@@ -26,6 +26,7 @@ STEP = 1e-4
 EXCITERS = ("ac4a", "st1", "st4b")
 _CONVERTER_OPEN = {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
 _CONVERTER_OPEN |= {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9}
+_FOLLOWING_OPEN = {"reactive_power.mode": 2, "frequency_droop.enabled": True}
 # Settings under which every declared path of a model carries a signal.
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
@@ -34,6 +35,8 @@ ALL_PATHS_OPEN = {
     "gfor_phasor": _CONVERTER_OPEN | {"communication_step": 5e-3},
     "synchronous_generator": {"transformer.X_t": 0.1},  # without it v_t is the bus voltage
     "synchronous_generator_phasor": {"communication_step": 5e-3, "transformer.X_t": 0.1},
+    "gfl": _FOLLOWING_OPEN,
+    "gfl_phasor": _FOLLOWING_OPEN | {"communication_step": 5e-3},
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.
 FED = {

@@ -1,0 +1,46 @@
+"""Phase-locked loop in the synchronous reference frame (SRF-PLL): the frame in which a voltage has no d component."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model_builder import ModelBuilder, Scalar
+
+STRUCTURE = "structure and damping: Chung 2000; 10 Hz chosen here"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The converter's frame: its angle in the network frame [rad], a state, and its frequency [pu, f_n]."""
+
+    theta: ca.SX
+    w: ca.SX
+
+
+def phase_locked_loop(m: ModelBuilder, angle_0: Scalar, omega_b: ca.SX, measured: Phasor) -> Frame:
+    """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
+
+    For a voltage of 1 pu the angle follows as (2ξω_0·s + ω_0²)/(s² + 2ξω_0·s + ω_0²).
+
+    Parameters
+    ----------
+    m
+        The converter's model.
+    angle_0
+        Angle of the frame at the start [rad], a calculated value.
+    omega_b
+        Base angular frequency [rad/s].
+    measured
+        Voltage in the converter's own frame [pu], a function of states.
+    """
+    with m.scope("pll"):
+        f_0 = m.parameter("f_0", 10.0, "Hz", "Natural frequency at 1 pu", minimum=0.1, maximum=200, source=STRUCTURE)
+        xi = m.parameter("xi", 0.707, "1", "Damping ratio at 1 pu", minimum=0.05, maximum=5, source=STRUCTURE)
+        omega_0 = 2 * ca.pi * f_0
+        x = m.state("x", 0, "pu", "Integrator, deviation of the frequency", base="f_n")
+        theta = m.state("theta", angle_0, "rad", "Angle of the converter's frame in the network frame")
+        w = 1 + 2 * xi * omega_0 / omega_b * measured.im + x
+        m.derivative(x, omega_0**2 / omega_b * measured.im)
+        m.derivative(theta, omega_b * (w - 1))
+    return Frame(theta, w)
