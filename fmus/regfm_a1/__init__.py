@@ -1,0 +1,1 @@
+"""WECC's model REGFM_A1: a droop-controlled grid-forming inverter for positive-sequence studies."""
