@@ -70,4 +70,4 @@ def _declare_measurement(m: ModelBuilder, f: Filter) -> tuple[QdState, ca.SX]:
 
 def _standby(f: Filter, port: DevicePort, frame: Frame, bus: Phasor) -> Phasor:
     """Current behind an open breaker: what the capacitor takes, and what brings its voltage to that of the bus."""
-    return Phasor(0, frame.w * f.B_c) * f.u + (bus - f.u) * (f.B_c / port.omega_b / TRACKING_TIME)
+    return Phasor(0, frame.w * f.B_c) * f.u_c.value + (bus - f.u) * (f.B_c / port.omega_b / TRACKING_TIME)

@@ -1,7 +1,7 @@
 """Outer control: active power, and reactive power or voltage, each by a PI controller that asks for current.
 
-The gains follow from one response time each. The controllers' zeros cancel the lag of the measurement, so that a
-reference is followed as 1/(1 + s·τ) as long as the current control is much faster and the voltage is 1 pu.
+The gains follow from one response time each. The controllers' zeros cancel the lag τ_m of the measurement: at 1 pu and
+with a fast current control the measured power follows its reference as 1/(1 + s·τ), the power as (1 + s·τ_m)/(1 + s·τ).
 """
 
 from dataclasses import dataclass

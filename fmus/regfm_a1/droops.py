@@ -32,7 +32,7 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
                      tunable=True, source=SPECIFICATION)  # fmt: skip
     ki = m.parameter("kipmax", 0.1, "1/s", "Integral gain of Pmax and Pmin", minimum=0, tunable=True,
                      source=SPECIFICATION)  # fmt: skip
-    beyond = _limits(m, "P", 1.0, 0.0, Pf, P_0, kp, ki)
+    beyond = _limits(m, "P", 1.0, -1.0, Pf, P_0, kp, ki)
     return 1 + mp * (Pref + change - Pf) + beyond
 
 
@@ -82,8 +82,9 @@ def _limits(
 
     Each is a proportional-integral controller that only leads back: integrator and output stay on one side of 0.
     """
-    high = m.parameter(f"{name}max", most, "pu", f"Largest {name}", base="S_n", source=SPECIFICATION)
-    low = m.parameter(f"{name}min", least, "pu", f"Smallest {name}", base="S_n", source=SPECIFICATION)
+    source = "chosen here: storage; the specification's resources feed 0 to 0.9" if name == "P" else SPECIFICATION
+    high = m.parameter(f"{name}max", most, "pu", f"Largest {name}", base="S_n", source=source)
+    low = m.parameter(f"{name}min", least, "pu", f"Smallest {name}", base="S_n", source=source)
     m.require(high - start, f"the power flow asks for more than {name}max: lower {name}_0, or raise {name}max or S_n")
     m.require(start - low, f"the power flow asks for less than {name}min: raise {name}_0, or lower {name}min")
     down = m.state(f"x_{name}max", 0, "pu", f"Integrator of {name}max", base="S_n")

@@ -86,6 +86,25 @@ _CONVERTER = {
     "feed_forward.tau": Plausible(1e-5, 0.02, "s", _CONTROL),
 }
 
+_FOLLOWING = {
+    "pll.f_0": Plausible(0.5, 100, "Hz", "PLLs of 1 to 50 Hz, widened"),
+    "pll.xi": Plausible(0.2, 3, "1", "PLLs of usual damping"),
+    "measurement.tau": Plausible(0.001, 0.2, "s", _CONTROL),
+    "active_power.tau": Plausible(0.005, 5, "s", _CONTROL),
+    "reactive_power.tau": Plausible(0.005, 5, "s", _CONTROL),
+    "reactive_power.R_V": Plausible(0.001, 0.5, "pu", "usual voltage droops: 2 to 10 %"),
+    "reactive_power.X_s": Plausible(0.05, 2, "pu", "short-circuit ratios of 0.5 to 20"),
+    "frequency_droop.R_f": Plausible(0.002, 0.3, "pu", "grid codes: 2 to 12 % of rated frequency at rated power"),
+    "current_limit.I_max": Plausible(0.5, 5, "pu", "usual current limits: 1 to 3 of the rated current"),
+}
+
+_REGFM_A1 = {
+    "mp": Plausible(0.001, 0.3, "pu", "droops of 0.5 to 10 % of rated frequency; rad/s would be 314 times as much"),
+    "mq": Plausible(0.001, 0.5, "pu", "usual voltage droops: 2 to 10 %", or_zero=True),
+    "XL": Plausible(0.02, 0.6, "pu", _FILTER),
+    "ImaxF": Plausible(0.5, 10, "pu", "usual fault currents: 1 to 3 of the rated current"),
+}
+
 _POD = {
     "T_W": Plausible(0.3, 50, "s", "a washout passes 0.1 to 2 Hz"),
     "T_f": Plausible(0.001, 2, "s", "a filter that passes 0.1 to 2 Hz"),
@@ -106,6 +125,8 @@ RANGES: dict[str, Plausible] = {
     **_PORT,
     **_MACHINE,
     **_CONVERTER,
+    **_FOLLOWING,
+    **_REGFM_A1,
     **{f"{pod}.{name}": wanted for pod in ("pod_p", "pod_q") for name, wanted in _POD.items()},
 }
 """Ranges by the variable's name inside a component."""

@@ -88,6 +88,8 @@ LIMITS = (
     _current_limit("active", "q"),
     _current_limit("reactive", "d"),
     Limit("current limit (which the phasor model lacks)", "current_limit", None, represented=False),
+    Limit("limit of the current reference", "current_demand", None),
+    Limit("fault current limit", "fault_current", None),
     Limit("output limit of POD-P", "delta_p_pod", "pod_p.limit", enabled="pod_p.enabled"),
     Limit("output limit of POD-Q", "delta_q_pod", "pod_q.limit", enabled="pod_q.enabled"),
     Limit("output limit of the stabiliser", "pss.lead_lag_2", "pss.limit", Lead("pss.lead_lag_2", "pss.T_3"),

@@ -13,7 +13,12 @@ from tests.pages.markdown import ROOT, blocks
 
 DOCS = ROOT / ".docs"
 IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study")
-ANYWHERE = ("first-steps", "how-to/use-your-own-fmu", "how-to/black-box")
+ANYWHERE = (
+    "first-steps",
+    "how-to/use-your-own-fmu",
+    "how-to/black-box",
+    "how-to/grid-forming-among-grid-following",
+)
 SECONDS = 1800.0
 
 

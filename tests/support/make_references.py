@@ -47,6 +47,20 @@ REFERENCES = (
         *_BUS, ("i_re", "i_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
     ),
     Reference(
+        "gfl", "fmus/grid_following/reference.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
+        *_BUS, ("i_re", "i_im", "omega", "u", "i_s", "current_demand"),
+    ),
+    Reference(
+        "gfl_phasor", "fmus/grid_following/reference_phasor.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
+        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u", "i_s"),
+    ),
+    Reference(
+        "regfm_a1_phasor", "fmus/regfm_a1/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
+    ),
+    Reference(
         "synchronous_generator_ac4a", f"{_FOLDER}/reference_ac4a.csv", {"P_0": 0.8, **_EXACT}, *_BUS, _GENERATOR,
     ),
     Reference("synchronous_generator_st1", f"{_FOLDER}/reference_st1.csv", {"P_0": 0.78}, *_BUS, _GENERATOR),
