@@ -13,7 +13,8 @@ from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
-DEVICES = ["gfor", *GENERATORS]
+DEVICES = ["gfor", "gfl", *GENERATORS]
+ALONE = ["regfm_a1"]  # without an EMT variant
 OMEGA_B = 2 * np.pi * 50
 
 
@@ -49,7 +50,7 @@ def source(y):
 # -- the electrical side ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("name", [*DEVICES, *ALONE])
 def test_emf_and_admittance_give_the_current(name):
     device = Evaluated(f"{name}_phasor", P_0=0.7, Q_0=0.1, v_0=1.02, theta_0=0.4)
     v = 1.02 * np.exp(0.4j)
@@ -61,7 +62,7 @@ def test_emf_and_admittance_give_the_current(name):
     assert (start["p"], start["q"]) == pytest.approx((0.7, 0.1), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("name", [*DEVICES, *ALONE])
 def test_the_emf_follows_from_states_alone_and_the_current_does_not(name, fmu_path):
     """What a network solver needs, it gets without an algebraic loop; the current would close one."""
     description = read_description(fmu_path(f"{name}_phasor"))
@@ -155,7 +156,7 @@ def test_a_dispatch_beyond_the_current_limit_is_refused(fmu_path):
             device.exit_initialization_mode()
 
 
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("name", [*DEVICES, *ALONE])
 def test_behind_an_open_breaker_there_is_no_admittance_and_no_current(name):
     device = Evaluated(f"{name}_phasor", P_0=0.5, connected=0.0)
     y = device.outputs([1.0, 0.0])
@@ -164,7 +165,7 @@ def test_behind_an_open_breaker_there_is_no_admittance_and_no_current(name):
         assert y["v_t"] == pytest.approx(abs(source(y)[0]), rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "time"), [("gfor", 0.05), *((name, 0.1) for name in GENERATORS)])
+@pytest.mark.parametrize(("name", "time"), [("gfor", 0.05), ("regfm_a1", 0.02), *((name, 0.1) for name in GENERATORS)])
 def test_the_emf_is_given_for_the_middle_of_the_coming_step(name, time):
     """Against the emf itself, followed with small steps on the same held voltage, at a time when it is on its way."""
     step, values = 5e-3, {"P_0": 0.8, "Q_0": 0.05}
