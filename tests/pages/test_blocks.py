@@ -17,7 +17,7 @@ OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest",
 ADDED = {"least-damped"}
 """Commands of ``gfor`` that a guide adds."""
 
-FMUS = ("gfor", "two_area_grid", "synchronous_generator_st1", "infinite_bus")
+FMUS = ("gfor", "two_area_grid", "synchronous_generator_st1", "gfl", "regfm_a1_phasor", "infinite_bus")
 """FMUs that the Python blocks of the leaflets open."""
 
 
