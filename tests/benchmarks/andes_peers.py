@@ -1,33 +1,31 @@
-"""The published cases in ANDES, another program: ``python -m tests.benchmarks.andes_peers``.
+"""The published cases in ANDES, another program: ``python -m tests.benchmarks.andes_peers > andes.json``.
 
-Needs ANDES (2.0.0 was measured; not in our lock). Prints modes [rad/s] as JSON, a line for each model; data from
-`tests.reference.published`, machines of sixth order (GENROU). Knows nothing of our models.
+Needs the extra ``peers``. Data from `tests.reference.published`, machines of sixth order (GENROU); eigenvalues in
+rad/s. Knows nothing of our models. ``andes.json`` is what ANDES 2.0.0 gave.
 """
 
 import json
-import sys
-import tempfile
-from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tests.reference.multi_machine import Commutator, System, Thyristor
-from tests.reference.published import KUNDUR_EXCITERS, exponential, kundur, quadratic, wscc9, with_subtransients
+from tests.reference.published import KUNDUR_EXCITERS, exponential, kundur, quadratic, with_subtransients, wscc9
 
 
-def modes_in_andes(system: System, work: Path) -> list[complex]:
+def modes_in_andes(system: System) -> list[complex]:
     """Swings of a system [rad/s], slowest first; loads as the first one's exponent says."""
     import andes  # noqa: PLC0415 - is not installed everywhere
 
     andes.config_logger(stream_level=40)
     made = andes.System(no_output=True, default_config=True)
     _network(made, system)
-    share = {name: 0.0 for name in ("p2p", "p2i", "p2z", "q2q", "q2i", "q2z")}
+    share = dict.fromkeys(("p2p", "p2i", "p2z", "q2q", "q2i", "q2z"), 0.0)
     load = system.loads[0]
     share[("p2p", "p2i", "p2z")[round(load.a)]] = 1.0
     share[("q2q", "q2i", "q2z")[round(load.b)]] = 1.0
     for name, value in share.items():
         setattr(made.PQ.config, name, value)
-    made.PQ.pq2z = 0
     made.setup()
     made.PFlow.run()
     made.TDS.config.criteria = 0
@@ -61,8 +59,8 @@ def _network(made: Any, system: System) -> None:
         x = system.exciter
         if isinstance(x, Thyristor):
             made.add(
-                "EXST1", idx=f"X{m.bus}", syn=f"G{m.bus}", TR=x.T_R, KA=x.K_A, TA=0.0, TB=x.T_B, TC=x.T_A, KF=0.0, TF=1.0,
-                KC=0.0, VIMAX=99.0, VIMIN=-99.0, VRMAX=99.0, VRMIN=-99.0,
+                "EXST1", idx=f"X{m.bus}", syn=f"G{m.bus}", TR=x.T_R, KA=x.K_A, TA=0.0, TB=x.T_B, TC=x.T_A, KF=0.0,
+                TF=1.0, KC=0.0, VIMAX=99.0, VIMIN=-99.0, VRMAX=99.0, VRMIN=-99.0,
             )  # fmt: skip
         elif isinstance(x, Commutator):
             made.add(
@@ -72,26 +70,24 @@ def _network(made: Any, system: System) -> None:
 
 
 def cases() -> dict[str, System]:
-    """What is compared; keys are those of `figures` kept in the cases' READMEs."""
+    """What is compared."""
     found = {
         f"wscc9, {name}": with_subtransients(wscc9(exponent=exponent, saturation=quadratic))
         for name, exponent in (("impedance", 2.0), ("power", 0.0))
     }
     for name, exciter in KUNDUR_EXCITERS.items():
         if exciter is None or not exciter.K_STAB:
-            found |= {f"kundur {name}, {load}": kundur(name, active=a) for load, a in (("current", 1.0), ("impedance", 2.0))}
+            found |= {
+                f"kundur {name}, {load}": kundur(name, active=a) for load, a in (("current", 1.0), ("impedance", 2.0))
+            }
     return found
 
 
 def main() -> None:
     import andes  # noqa: PLC0415 - as above
 
-    print(json.dumps({"andes": andes.__version__}))
-    with tempfile.TemporaryDirectory() as work:
-        for name, system in cases().items():
-            swings = [[z.real, z.imag] for z in modes_in_andes(system, Path(work))]
-            print(json.dumps({name: swings}))
-            sys.stdout.flush()
+    modes = {name: [[round(z.real, 6), round(z.imag, 6)] for z in modes_in_andes(s)] for name, s in cases().items()}
+    print(json.dumps({"andes": andes.__version__, "numpy": np.__version__, "modes": modes}, indent=1))
 
 
 if __name__ == "__main__":

@@ -169,9 +169,7 @@ class System:
 
     def swings(self, low: float = 0.3, high: float = 2.5, most: float = 0.4) -> list[complex]:
         """Modes between two frequencies [Hz] below a damping ratio, slowest first [rad/s]."""
-        found = [
-            z for z in self.eigenvalues() if low < z.imag / (2 * np.pi) < high and -z.real < most * abs(z)
-        ]
+        found = [z for z in self.eigenvalues() if low < z.imag / (2 * np.pi) < high and -z.real < most * abs(z)]
         return sorted(found, key=lambda z: z.imag)
 
 
@@ -314,6 +312,7 @@ class _Unit:
         E_fd, others = self.excitation(s, abs(v))
         S = self.saturation(np.hypot(e_q, e_d)) if m.S_12 else 0.0
         if self.sixth:
+
             def field(E: float, psi: float, i: float, X: float, X1: float, X2: float) -> float:
                 near = (X2 - m.X_l) / (X1 - m.X_l)
                 far = (X1 - X2) / (X1 - m.X_l) ** 2

@@ -18,7 +18,16 @@ def kundur(scenario: str, *, active: float = 1.0, saturation: bool = True, stray
     """Example 12.6; active power in proportion to |v|^active (the book: constant current), reactive to |v|²."""
     short, long = (0.0025, 0.025, 0.04375), (0.001, 0.01, 0.0175)
     tie = (0.011, 0.11, 0.1925)
-    lines = [(5, 6, short), (6, 7, long), (7, 8, tie), (7, 8, tie), (8, 9, tie), (8, 9, tie), (9, 10, long), (10, 11, short)]
+    lines = [
+        (5, 6, short),
+        (6, 7, long),
+        (7, 8, tie),
+        (7, 8, tie),
+        (8, 9, tie),
+        (8, 9, tie),
+        (9, 10, long),
+        (10, 11, short),
+    ]
     transformers = [(1, 5), (2, 6), (3, 11), (4, 10)]
     data = {
         "base": 900.0, "X_d": 1.8, "X_q": 1.7, "X_d1": 0.3, "X_q1": 0.55, "X_d2": 0.25, "X_l": 0.2, "R_a": 0.0025,
@@ -32,11 +41,16 @@ def kundur(scenario: str, *, active: float = 1.0, saturation: bool = True, stray
             *(Branch(a, b, 0.0, 0.15 / 9) for a, b in transformers),
             *(Branch(a, b, *values) for a, b, values in lines),
         ),
-        shunts={7: 2.0, 9: 3.5} | ({k: stray_B for k in (1, 2, 3, 4)} if stray_B else {}),
+        shunts={7: 2.0, 9: 3.5} | (dict.fromkeys((1, 2, 3, 4), stray_B) if stray_B else {}),
         loads=(Load(7, 9.67, 1.0, active), Load(9, 17.67, 1.0, active)),
         machines=tuple(
             Machine(bus=bus, P=P, V=V, H=H, **data)
-            for bus, P, V, H in ((1, 7.0, 1.03, 6.5), (2, 7.0, 1.01, 6.5), (3, 7.19, 1.03, 6.175), (4, 7.0, 1.01, 6.175))
+            for bus, P, V, H in (
+                (1, 7.0, 1.03, 6.5),
+                (2, 7.0, 1.01, 6.5),
+                (3, 7.19, 1.03, 6.175),
+                (4, 7.0, 1.01, 6.175),
+            )
         ),
         slack=3,
         exciter=KUNDUR_EXCITERS[scenario],
@@ -71,7 +85,7 @@ def wscc9(*, exponent: float = 0.0, saturation=exponential, stray_B: float = 0.0
             Branch(4, 5, 0.01, 0.085, 0.176), Branch(4, 6, 0.017, 0.092, 0.158), Branch(5, 7, 0.032, 0.161, 0.306),
             Branch(6, 9, 0.039, 0.17, 0.358), Branch(7, 8, 0.0085, 0.072, 0.149), Branch(8, 9, 0.0119, 0.1008, 0.209),
         ),
-        shunts={k: stray_B for k in (1, 2, 3)} if stray_B else {},
+        shunts=dict.fromkeys((1, 2, 3), stray_B) if stray_B else {},
         loads=tuple(Load(k, P, Q, exponent, exponent) for k, P, Q in ((5, 1.25, 0.5), (6, 0.9, 0.3), (8, 1.0, 0.35))),
         machines=tuple(
             Machine(bus, 100.0, P, V, H, X_d, X_q, X_d1, X_q1, T_d10, T_q10)
@@ -85,7 +99,5 @@ def wscc9(*, exponent: float = 0.0, saturation=exponential, stray_B: float = 0.0
 
 def with_subtransients(system: System) -> System:
     """The WSCC system with machines of sixth order, X'' = 0.8·X'_d and X_l = 0.5·X'_d: to compare programs with."""
-    machines = tuple(
-        replace(m, X_d2=0.8 * m.X_d1, X_l=0.5 * m.X_d1, T_d20=0.03, T_q20=0.05) for m in system.machines
-    )
+    machines = tuple(replace(m, X_d2=0.8 * m.X_d1, X_l=0.5 * m.X_d1, T_d20=0.03, T_q20=0.05) for m in system.machines)
     return replace(system, machines=machines)

@@ -1,1 +1,1 @@
-"""The New England system, taken from pandapower: a case to copy for a network of ones own."""
+"""Kundur's example 12.6: two areas, four machines."""

@@ -1,1 +1,1 @@
-"""The New England system, taken from pandapower: a case to copy for a network of ones own."""
+"""The WSCC system of three machines and nine buses."""
