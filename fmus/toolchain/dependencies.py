@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy.sparse import csr_array
 
 from fmus.toolchain.model import Model
 
@@ -40,8 +41,8 @@ def structure(model: Model) -> Structure:
     f_x, f_u, f_p, f_c = (_pattern(f, 0, k) for k in range(4))
     g_x, g_u, g_p, g_c = (_pattern(g, 0, k) for k in range(4))
     c_p, x_p = _pattern(model.initialise, 0, 0), _pattern(model.initialise, 1, 0)
-    g_start = g_p | _product(g_x, x_p) | _product(g_c, c_p)
-    f_start = f_p | _product(f_x, x_p) | _product(f_c, c_p)
+    g_start = g_p + g_x @ x_p + g_c @ c_p
+    f_start = f_p + f_x @ x_p + f_c @ c_p
     return Structure(
         outputs=_unknowns(first_output, [(g_u, inputs), (g_x, states)]),
         derivatives=_unknowns(first_derivative, [(f_u, inputs), (f_x, states)]),
@@ -54,23 +55,23 @@ def structure(model: Model) -> Structure:
     )
 
 
-def _unknowns(first: int, blocks: list[tuple[np.ndarray, np.ndarray]]) -> tuple[Unknown, ...]:
+def _unknowns(first: int, blocks: list[tuple[csr_array, np.ndarray]]) -> tuple[Unknown, ...]:
     """One unknown for each row of the patterns, which stand side by side."""
+    for matrix, _ in blocks:
+        matrix.sort_indices()
     return tuple(
-        Unknown(first + row, tuple(int(i) for matrix, references in blocks for i in references[matrix[row]]))
-        for row in range(len(blocks[0][0]))
+        Unknown(first + row, tuple(int(i) for matrix, references in blocks for i in references[_columns(matrix, row)]))
+        for row in range(blocks[0][0].shape[0])
     )
 
 
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    product: np.ndarray = (a.astype(int) @ b.astype(int)) > 0
-    return product
+def _columns(matrix: csr_array, row: int) -> np.ndarray:
+    columns: np.ndarray = matrix.indices[matrix.indptr[row] : matrix.indptr[row + 1]]
+    return columns
 
 
-def _pattern(function: ca.Function, output: int, input_: int) -> np.ndarray:
-    """Boolean matrix: whether each element of an output depends on each element of an input."""
+def _pattern(function: ca.Function, output: int, input_: int) -> csr_array:
+    """Matrix of truth values: whether each element of an output depends on each element of an input."""
     pattern = function.jac_sparsity(output, input_)
-    matrix = np.zeros(pattern.shape, dtype=bool)
     rows, columns = pattern.get_triplet()
-    matrix[rows, columns] = True
-    return matrix
+    return csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=pattern.shape)

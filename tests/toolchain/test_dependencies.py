@@ -1,0 +1,41 @@
+"""Dependencies in a model description against full matrices, and against what moves when a value moves."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from fmus.grid.grid import grid
+from fmus.grid.network import Line, Load, Network, Port
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.dependencies import structure
+
+
+def _chain(buses):
+    names = tuple(f"b{k}" for k in range(buses))
+    lines = tuple(Line(f"l{k}", names[k], names[k + 1], X=0.1, R=0.01, B=0.02) for k in range(buses - 1))
+    return Network("chain", names, lines, (Load("load", names[-1], 50.0, 10.0),), (Port("unit", names[0]),))
+
+
+def _full(function, output, input_):
+    pattern = function.jac_sparsity(output, input_)
+    return np.array(ca.DM(pattern, 1).full(), dtype=bool)
+
+
+@pytest.mark.parametrize("name", ["gfor", "synchronous_generator_ac4a", "infinite_bus", "chain of 12 buses"])
+def test_initial_unknowns_follow_full_matrices(name):
+    """An initial output or derivative depends on a parameter directly, by a calculated value or by an initial state."""
+    model = grid(_chain(12)) if name.startswith("chain") else build_model(name)
+    found = {unknown.reference: unknown.known for unknown in structure(model).initial}
+    first_input = len(model.parameters) + len(model.calculated)
+    first_output = first_input + len(model.inputs) + len(model.states)
+    for first, function in (
+        (first_output, model.outputs_function),
+        (first_output + len(model.outputs), model.derivatives),
+    ):
+        x, u, p, c = (_full(function, 0, k) for k in range(4))
+        by_parameter = p | (
+            x.astype(int) @ _full(model.initialise, 1, 0) + c.astype(int) @ _full(model.initialise, 0, 0) > 0
+        )
+        for row in range(len(u)):
+            wanted = (*np.flatnonzero(by_parameter[row]), *(first_input + np.flatnonzero(u[row])))
+            assert found[first + row] == wanted
