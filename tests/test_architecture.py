@@ -97,7 +97,7 @@ def test_the_imports_are_read():
     graph = imports()
     assert "fmus.toolchain.model" in graph["gfor_fmu.converter"]
     assert "orchestrator.coupling.observers" in graph["orchestrator.coupling.master"]
-    assert "pandapower" in imported_names(MODULES["orchestrator.cases.power_flow"])
+    assert "pandapower" in imported_names(MODULES["orchestrator.cases.network_sources"])
 
 
 def test_every_module_of_the_orchestrator_is_on_a_floor():
@@ -219,7 +219,7 @@ def test_there_is_no_cycle():
             "fmpy",
             {f"orchestrator.fmi.{name}" for name in ("binary", "description", "loaded", "messages", "validation")},
         ),
-        ("pandapower", {"orchestrator.cases.power_flow", "orchestrator.cases.network_sources"}),
+        ("pandapower", {"orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),
         ("pint", {"orchestrator.units"}),

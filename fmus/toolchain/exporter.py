@@ -39,6 +39,9 @@ class Recipe(Protocol):
             If no such FMU can be made for this machine.
         """
 
+    def description(self) -> bytes:
+        """The text of modelDescription.xml, for which nothing is compiled."""
+
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         """The archive's members by path, with a library for each platform."""
 
@@ -78,6 +81,12 @@ def export(
     return write_archive(destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {}))
 
 
+def kept_at(recipe: Recipe) -> Path:
+    """Path at which this machine's FMU is kept, whether it is there or not."""
+    folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
+    return folder / f"{recipe.model.name}.fmu"
+
+
 def cached(recipe: Recipe) -> Path:
     """Return this machine's FMU, building it if it was not built before, or was changed since.
 
@@ -89,8 +98,7 @@ def cached(recipe: Recipe) -> Path:
         If it cannot be kept.
     """
     platforms = recipe.host_platforms()
-    folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
-    target = folder / f"{recipe.model.name}.fmu"
+    target = kept_at(recipe)
     return target if intact(target) else keep(target, packed(recipe.contents(platforms)))
 
 

@@ -50,6 +50,10 @@ class NativeFmu:
             return model_description_3(self.model, guid, self.model.name, tool)
         return model_description(self.model, guid, self.model.name, tool, native=True)
 
+    def description(self) -> bytes:
+        """The text of modelDescription.xml, for which nothing is compiled."""
+        return self._description(guid_of(self.digest))
+
     def default_platforms(self) -> tuple[str, ...]:
         """All of them."""
         return tuple(TARGETS)
@@ -64,7 +68,7 @@ class NativeFmu:
         """The archive's members, with a binary for each platform [FMI 2.0 names]."""
         guid = guid_of(self.digest)
         code = identity_source(guid, self.digest) + self._code
-        members = {"modelDescription.xml": self._description(guid)}
+        members = {"modelDescription.xml": self.description()}
         if self._icons:
             members["terminalsAndIcons/terminalsAndIcons.xml"] = self._icons
         for platform in platforms:

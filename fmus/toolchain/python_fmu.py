@@ -47,13 +47,17 @@ class PythonFmu:
         """That of this machine; where there is none, the FMU evaluates its equations in pure Python."""
         return this_machine()
 
+    def description(self) -> bytes:
+        """The text of modelDescription.xml, for which nothing is compiled."""
+        return model_description(self.model, guid_of(self.digest), self.model.name, self._tool)
+
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         """The archive's members, with a kernel for each platform [FMI 2.0 names]."""
         model, tag = self.model, self.digest[:16]
         kernel_module = f"gfor_cosim_kernel_{tag}"
         slave_module = f"gfor_cosim_slave_{tag}"
         contents: dict[str, bytes] = {
-            "modelDescription.xml": model_description(model, guid_of(self.digest), model.name, self._tool),
+            "modelDescription.xml": self.description(),
             "resources/slavemodule.txt": slave_module.encode(),
             f"resources/{slave_module}.py": self._slave.encode(),
             f"resources/{kernel_module}.py": self._python.encode(),

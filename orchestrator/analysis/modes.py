@@ -20,6 +20,9 @@ ELECTROMECHANICAL_HZ = (0.1, 2.0)
 """Range of frequencies of electromechanical modes [Hz], which is the default wherever modes are searched, named or
 guarded."""
 
+HIGHEST_SWING_HZ = 5.0
+"""Frequency [Hz] up to which electromechanical modes outside of a range are named: small machines beside large ones."""
+
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this decays within one step and is not a mode."""
 

@@ -46,6 +46,7 @@ _DENSE_VECTORS = 200
 """Up to this number of states, all eigenvectors cost less than a search for one."""
 
 _STATES_NAMED = 3
+_SWINGS_SHOWN = 3
 
 
 class Cause(StrEnum):
@@ -58,11 +59,14 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Hidden:
-    """Oscillatory modes outside of a frequency range [Hz]: how many, and the least damped of them [rad/s]."""
+    """Oscillatory modes outside of a frequency range [Hz]: how many, the least damped of them, and those of which it is
+    known that generators swing in them [rad/s].
+    """
 
     frequency_range: tuple[float, float]
     count: int
     least_damped: complex | None
+    electromechanical: tuple[complex, ...] = ()
 
     def sentence(self) -> str:
         """The sentence on the hidden modes."""
@@ -71,13 +75,33 @@ class Hidden:
         text = f"{self.count} {words} outside {low:g} to {high:g} Hz"
         if self.least_damped is None:
             return text
-        return f"{text}; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
+        text += f"; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
+        if not self.electromechanical:
+            return text
+        shown = [f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in self.electromechanical]
+        more = f" and {len(shown) - _SWINGS_SHOWN} more" if len(shown) > _SWINGS_SHOWN else ""
+        highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
+        wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
+        return f"{text}; electromechanical: {'; '.join(shown[:_SWINGS_SHOWN])}{more}: show them by --range {wide}"
 
     def as_json(self) -> dict[str, Any]:
         """The number and the least damped of the hidden modes as JSON's types."""
         known = self.least_damped is not None
         least = {"frequency_hz": self._hertz, "damping_percent": self._percent} if known else None
-        return {"range_hz": list(self.frequency_range), "oscillatory_modes": self.count, "least_damped": least}
+        swings = [
+            {"frequency_hz": z.imag / (2 * np.pi), "damping_percent": damping_percent(z)}
+            for z in self.electromechanical
+        ]
+        return {
+            "range_hz": list(self.frequency_range),
+            "oscillatory_modes": self.count,
+            "least_damped": least,
+            "electromechanical": swings,
+        }
+
+    @property
+    def _lowest_swing(self) -> float:
+        return float(min(z.imag for z in self.electromechanical) / (2 * np.pi))
 
     @property
     def _hertz(self) -> float:

@@ -62,13 +62,20 @@ def _assign_frequency(draft: Draft) -> None:
 
 
 def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
-    """Assign to one component, or to all whose name fits a pattern such as ``gfor*``."""
+    """Assign to one component, or to all that have the variable and whose name fits a pattern such as ``gfor*``."""
     if sets_imperfection(key):
         return  # done when the connections are made
     pattern, _, variable = key.partition(".")
-    for name in fnmatch.filter(draft.tables, pattern) if variable else ():
+    fitting = fnmatch.filter(draft.tables, pattern) if variable else []
+    having = [name for name in fitting if _has(draft, name, variable)]
+    for name in having if pattern not in draft.tables and having else fitting:
         _assign(draft, name, variable, value, where)
     _check_component(draft, pattern, where)
+
+
+def _has(draft: Draft, name: str, variable: str) -> bool:
+    plan = draft.system.components.get(name)
+    return plan is not None and variable in plan.description.variables
 
 
 def _check_component(draft: Draft, pattern: str, where: str) -> None:

@@ -1,6 +1,7 @@
 """Rows of a CSV file, each with its place for errors."""
 
 import csv
+import math
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 from orchestrator.errors import InputError
 
 Row = dict[str, str]
-_PLACE = "_place"
+PLACE = "_place"
+"""Key of a row's file and line."""
 
 MOST_ROWS = 100_000
 """Of one file: ten times the lines of the largest networks that operators study."""
@@ -31,7 +33,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
             missing = [c for c in columns if c not in (reader.fieldnames or ())]
             if missing:
                 raise InputError(f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}")
-            rows = [row | {_PLACE: f"{path}, line {n}"} for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)]
+            rows = [row | {PLACE: f"{path}, line {n}"} for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: it cannot be read as a table: {error}; save it as CSV in UTF-8") from error
     if len(rows) > MOST_ROWS:
@@ -41,7 +43,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
 
 def place_of(row: Row) -> str:
     """File and line of a row."""
-    return row[_PLACE]
+    return row[PLACE]
 
 
 def number(row: Row, column: str) -> float:
@@ -53,9 +55,12 @@ def number(row: Row, column: str) -> float:
         If the column holds no number.
     """
     try:
-        return float(row[column])
+        value = float(row[column])
     except (TypeError, ValueError):
-        raise InputError(f"{place_of(row)}: {column} = {row[column]!r} is not a number") from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{place_of(row)}: {column} = {row[column]!r} is not a number")
+    return value
 
 
 def optional_number(row: Row, column: str) -> float | None:

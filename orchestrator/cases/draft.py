@@ -62,6 +62,8 @@ class Draft:
         Place of the last assignment of each ``component.variable``.
     origins
         Origin of each component of the units table, by its name.
+    reactive_limits
+        Least and most reactive power of the units at a bus together [Mvar], by bus.
     questions
         Questions about unusual data.
     parameter_files
@@ -86,6 +88,7 @@ class Draft:
     network_failed: bool = False
     places: dict[str, str] = field(default_factory=dict)
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
+    reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     whole: bool = True
@@ -108,6 +111,11 @@ class Draft:
         """Add a problem that leaves no network. Problems that follow from the missing network are then not noted."""
         self.network_failed = True
         self.note(place, text)
+
+    def place_of_component(self, name: str) -> str:
+        """Place of a component: its table, or the row of its unit."""
+        origin = self.origins.get(name)
+        return self.place("components", name) if origin is None else origin.row
 
     def place_of_value(self, name: str, group: str, path: Sequence[str]) -> str:
         """Place of a value of a component's table: the table, or the row and the table of its unit."""

@@ -1,14 +1,9 @@
-"""The elements of a power flow, and our own nodal equations. They check a solution, and explain why a power flow has no
-solution.
-"""
+"""The elements of a power flow, and the balance of every bus, element by element: it checks a solution."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
 
 from fmus.grid.network import OPEN_CHARGING
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
@@ -52,11 +47,12 @@ class FlowLoad:
 
 @dataclass(frozen=True, slots=True)
 class FlowShunt:
-    """An admittance to earth g + jb [pu, 100 MVA]."""
+    """An admittance to earth g + jb [pu, 100 MVA]; ``stray`` where it is the network's stray capacitance."""
 
     bus: str
     g: float
     b: float
+    stray: bool = False
 
 
 def nodal_powers(
@@ -118,52 +114,3 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
             f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
             f"{remedy}connect them with a line, or remove them"
         )
-
-
-def widest_angle(
-    buses: Sequence[str],
-    lines: Sequence[FlowLine],
-    loads: Sequence[FlowLoad],
-    injected: Mapping[str, float],
-    slack_bus: str,
-) -> str:
-    """A sentence that names the branch with the largest angle in the DC solution.
-
-    Parameters
-    ----------
-    buses
-        Names of the buses.
-    lines
-        Lines of the network; open ones are left out.
-    loads
-        Loads, of which only the active power counts.
-    injected
-        Active power that units feed, by bus [pu, 100 MVA]; 0 where a bus is missing.
-    slack_bus
-        The bus with angle 0, which feeds the remaining power.
-    """
-    closed = [line for line in lines if line.closed]
-    position = {bus: k for k, bus in enumerate(buses)}
-    power = np.array([injected.get(bus, 0.0) for bus in buses])
-    for load in loads:
-        power[position[load.bus]] -= load.p_mw / SYSTEM_BASE_MVA
-    start = np.array([position[line.from_bus] for line in closed])
-    end = np.array([position[line.to_bus] for line in closed])
-    b = np.array([1 / (line.X * line.tap) for line in closed])
-    shifts = np.array([line.shift for line in closed])
-    np.add.at(power, start, b * shifts)
-    np.add.at(power, end, -b * shifts)
-    rows, columns = np.concatenate([start, end, start, end]), np.concatenate([start, end, end, start])
-    B = coo_matrix((np.concatenate([b, b, -b, -b]), (rows, columns)), shape=(len(buses),) * 2).tocsc()
-    kept = np.array([k for bus, k in position.items() if bus != slack_bus])
-    angle = np.zeros(len(buses))
-    angle[kept] = spsolve(B[kept][:, kept], power[kept])
-    across = angle[start] - angle[end] - shifts
-    worst = int(np.argmax(np.abs(across)))
-    line, degrees = closed[worst], math.degrees(across[worst])
-    ends = (f"{bus!r} ({math.degrees(angle[position[bus]]):.1f} deg)" for bus in (line.from_bus, line.to_bus))
-    carried = across[worst] * b[worst] * SYSTEM_BASE_MVA
-    return (
-        f"In the DC solution the largest angle, {abs(degrees):.1f} deg, is across {line.name!r} between "
-        f"{' and '.join(ends)}, X = {line.X:g} pu, which would carry {carried:.0f} MW. "
-    )

@@ -19,21 +19,27 @@ _NO_LIMIT = 1e4
 
 @dataclass(frozen=True, slots=True)
 class Generation:
-    """Total power [MW] and common voltage [pu] of the generators at a bus, and a suitable rating [MVA]."""
+    """Total power [MW] and common voltage [pu] of the generators at a bus, a suitable rating [MVA], and their least and
+    most reactive power together [Mvar], infinite where the source has no limit.
+    """
 
     label: str
     p_mw: float
     v_pu: float
     rating_mva: float
+    q_min_mvar: float = -math.inf
+    q_max_mvar: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """One generator: its power [MW], voltage [pu] and rating [MVA]."""
+    """One generator: its power [MW], voltage [pu], rating [MVA] and limits of reactive power [Mvar]."""
 
     p_mw: float
     v_pu: float
     rating_mva: float
+    q_min_mvar: float = 0.0
+    q_max_mvar: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,7 +148,11 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
             p, most = float(row[1]), float(row[8])
             reactive = max(abs(float(row[3])), abs(float(row[4])))
             needed = max(abs(p), most) or (reactive if reactive < _NO_LIMIT else 0.0)
-            at_bus.setdefault(int(row[0]), []).append(_Member(p, float(row[5]), needed / _POWER_FACTOR))
+            least, largest = (q if abs(q) < _NO_LIMIT else math.copysign(math.inf, q) for q in map(float, row[[4, 3]]))
+            if least == largest == 0:  # not known, as in pandapower's tables
+                least, largest = -math.inf, math.inf
+            member = _Member(p, float(row[5]), needed / _POWER_FACTOR, least, largest)
+            at_bus.setdefault(int(row[0]), []).append(member)
     return at_bus
 
 
@@ -160,7 +170,8 @@ def _loads(source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list
 
 def _generation(label: str, members: list[_Member]) -> Generation:
     rating = round(sum(m.rating_mva for m in members), 1) or SYSTEM_BASE_MVA
-    return Generation(label, sum(m.p_mw for m in members), members[0].v_pu, rating)
+    least, most = sum(m.q_min_mvar for m in members), sum(m.q_max_mvar for m in members)
+    return Generation(label, sum(m.p_mw for m in members), members[0].v_pu, rating, least, most)
 
 
 def _clean(value: float) -> float:

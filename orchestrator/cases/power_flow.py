@@ -1,26 +1,20 @@
-"""Power flow of a case with pandapower: voltages of all buses and the powers of all units."""
+"""Power flow of a case: voltages of all buses and the powers of all units."""
 
-import cmath
-import copy
-import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from fmus.toolchain.extras import require
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers, widest_angle
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers
+from orchestrator.cases.flow_equations import FlowEquations
+from orchestrator.cases.flow_failure import explain
+from orchestrator.cases.flow_limits import Excess, Limits, exceeded, solve_with_limits
+from orchestrator.cases.flow_newton import solve
 from orchestrator.errors import InputError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
 _TOLERANCE = 1e-9
 """Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
-_KV = 230.0
-"""Nominal voltage for conversion to pandapower's units [kV]; it cancels in the results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +43,17 @@ class PowerFlow:
         P + jQ of every unit on its own rating [pu, S_n].
     residual
         Largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages.
+    at_limits
+        Buses that feed a limit of reactive power instead of holding their voltage.
+    beyond_limits
+        Buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack.
     """
 
     voltages: dict[str, complex]
     powers: dict[str, complex]
     residual: float
+    at_limits: tuple[Excess, ...] = ()
+    beyond_limits: tuple[Excess, ...] = ()
 
 
 def solve_power_flow(
@@ -63,6 +63,9 @@ def solve_power_flow(
     units: Sequence[FlowUnit],
     slack_bus: str,
     shunts: Sequence[FlowShunt] = (),
+    limits: Limits | None = None,
+    *,
+    keep_limits: bool = False,
 ) -> PowerFlow:
     """Solve the power flow.
 
@@ -79,6 +82,10 @@ def solve_power_flow(
         Units that feed the network, each with its bus, power and voltage.
     slack_bus
         The bus whose units feed the remaining power; its angle is zero.
+    limits
+        Limits of reactive power, by bus.
+    keep_limits
+        Whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only named.
 
     Raises
     ------
@@ -102,102 +109,31 @@ def solve_power_flow(
             "choose another slack in [power_flow]"
         )
     check_connected(buses, lines, slack_bus)
-    voltages = _pandapower_voltages(buses, lines, loads, shunts, at_bus, slack_bus)
+    active = {bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA for bus, members in at_bus.items()}
+    held = {bus: members[0].v_0 for bus, members in at_bus.items()}
+    equations = FlowEquations.of(buses, lines, loads, shunts, active, held, slack_bus)
+    known = limits or {}
+    if keep_limits:
+        final, result, at_limits = solve_with_limits(equations, known)
+    else:
+        final, result, at_limits = equations, solve(equations), []
+    if not result.converged:
+
+        def with_stray(share: float) -> FlowEquations:
+            fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
+            return FlowEquations.of(buses, lines, loads, fewer, active, held, slack_bus)
+
+        raise InputError(explain(equations, result, with_stray if any(s.stray for s in shunts) else None))
+    voltages = dict(zip(equations.buses, map(complex, result.voltages), strict=True))
     flow = _shares(voltages, nodal_powers(voltages, lines, loads, shunts), at_bus, slack_bus)
-    powers = flow.powers | {unit.name: 0j for unit in units if not unit.connected}
     if not flow.residual <= _TOLERANCE:
         raise InputError(
             f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
             "check for very small reactances"
         )
-    return PowerFlow(flow.voltages, powers, flow.residual)
-
-
-def _pandapower_voltages(
-    buses: Sequence[str],
-    lines: Sequence[FlowLine],
-    loads: Sequence[FlowLoad],
-    shunts: Sequence[FlowShunt],
-    at_bus: Mapping[str, Sequence[FlowUnit]],
-    slack_bus: str,
-) -> dict[str, complex]:
-    require("the power flow from which a network starts", "pandapower")
-    import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
-
-    logging.getLogger("pandapower").setLevel(logging.ERROR)
-    net = copy.deepcopy(empty_network())
-    index = {bus: pp.create_bus(net, vn_kv=_KV, name=bus) for bus in buses}
-    for line in lines:
-        _add_line(pp, net, line, index)
-    for load in loads:
-        pp.create_load(net, index[load.bus], p_mw=load.p_mw, q_mvar=load.q_mvar)
-    for shunt in shunts:
-        pp.create_shunt(net, index[shunt.bus], p_mw=shunt.g * SYSTEM_BASE_MVA, q_mvar=-shunt.b * SYSTEM_BASE_MVA)
-    for bus, members in at_bus.items():
-        if bus == slack_bus:
-            pp.create_ext_grid(net, index[bus], vm_pu=members[0].v_0)
-        else:
-            pp.create_gen(net, index[bus], p_mw=sum(u.P_0 * u.S_n for u in members), vm_pu=members[0].v_0)
-    try:
-        pp.runpp(
-            net, tolerance_mva=1e-10, max_iteration=50, numba=False, init="dc", calculate_voltage_angles=True,
-            trafo_model="pi",
-        )  # fmt: skip
-    except pp.LoadflowNotConverged as error:
-        injected = {bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA for bus, members in at_bus.items()}
-        raise InputError(
-            "power flow: no solution found; the lines cannot carry the power asked of them. "
-            f"{widest_angle(buses, lines, loads, injected, slack_bus)}Lower P_0 or the loads, or the line reactances"
-        ) from error
-    result = net.res_bus
-    return {bus: cmath.rect(float(result.vm_pu[i]), float(np.deg2rad(result.va_degree[i]))) for bus, i in index.items()}
-
-
-@cache
-def empty_network() -> Any:
-    """An empty network of pandapower, to be copied.
-
-    Making its eighty empty tables takes ten times as long as copying them, and longer than the power flow of a small
-    system.
-    """
-    import pandapower as pp  # noqa: PLC0415 - as above
-
-    return pp.create_empty_network(f_hz=50.0, sn_mva=SYSTEM_BASE_MVA)
-
-
-def _add_line(pp: Any, net: Any, line: FlowLine, index: Mapping[str, int]) -> None:
-    """Add a line, or a transformer if the line has a ratio; only its shunts if it is open."""
-    impedance = _KV**2 / SYSTEM_BASE_MVA
-    ends = index[line.from_bus], index[line.to_bus]
-    if line.closed and not line.has_ratio:
-        pp.create_line_from_parameters(
-            net,
-            *ends,
-            length_km=1.0,
-            r_ohm_per_km=line.R * impedance,
-            x_ohm_per_km=line.X * impedance,
-            c_nf_per_km=line.B / impedance / (2 * np.pi * 50.0) * 1e9,
-            max_i_ka=1e3,
-            name=line.name,
-        )
-        return
-    for end, b in zip(ends, line.charging, strict=True):
-        if b:
-            pp.create_shunt(net, end, p_mw=0.0, q_mvar=-b * SYSTEM_BASE_MVA)
-    if line.closed:
-        pp.create_transformer_from_parameters(
-            net,
-            *ends,
-            sn_mva=SYSTEM_BASE_MVA,
-            vn_hv_kv=line.tap * _KV,
-            vn_lv_kv=_KV,
-            vkr_percent=100 * line.R,
-            vk_percent=100 * abs(complex(line.R, line.X)),
-            pfe_kw=0.0,
-            i0_percent=0.0,
-            shift_degree=float(np.rad2deg(line.shift)),
-            name=line.name,
-        )
+    powers = flow.powers | {unit.name: 0j for unit in units if not unit.connected}
+    beyond = tuple(exceeded(final, result.voltages, known))
+    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond)
 
 
 def _shares(

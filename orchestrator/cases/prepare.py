@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 from fmus.grid.network import Network, Port
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, network_of, parts_of
-from fmus.toolchain.extras import require
+from fmus.toolchain.catalogue import model_names, needs_arguments, network_of, parts_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
 from orchestrator.cases.build_choices import PARTS
+from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.draft import Draft
@@ -42,7 +41,7 @@ from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
 from orchestrator.coupling.step_awareness import tell_step
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError, Problem
-from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import is_ours
 
 MOST_STEPS = 1e11
@@ -50,6 +49,13 @@ MOST_STEPS = 1e11
 
 _STEPS_A_SECOND = 30_000
 """Of the two-area system on one core, about."""
+
+
+_USUAL_VOLTAGES = (0.8, 1.2)
+"""Magnitudes [pu] of bus voltages that are not questioned."""
+
+_SHOWN = 5
+"""Buses that a question names; the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,10 @@ class PreparedScenario:
         Data that are most unusual, each with its place: see `plausibility`.
     references
         Published modes of the scenario by name, where the conditions of ``[reference]`` hold.
+    places
+        File and line of every component.
+    of_units
+        Components that come from the units table.
     """
 
     case: CaseDefinition
@@ -92,6 +102,8 @@ class PreparedScenario:
     record_filtered: bool = False
     about_rows: tuple[Problem, ...] = ()
     references: Mapping[str, ReferenceModeTable] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
+    of_units: frozenset[str] = frozenset()
 
 
 def _takes_network(table: ComponentTable) -> bool:
@@ -113,36 +125,8 @@ def _with_switches(network: Network | None, case: CaseTable) -> Network | None:
     return replace(network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts)
 
 
-@cache
-def catalogue_fmu(
-    model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
-) -> FmuDescription:
-    """FMU of a catalogue's model, built once on each machine.
-
-    Parameters
-    ----------
-    model
-        Its name.
-    network
-        That a grid is built for.
-    native
-        Whether it is compiled, with no Python in it.
-    parts
-        What a model with parts is made of, as pairs of a key and a part's name.
-
-    Raises
-    ------
-    MissingLibraryError
-        If the extra that builds FMUs is not installed.
-    """
-    require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
-    from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
-    from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
-
-    arguments = dict(parts) | ({"network": network} if network is not None else {})
-    recipe = NativeFmu if native else PythonFmu
-    return read_description(cached(recipe(build_model(model, **arguments))))
+def _first_few(texts: Sequence[str]) -> str:
+    return ", ".join(texts[:_SHOWN]) + (f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else "")
 
 
 class Preparer:
@@ -157,6 +141,7 @@ class Preparer:
     ) -> None:
         scenario = case.scenarios[name]
         self._case = case
+        self._planned: dict[str, PlannedFmu] = {}
         self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
         draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
@@ -203,6 +188,7 @@ class Preparer:
         references = references_of(draft, imperfections)
         if draft.problems or clock is None:
             return None
+        self._build()
         every, about_rows = record_every(draft, clock, stop)
         record, left_out = recorded(draft)
         draft.questions += [*doubts(draft.case, draft.place), *self._area_questions()]
@@ -224,6 +210,8 @@ class Preparer:
             questions=tuple(draft.questions),
             about_rows=(*about_rows, *left_out),
             references=references,
+            places={name: draft.place_of_component(name) for name in draft.system.components},
+            of_units=frozenset(draft.origins),
         )
 
     # -- network and components ------------------------------------------------------------------
@@ -278,6 +266,8 @@ class Preparer:
                     f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
                 )
             return None
+        if draft.network_failed:
+            return None
         held = {table.bus for table in self._everything.values()}
         idle = [bus for bus in data.generation if bus not in held]
         if idle:
@@ -309,7 +299,7 @@ class Preparer:
             self.draft.note(where, "'binding' is for an FMU of others; give its path as 'fmu', or remove 'binding'")
             return
         try:
-            description = self._description(table, self._is_native(name, table), self._parts(name, table))
+            description = self._description(name, table, self._is_native(name, table), self._parts(name, table))
             self._check_trust(name, table)
             self.draft.system.add(name, description, isolated=table.isolated)
         except (InputError, ValueError) as error:  # ValueError: the model does not fit the network
@@ -359,7 +349,14 @@ class Preparer:
             )
         return tuple(chosen.items())
 
-    def _description(self, table: ComponentTable, native: bool, parts: tuple[tuple[str, str], ...]) -> FmuDescription:
+    def _build(self) -> None:
+        """Build the FMUs that are described so far and not there; nothing is wrong with the case."""
+        for name, planned in self._planned.items():
+            self.draft.system.components[name].description = build_fmu(planned)
+
+    def _description(
+        self, name: str, table: ComponentTable, native: bool, parts: tuple[tuple[str, str], ...]
+    ) -> FmuDescription:
         if table.fmu is not None:
             directory = self.draft.directory
             return bound_fmu(directory / table.fmu, directory / table.binding if table.binding else None)
@@ -371,7 +368,9 @@ class Preparer:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
-        return catalogue_fmu(table.model or "", self.draft.network if own else None, native, parts)
+        planned = plan_fmu(table.model or "", self.draft.network if own else None, native, parts)
+        self._planned[name] = planned
+        return planned.description
 
     # -- operating point -------------------------------------------------------------------------
 
@@ -396,10 +395,52 @@ class Preparer:
             )
             return None
         try:
-            return start_from_power_flow(draft.system, draft.network, table.grid, units, slack)
+            flow = start_from_power_flow(
+                draft.system, draft.network, table.grid, units, slack, self._reactive_limits(),
+                keep_limits=table.reactive_limits is True,
+            )  # fmt: skip
         except InputError as error:
             draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}")
             return None
+        draft.questions += [*self._limit_questions(flow), *self._voltage_questions(flow)]
+        return flow
+
+    def _voltage_questions(self, flow: PowerFlow) -> list[Problem]:
+        """Ask about voltages with which no network is run."""
+        low, high = _USUAL_VOLTAGES
+        unusual = [f"{bus!r} {abs(v):.3f} pu" for bus, v in flow.voltages.items() if not low <= abs(v) <= high]
+        if not unusual:
+            return []
+        return [
+            Problem(
+                self.draft.place("power_flow"),
+                f"the power flow gives voltages outside of {low:g} to {high:g} pu: {_first_few(unusual)}; check loads, "
+                "shunts and stray_B there",
+            )
+        ]
+
+    def _reactive_limits(self) -> dict[str, tuple[float, float]]:
+        """Limits of the source's generators, which the units' file overrides [Mvar]."""
+        generation = self.draft.data.generation if self.draft.data else {}
+        return {bus: (g.q_min_mvar, g.q_max_mvar) for bus, g in generation.items()} | self.draft.reactive_limits
+
+    def _limit_questions(self, flow: PowerFlow) -> list[Problem]:
+        """What is to be said of limits of reactive power."""
+        kept = self.draft.case.power_flow.reactive_limits if self.draft.case.power_flow else None
+        where = self.draft.place("power_flow", *(["reactive_limits"] if kept is not None else []))
+        found = []
+        if flow.at_limits:
+            told = _first_few([excess.text(kept=True) for excess in flow.at_limits])
+            found.append(Problem(where, f"limits of reactive power are reached: {told}"))
+        if flow.beyond_limits and kept is not False:
+            told = _first_few([excess.text(kept=False) for excess in flow.beyond_limits])
+            remedy = (
+                "the slack bus keeps no limit; take another slack"
+                if kept
+                else "write reactive_limits = true to keep the limits, or false if the voltages are meant"
+            )
+            found.append(Problem(where, f"limits of reactive power are exceeded: {told}; {remedy}"))
+        return found
 
     def _area_questions(self) -> list[Problem]:
         areas = self.draft.case.analysis.areas

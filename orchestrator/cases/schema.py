@@ -67,10 +67,13 @@ class ComponentTable(Table):
 
 
 class PowerFlowTable(Table):
-    """Which component is the grid, and which unit or bus balances it."""
+    """Which component is the grid, which unit or bus balances it, and whether limits of reactive power are kept; None
+    names those that are exceeded.
+    """
 
     grid: str
     slack: str | None = None
+    reactive_limits: bool | None = None
 
 
 class LineTable(Table):

@@ -1,12 +1,13 @@
 """Start values of every component, from a power flow with the values that are set."""
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
@@ -16,7 +17,14 @@ _RESULTS = ("Q_0", "theta_0")
 
 
 def start_from_power_flow(
-    system: System, network: Network, grid: str, units: Mapping[str, str], slack: str
+    system: System,
+    network: Network,
+    grid: str,
+    units: Mapping[str, str],
+    slack: str,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    keep_limits: bool = False,
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -35,6 +43,11 @@ def start_from_power_flow(
         Bus of every unit.
     slack
         The bus whose units feed the remaining power.
+    limits
+        Least and most reactive power of all units of a bus together [Mvar], by bus. Where some of them are
+        disconnected, the limits shrink with the rating.
+    keep_limits
+        Whether a bus gives its voltage up at a limit.
 
     Raises
     ------
@@ -49,13 +62,16 @@ def start_from_power_flow(
                 f"{name}: {' and '.join(given)} cannot be set, because the power flow computes it; "
                 "remove it, and set P_0 and v_0"
             )
+    feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
     flow = solve_power_flow(
         (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
         [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
         _loads(network, system.components[grid]),
-        [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()],
+        feeding,
         slack,
         _shunts(network, system.components[grid]),
+        _limits(limits or {}, feeding),
+        keep_limits=keep_limits,
     )
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
@@ -124,7 +140,7 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
         for closed in (not shunt.switched or _is_connected(grid, f"{shunt.name}.connected"),)
     ]
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
-    return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B")) for bus in stray]
+    return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B"), stray=True) for bus in stray]
 
 
 def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
@@ -136,6 +152,18 @@ def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
     connected = _is_connected(plan, "connected") and _is_connected(grid, f"{name}.connected")
     return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected)
+
+
+def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]) -> Limits:
+    """The limits of the units that are connected [pu, 100 MVA]."""
+    found = {}
+    for bus, both in limits.items():
+        whole = sum(u.S_n for u in units if u.bus == bus)
+        feeding = sum(u.S_n for u in units if u.bus == bus and u.connected)
+        if feeding:
+            least, most = (q * feeding / whole / SYSTEM_BASE_MVA for q in both)
+            found[bus] = (least, most)
+    return found
 
 
 def _is_connected(plan: ComponentPlan, switch: str) -> bool:

@@ -2,13 +2,14 @@
 share each unit.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.build_choices import PARTS
-from orchestrator.cases.csv_rows import Row, optional_number, place_of, rows_of
+from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
@@ -18,6 +19,12 @@ from orchestrator.errors import InputError
 
 UNIT_KINDS = ("sg", "gfor")
 """First parts of the names of a unit's generator and converter."""
+
+_LIMITS = ("q_min_mvar", "q_max_mvar")
+_REMARKS = ("q_mvar", "name", "comment", "source")
+"""Columns that say more to a reader; the power flow computes the reactive power."""
+
+_COLUMNS = ("bus", "rating_mva", "p_mw", "v_pu", "alpha", *_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +45,8 @@ class UnitRow:
         File and line of the row; empty where the unit comes from the network's source.
     parts
         Parts of the generator that the row itself chooses.
+    q_min_mvar, q_max_mvar
+        Limits of reactive power [Mvar]; infinite without.
     """
 
     label: str
@@ -49,6 +58,8 @@ class UnitRow:
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     place: str = ""
     parts: Mapping[str, str] = field(default_factory=dict)
+    q_min_mvar: float = -math.inf
+    q_max_mvar: float = math.inf
 
 
 def unit_components(draft: Draft) -> dict[str, ComponentTable]:
@@ -66,9 +77,10 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     except InputError as error:
         if draft.network_failed:
             return {}  # figures that the source would have given are missing
-        draft.note(draft.place("units", "file") if table.file else draft.place("units"), str(error))
+        draft.note_network(draft.place("units", "file") if table.file else draft.place("units"), str(error))
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
+    draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
     alphas = _alphas(draft, table, rows)
     models = (
         (table.generator, "generator_parameters", table.generator_parameters),
@@ -103,10 +115,15 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
                 "the key 'file' is missing; without it the units are the generators of the [network] source, "
                 "which is not given or has none"
             )
-        rows = [UnitRow(g.label, bus, g.rating_mva, g.p_mw, g.v_pu) for bus, g in generation.items()]
+        rows = [
+            UnitRow(
+                g.label, bus, g.rating_mva, g.p_mw, g.v_pu, q_min_mvar=g.q_min_mvar, q_max_mvar=g.q_max_mvar
+            )
+            for bus, g in generation.items()
+        ]  # fmt: skip
         return [_checked(row, "the network's source") for row in rows]
     rows = []
-    for entry in rows_of(directory / table.file, ("bus",)):
+    for entry in _known_rows(directory / table.file):
         bus = bus_name(entry["bus"])
         given = generation.get(bus)
         figures = {column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")}
@@ -120,12 +137,27 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         if alpha is not None and not 0 <= alpha <= 1:
             raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
-        parts = _parts_in(entry)
-        unit = UnitRow(entry["bus"], bus, **figures, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
+        limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
+        numbers = {**figures, **limits}
+        unit = UnitRow(
+            entry["bus"], bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=_parts_in(entry)
+        )  # type: ignore[arg-type]
         rows.append(_checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:
         raise InputError(f"{directory / table.file}: bus {', '.join(repeated)} has more than one row; merge its units")
+    return rows
+
+
+def _known_rows(path: Path) -> list[Row]:
+    """The rows of a units' file; a column that nothing reads may be a misspelt one."""
+    rows = rows_of(path, ("bus",))
+    known = [*_COLUMNS, *UnitsTable.model_fields]
+    for column in rows[0] if rows else ():
+        kind = column.partition(".")[0]
+        if column not in (*known, *_REMARKS, PLACE) and not ("." in column and kind in UNIT_KINDS):
+            hint = close_names(column, known, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter")
+            raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
     return rows
 
 
@@ -144,6 +176,15 @@ def _checked(row: UnitRow, place: str) -> UnitRow:
         raise InputError(
             f"{place}: the unit at bus {row.label} feeds {row.p_mw:g} MW, more than its rating of "
             f"{row.rating_mva:g} MVA; raise the rating or lower p_mw"
+        )
+    if not row.q_min_mvar <= row.q_max_mvar:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = "
+            f"{row.q_max_mvar:g}; swap them"
+        )
+    if not row.v_pu > 0:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it must exceed 0, and is near 1"
         )
     return row
 

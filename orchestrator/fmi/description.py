@@ -166,7 +166,34 @@ def read_description(path: Path | str) -> FmuDescription:
         If it is of another FMI version, not for co-simulation, or without a binary for this platform.
     """
     path = Path(path)
-    text = read_model_description_text(path)
+    described = parse_description(path, read_model_description_text(path), names_in(path))
+    if fmpy.platform not in described.platforms:
+        has = ", ".join(described.platforms) or "none"
+        raise UnsupportedFmuError(
+            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
+            f"ask its author for a {fmpy.platform} build",
+            "another platform",
+        )
+    return described
+
+
+def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
+    """The description in a modelDescription.xml.
+
+    Parameters
+    ----------
+    path
+        The .fmu file, which need not be there yet.
+    text
+        Of its modelDescription.xml.
+    names
+        Of the archive's members, by which the platforms are known.
+
+    Raises
+    ------
+    FmuFileError, UnsupportedFmuError
+        As `read_description`, but for the platform.
+    """
     version = _fmi_version(path, text)
     if version not in VERSIONS:
         raise UnsupportedFmuError(
@@ -177,7 +204,7 @@ def read_description(path: Path | str) -> FmuDescription:
     try:
         description = fmpy.read_model_description(_only(text), validate=False)
         exchange_only = description.coSimulation is None
-        platforms = tuple(fmpy.supported_platforms(_only(text, names_in(path))))
+        platforms = tuple(fmpy.supported_platforms(_only(text, names)))
         described = None if exchange_only else _describe(path, description, text, platforms, version)
     except FmuFileError:
         raise
@@ -191,13 +218,6 @@ def read_description(path: Path | str) -> FmuDescription:
             f"{path}: it is not an FMU for co-simulation ({' and '.join(kinds) or 'of no kind'} only), which this "
             "master needs; ask for that export",
             "no co-simulation",
-        )
-    if fmpy.platform not in platforms:
-        has = ", ".join(platforms) or "none"
-        raise UnsupportedFmuError(
-            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
-            f"ask its author for a {fmpy.platform} build",
-            "another platform",
         )
     return described
 

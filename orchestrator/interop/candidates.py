@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.prepare import catalogue_fmu
+from orchestrator.cases.catalogue_fmus import catalogue_fmu
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder

@@ -4,7 +4,7 @@ import fnmatch
 import math
 from cmath import phase
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous_model
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
+    HIGHEST_SWING_HZ,
     Mode,
     Spectrum,
     find_spectrum,
@@ -29,8 +30,13 @@ from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.master import Master, open_plan
+from orchestrator.errors import ComponentError
 from orchestrator.federation.federation import Federation
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.study.start_errors import start_error
+
+_LEADING = 3
+"""Of the states of an electromechanical mode: angle and speed of one machine, and the speed of another."""
 
 
 @dataclass(frozen=True)
@@ -129,9 +135,18 @@ def compute_modes(
 
 
 def running(prepared: PreparedScenario, federation: Federation | None = None) -> Master:
-    """The scenario's FMUs, initialised; those of a federation still in this process."""
+    """The scenario's FMUs, initialised; those of a federation still in this process.
+
+    Raises
+    ------
+    CaseError
+        If a component refuses to initialise, with its place.
+    """
     opener = open_plan if federation is None else federation.open
-    return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener)
+    try:
+        return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener)
+    except ComponentError as error:
+        raise start_error(prepared, error) or error from error
 
 
 def modes_of(
@@ -188,16 +203,18 @@ def modes_from(
     low, high = frequency_range
     if critical is None:
         # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
-        everything = find_spectrum(model, min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1]))
+        first, last = min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
+        everything = find_spectrum(model, first, max(last, HIGHEST_SWING_HZ))
         spectrum: Spectrum | None = everything
-        swinging = [mode for mode in everything.modes if mode.is_oscillation]
+        oscillating = [mode for mode in everything.modes if mode.is_oscillation]
+        swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
         shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
         candidates = named_modes(prepared.case, model, swinging)
         named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
     else:
         spectrum = whole_spectrum(model)
         swinging = shown = find_critical_modes(model, low, high, critical)
-        named = {}
+        named, oscillating = {}, []
     examined = examine(
         master, blocks, model, system, spectrum=spectrum, modes=swinging, shown=shown, frequency_range=frequency_range
     )
@@ -220,10 +237,25 @@ def modes_from(
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
         areas=areas_of(analysis.areas, prepared.system),
         stability=stability,
-        hidden=None if spectrum is None else hidden(spectrum.eigenvalues, low, high),
+        hidden=None
+        if spectrum is None
+        else replace(
+            hidden(spectrum.eigenvalues, low, high),
+            electromechanical=tuple(
+                mode.eigenvalue
+                for mode in oscillating
+                if not low <= mode.frequency_hz <= high and _is_swing(mode, analysis.swing)
+            ),
+        ),
         system=system,
         fit_errors={name: c.disagreement for name, c in blocks.components.items() if c.source == IDENTIFIED},
     )
+
+
+def _is_swing(mode: Mode, speeds: Sequence[str]) -> bool:
+    """Whether one of the states that show who swings against whom is among those that take part most."""
+    states = [state for state, _ in mode.participation[:_LEADING]]
+    return any(fnmatch.fnmatchcase(state, pattern) for state in states for pattern in speeds)
 
 
 def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:

@@ -1,0 +1,168 @@
+"""Newton's method for a power flow, in polar voltages, with a sparse Jacobian and a shortened step where a whole one
+goes too far.
+"""
+
+import warnings
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import MatrixRankWarning, spsolve
+
+from orchestrator.cases.flow_equations import FlowEquations
+
+CONVERGED = 1e-9
+"""Largest mismatch of a bus [pu, 100 MVA] of a solution."""
+
+_ITERATIONS = 30
+_HALVINGS = 8
+_POLISHING = 4
+"""Most iterations after convergence: with the mismatch in extended precision they end at the nearest double, so that
+the solution does not depend on where it was begun."""
+
+_LEAST_VOLTAGE = 0.01
+"""Magnitude [pu] below which no step goes."""
+
+
+@dataclass(frozen=True)
+class NewtonResult:
+    """What the iterations came to.
+
+    Attributes
+    ----------
+    voltages
+        Complex bus voltages [pu].
+    converged
+        Whether the mismatch is below `CONVERGED`.
+    history
+        Largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus.
+    """
+
+    voltages: NDArray[np.complex128]
+    converged: bool
+    history: tuple[tuple[float, str], ...]
+
+
+def solve(equations: FlowEquations) -> NewtonResult:
+    """Solve from the DC angles, or else from a flat start, or else step by step from a network without load and
+    generation; the first of these that converges.
+    """
+    first = _newton(equations, _start(equations, equations.dc_angles()))
+    if first.converged:
+        return first
+    flat = _newton(equations, _start(equations, np.zeros(len(equations.buses))))
+    if flat.converged:
+        return flat
+    share, grown = grow(equations)
+    if grown is not None and share == 1:
+        return grown
+    return min(first, flat, key=lambda result: result.history[-1][0])
+
+
+def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
+    """The largest share of all given powers, loads and units alike, with a solution that is reached from no power at
+    all, and this solution; (0, None) where there is none without power.
+    """
+    found = _newton(scaled(equations, 0.0), _start(equations, np.zeros(len(equations.buses))))
+    if not found.converged:
+        return 0.0, None
+    share, step = 0.0, 0.25
+    while step > 0.002 and share < 1:
+        wanted = min(1.0, share + step)
+        further = _newton(scaled(equations, wanted), found.voltages)
+        if further.converged:
+            share, found = wanted, further
+        else:
+            step /= 2
+    return share, found
+
+
+def scaled(equations: FlowEquations, share: float) -> FlowEquations:
+    """The same network with a share of all given powers."""
+    return replace(equations, fed=share * equations.fed)
+
+
+def _start(equations: FlowEquations, angles: NDArray[np.float64]) -> NDArray[np.complex128]:
+    usable = angles if np.isfinite(angles).all() else np.zeros(len(angles))
+    start: NDArray[np.complex128] = equations.magnitudes * np.exp(1j * usable)
+    return start
+
+
+def _newton(equations: FlowEquations, start: NDArray[np.complex128]) -> NewtonResult:
+    angle, magnitude = np.angle(start), np.abs(start)
+    mismatch = equations.mismatch(start)
+    history = [_largest(equations, mismatch)]
+    for _ in range(_ITERATIONS):
+        if history[-1][0] <= CONVERGED:
+            return _polished(equations, angle, magnitude, history)
+        step = _newton_step(equations, angle, magnitude, mismatch)
+        if step is None:
+            break
+        norm, length = np.linalg.norm(mismatch), 1.0
+        for _ in range(_HALVINGS):
+            trial = _moved(equations, angle, magnitude, length * step)
+            left = equations.mismatch(_voltages(*trial))
+            if np.isfinite(left).all() and trial[1].min() > _LEAST_VOLTAGE and np.linalg.norm(left) < norm:
+                break
+            length /= 2
+        else:
+            break
+        (angle, magnitude), mismatch = trial, left
+        history.append(_largest(equations, mismatch))
+    converged = history[-1][0] <= CONVERGED
+    if converged:
+        return _polished(equations, angle, magnitude, history)
+    return NewtonResult(_voltages(angle, magnitude), False, tuple((m, bus) for m, bus in history))
+
+
+def _polished(
+    equations: FlowEquations, angle: np.ndarray, magnitude: np.ndarray, history: list[tuple[float, str]]
+) -> NewtonResult:
+    """The solution as exact as it gets."""
+    angle, magnitude = angle.astype(np.longdouble), magnitude.astype(np.longdouble)
+    mismatch = equations.mismatch(_voltages(angle, magnitude))
+    for _ in range(_POLISHING):
+        step = _newton_step(equations, angle, magnitude, mismatch)
+        if step is None:
+            break
+        trial = _moved(equations, angle, magnitude, step)
+        left = equations.mismatch(_voltages(*trial))
+        if not np.abs(left).max(initial=0) < np.abs(mismatch).max(initial=0):
+            break
+        (angle, magnitude), mismatch = trial, left
+    voltages = _voltages(angle, magnitude).astype(np.complex128)
+    return NewtonResult(voltages, True, tuple(history))
+
+
+def _newton_step(
+    equations: FlowEquations, angle: np.ndarray, magnitude: np.ndarray, mismatch: np.ndarray
+) -> NDArray[np.float64] | None:
+    """Steps of the angles and the magnitudes; None where the Jacobian is singular."""
+    if not len(mismatch):
+        return None
+    jacobian = equations.jacobian(_voltages(angle, magnitude).astype(np.complex128))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MatrixRankWarning)
+        step: NDArray[np.float64] = np.atleast_1d(spsolve(jacobian, -mismatch.astype(np.float64)))
+    return step if np.isfinite(step).all() else None
+
+
+def _moved(
+    equations: FlowEquations, angle: np.ndarray, magnitude: np.ndarray, step: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    angle, magnitude, count = angle.copy(), magnitude.copy(), len(equations.angle_buses)
+    angle[equations.angle_buses] += step[:count]
+    magnitude[equations.free_buses] += step[count:]
+    return angle, magnitude
+
+
+def _voltages(angle: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
+    voltages: np.ndarray = magnitude * (np.cos(angle) + 1j * np.sin(angle))
+    return voltages
+
+
+def _largest(equations: FlowEquations, mismatch: np.ndarray) -> tuple[float, str]:
+    if not len(mismatch):
+        return 0.0, equations.buses[equations.slack]
+    bus, size = equations.worst(mismatch)
+    return size, bus

@@ -1,0 +1,29 @@
+"""What a component says that cannot start, in the words of the case: its place, its operating point, the remedy."""
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import CaseError, ComponentError, Problem
+
+_INITIALISATION = "InitializationMode"
+_PREFACE = "parameters cannot be used: "
+"""Begins what our models say of values that do not fit together."""
+
+
+def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError | None:
+    """The error of a component that refused to initialise; None for any other call."""
+    if _INITIALISATION not in error.call or error.component not in prepared.places:
+        return None
+    name, plan = error.component, prepared.system.components[error.component]
+    said = error.log.removeprefix(_PREFACE) or "the FMU says no more than that its initialisation failed"
+    given = {v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables}
+    text = f"scenario {prepared.name!r}: {name} cannot start: {said}"
+    if {"P_0", "Q_0", "S_n"} <= set(given):
+        computed = prepared.power_flow is not None and name in prepared.power_flow.powers
+        by = "the power flow asks it for" if computed else "it is to start at"
+        voltage = f" at v = {given['v_0']:.4g} pu" if "v_0" in given else ""
+        text += (
+            f"; {by} P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu of S_n = {given['S_n']:g} MVA{voltage}"
+        )
+        if computed:
+            rating = f"rating_mva of its unit ({prepared.places[name]})" if name in prepared.of_units else "its S_n"
+            text += f". Q_0 is a result and cannot be set: raise {rating}, or change the voltages or loads around it"
+    return CaseError(str(prepared.case.path), [Problem(prepared.places[name], text)])
