@@ -68,7 +68,13 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     pattern, _, variable = key.partition(".")
     fitting = fnmatch.filter(draft.tables, pattern) if variable else []
     having = [name for name in fitting if _has(draft, name, variable)]
-    for name in having if pattern not in draft.tables and having else fitting:
+    if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
+        if fitting and not having:
+            settable = {v for name in fitting for v in _settable(draft, name)}
+            hint = close_names(variable, settable, f"{', '.join(fitting[:5])} are what fits the pattern")
+            draft.note(where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}")
+        fitting = having
+    for name in fitting:
         _assign(draft, name, variable, value, where)
     _check_component(draft, pattern, where)
 
@@ -78,9 +84,16 @@ def _has(draft: Draft, name: str, variable: str) -> bool:
     return plan is not None and variable in plan.description.variables
 
 
+def _settable(draft: Draft, name: str) -> tuple[str, ...]:
+    description = draft.system.components[name].description
+    return (*description.parameters, *description.inputs)
+
+
 def _check_component(draft: Draft, pattern: str, where: str) -> None:
+    if draft.network_failed and draft.case.units is not None:
+        return  # the units may be what is missing
     if not fnmatch.filter(draft.known, pattern):
-        some = ", ".join([*draft.case.components][:12])
+        some = ", ".join([*draft.case.components, *draft.origins][:12])
         draft.note(where, f"there is no component {pattern!r}; the case has: {some}")
 
 
@@ -90,8 +103,9 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         return  # the component's own problem is noted already
     info = plan.description.variables.get(variable)
     if info is None:
-        settable = [*plan.description.parameters, *plan.description.inputs]
-        hint = close_names(variable, settable, f"`gfor info {plan.description.path}` lists them")
+        if draft.is_repeated(name, variable):
+            return
+        hint = close_names(variable, _settable(draft, name), f"`gfor info {plan.description.path}` lists them")
         draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
         return
     if info.causality not in ("parameter", "input"):

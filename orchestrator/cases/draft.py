@@ -92,6 +92,7 @@ class Draft:
     questions: list[Problem] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     whole: bool = True
+    _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str) -> None:
         """Add a problem, once.
@@ -111,6 +112,16 @@ class Draft:
         """Add a problem that leaves no network. Problems that follow from the missing network are then not noted."""
         self.network_failed = True
         self.note(place, text)
+
+    def is_repeated(self, name: str, variable: str) -> bool:
+        """Whether this variable was missed already at a unit of the same kind: all of them have it, or none."""
+        origin = self.origins.get(name)
+        if origin is None:
+            return False
+        missed = (origin.common, variable)
+        repeated = missed in self._missed
+        self._missed.add(missed)
+        return repeated
 
     def place_of_component(self, name: str) -> str:
         """Place of a component: its table, or the row of its unit."""

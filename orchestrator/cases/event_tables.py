@@ -102,6 +102,8 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
     """What a table stands for; its values are still as the file has them. Nothing for a component that is removed."""
     if isinstance(table, ReferenceChangeTable | ParameterChangeTable):
         component = table.component
+    elif table.component is None and draft.network_failed:
+        return []
     elif table.component is None and draft.grid is None:
         draft.note(where, "the key 'component' is missing; name the grid here, or in a [power_flow] table")
         return []
@@ -182,7 +184,7 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
     for component, settings in event.changes().items():
         plan = draft.system.components.get(component)
         if plan is None:
-            if component not in draft.tables:
+            if component not in draft.tables and not (draft.network_failed and component == draft.grid):
                 names = ", ".join(draft.tables)
                 draft.note(where, f"there is no component {component!r}; the case has: {names}")
             return None

@@ -164,14 +164,14 @@ def _check_frequencies(draft: Draft) -> None:
     """Check that coupled components have one rated frequency: frames of two frequencies turn against each other."""
     rated = {name: f for name, plan in draft.system.components.items() if (f := _frequency(plan)) is not None}
     for group in _coupled(draft):
-        known = {name: rated[name] for name in group if name in rated}
+        known = {name: f for name, f in rated.items() if name in group}
         if len(set(known.values())) < 2:
             continue
         grid = draft.grid if draft.grid in known else None
         common = known[grid] if grid else max(set(known.values()), key=list(known.values()).count)
         reference = grid or next(name for name, f in known.items() if f == common)
         for name, f in known.items():
-            if f != common:
+            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.problems):
                 draft.note(
                     _frequency_place(draft, name),
                     f"{name} is rated at {f:g} Hz and {reference} at {common:g} Hz; what is coupled has one rated "

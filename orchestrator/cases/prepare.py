@@ -32,7 +32,7 @@ from orchestrator.cases.schema import (
     ShuntTripTable,
     Value,
 )
-from orchestrator.cases.start_values import start_from_power_flow
+from orchestrator.cases.start_values import RESULTS, start_from_power_flow
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
 from orchestrator.coupling.clock import Clock
@@ -248,14 +248,28 @@ class Preparer:
         """The network behind the grid component: the model's own, or the file's table."""
         draft = self.draft
         if draft.grid is None:
+            self._check_buses_have_a_grid()
             return
         grid = draft.tables.get(draft.grid)
         if grid is None:
-            draft.note(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}")
+            hint = close_names(draft.grid, draft.tables, f"the case has: {', '.join([*draft.tables][:12])}")
+            draft.note_network(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}")
         elif _takes_network(grid):
             draft.network = self._network_from_table(grid)
         elif grid.model in model_names():
             draft.network = _with_switches(network_of(grid.model or ""), draft.case)
+
+    def _check_buses_have_a_grid(self) -> None:
+        """Name the first of the components at a bus; what is said of it holds for all."""
+        for name, table in self.draft.tables.items():
+            if table.bus is not None:
+                place = "units" if name in self.draft.origins else "components"
+                where = self.draft.place(place) if place == "units" else self.draft.place(place, name, "bus")
+                self.draft.note_network(
+                    where,
+                    "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
+                )
+                return
 
     def _network_from_table(self, grid: ComponentTable) -> Network | None:
         draft, data = self.draft, self.draft.data
@@ -305,7 +319,17 @@ class Preparer:
         except (InputError, ValueError) as error:  # ValueError: the model does not fit the network
             self.draft.note(where, str(error))
         except KeyError as error:
-            self.draft.note(self.draft.place("components", name, "model"), str(error.args[0]))
+            self._note_model(name, table.model or "", str(error.args[0]))
+
+    def _note_model(self, name: str, model: str, text: str) -> None:
+        """A model that is not there, once for all units that are to be of it."""
+        hint = close_names(model, model_names())
+        text = f"there is no model {model!r}; {hint}" if hint and model not in model_names() else text
+        origin = self.draft.origins.get(name)
+        if origin is None:
+            self.draft.note(self.draft.place("components", name, "model"), text)
+        else:
+            self.draft.note_network(self.draft.place("units", origin.common.removesuffix("_parameters")), text)
 
     def _is_native(self, name: str, table: ComponentTable) -> bool:
         """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
@@ -393,6 +417,12 @@ class Preparer:
                 draft.place("power_flow", "slack"),
                 f"{wanted!r} is neither a unit of this scenario nor a bus with one; units: {known}",
             )
+            return None
+        for name, variable in ((n, v) for n in units for v in RESULTS if v in draft.system.components[n].parameters):
+            place = draft.places.get(f"{name}.{variable}", draft.place_of_component(name))
+            draft.note(place, f"{name}: {variable} cannot be set, because the power flow computes it; remove it, and "
+                       "set P_0 and v_0")  # fmt: skip
+        if draft.problems:
             return None
         try:
             flow = start_from_power_flow(

@@ -73,7 +73,7 @@ class PowerFlowTable(Table):
 
     grid: str
     slack: str | None = None
-    reactive_limits: bool | None = None
+    reactive_limits: Annotated[bool | None, Field(strict=True)] = None
 
 
 class LineTable(Table):

@@ -13,7 +13,8 @@ from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
 
-_RESULTS = ("Q_0", "theta_0")
+RESULTS = ("Q_0", "theta_0")
+"""What the power flow computes of a unit, so that it cannot be set."""
 
 
 def start_from_power_flow(
@@ -52,16 +53,9 @@ def start_from_power_flow(
     Raises
     ------
     InputError
-        If a value is set that the power flow computes, no solution is found, or a unit cannot feed the power of the
+        If no solution is found, or a unit cannot feed the power of the
         solution.
     """
-    for name in units:
-        given = [v for v in _RESULTS if v in system.components[name].parameters]
-        if given:
-            raise InputError(
-                f"{name}: {' and '.join(given)} cannot be set, because the power flow computes it; "
-                "remove it, and set P_0 and v_0"
-            )
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
     flow = solve_power_flow(
         (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),

@@ -20,6 +20,9 @@ from orchestrator.errors import InputError
 UNIT_KINDS = ("sg", "gfor")
 """First parts of the names of a unit's generator and converter."""
 
+_MOST_VOLTAGE = 2.0
+"""Largest voltage [pu] that a unit can hold."""
+
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
@@ -81,6 +84,13 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
+    for row in rows:
+        if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
+            hint = close_names(row.bus, draft.data.buses, f"there are: {', '.join(draft.data.buses[:8])}")
+            draft.note_network(
+                row.place or draft.place("units"),
+                f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}",
+            )
     alphas = _alphas(draft, table, rows)
     models = (
         (table.generator, "generator_parameters", table.generator_parameters),
@@ -182,9 +192,10 @@ def _checked(row: UnitRow, place: str) -> UnitRow:
             f"{place}: the unit at bus {row.label} has q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = "
             f"{row.q_max_mvar:g}; swap them"
         )
-    if not row.v_pu > 0:
+    if not 0 < row.v_pu <= _MOST_VOLTAGE:
         raise InputError(
-            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it must exceed 0, and is near 1"
+            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it is in pu of the nominal voltage, and "
+            f"must lie between 0 and {_MOST_VOLTAGE:g}"
         )
     return row
 

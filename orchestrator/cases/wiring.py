@@ -24,7 +24,7 @@ def check_inputs(draft: Draft) -> None:
                 f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other",
             )
     for endpoint in draft.system.unconnected_inputs():
-        if draft.network_failed and draft.tables[endpoint.component].bus is not None:
+        if draft.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
             continue
         draft.note(
             draft.place("components", endpoint.component),

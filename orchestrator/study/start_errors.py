@@ -13,7 +13,10 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError 
     if _INITIALISATION not in error.call or error.component not in prepared.places:
         return None
     name, plan = error.component, prepared.system.components[error.component]
-    said = error.log.removeprefix(_PREFACE) or "the FMU says no more than that its initialisation failed"
+    said = (
+        error.log.removeprefix(f"{name}: ").removeprefix(_PREFACE)
+        or "the FMU says no more than that its initialisation failed"
+    )
     given = {v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables}
     text = f"scenario {prepared.name!r}: {name} cannot start: {said}"
     if {"P_0", "Q_0", "S_n"} <= set(given):
