@@ -7,7 +7,7 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.flow_newton import NewtonResult, grow, solve
+from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve
 
 _SHARES = (0.9, 0.75, 0.5, 0.25, 0.0)
 """Parts of the stray capacitance that are tried."""
@@ -32,9 +32,13 @@ def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]
     left_out = [] if len(told) <= _SHOWN else ["…"]
     shown = ", ".join(told[: _SHOWN - 1] + left_out + told[-1:] if left_out else told)
+    ends = f"{mismatch * SYSTEM_BASE_MVA:.3g} MW or Mvar unbalanced at bus {bus!r}"
+    if mismatch <= CONVERGED:
+        lowest = int(np.argmin(np.abs(failed.voltages)))
+        ends = f"collapsed voltages, {abs(failed.voltages[lowest]):.3g} pu at bus {equations.buses[lowest]!r}"
     return (
-        f"power flow: no solution found. The iterations end with {mismatch * SYSTEM_BASE_MVA:.3g} MW or Mvar "
-        f"unbalanced at bus {bus!r} (largest mismatch by iteration: {shown}). {_helps(equations, with_stray)}"
+        f"power flow: no solution found. The iterations end with {ends} "
+        f"(largest mismatch by iteration: {shown}). {_helps(equations, with_stray)}"
         f"{widest_angle(equations)}"
     )
 

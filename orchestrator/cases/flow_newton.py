@@ -20,6 +20,10 @@ _POLISHING = 4
 """Most iterations after convergence: with the mismatch in extended precision they end at the nearest double, so that
 the solution does not depend on where it was begun."""
 
+LOWEST_VOLTAGE = 0.5
+"""Magnitude [pu] of the lowest voltage of a solution. The equations have others, with collapsed voltages, at which no
+network is run: at the end of one line from a source of 1 pu the usual solution is never below 0.5 pu."""
+
 _LEAST_VOLTAGE = 0.01
 """Magnitude [pu] below which no step goes."""
 
@@ -33,7 +37,7 @@ class NewtonResult:
     voltages
         Complex bus voltages [pu].
     converged
-        Whether the mismatch is below `CONVERGED`.
+        Whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`.
     history
         Largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus.
     """
@@ -131,7 +135,7 @@ def _polished(
             break
         (angle, magnitude), mismatch = trial, left
     voltages = _voltages(angle, magnitude).astype(np.complex128)
-    return NewtonResult(voltages, True, tuple(history))
+    return NewtonResult(voltages, bool(np.abs(voltages).min() >= LOWEST_VOLTAGE), tuple(history))
 
 
 def _newton_step(

@@ -9,7 +9,7 @@ import scipy.linalg
 from orchestrator.analysis import stability
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import find_modes, oscillations
-from orchestrator.analysis.stability import Cause, hidden, judge
+from orchestrator.analysis.stability import Cause, Hidden, hidden, judge
 
 STEP = 1e-4
 PLANTED = {0.01: 0.002, 3.0: 0.5, 37.0: 104.0, 900.0: 0.3, 4_999.0: 20.0, 7_300.0: 11.0}
@@ -148,3 +148,12 @@ def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
     assert "2 eigenvalues are zero" in verdict.sentence()
     assert judge(model(split, STEP)).stable is False  # nothing says that it is an error
     assert judge(model(np.diag([0.06, -1.0, -1.0]), STEP), system=model(exact)).stable is False
+
+
+def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_that_shows_them():
+    swings = (complex(-1.6, 2 * np.pi * 2.098), complex(-0.2, 2 * np.pi * 0.052))
+    found = Hidden((0.1, 2.0), 7, complex(-1.0, 500.0), swings)
+    assert found.sentence().endswith(
+        "; electromechanical: 2.098 Hz, 12.05 %; 0.052 Hz, 52.22 %: show them by --range 0.052:2.1"
+    )
+    assert [m["frequency_hz"] for m in found.as_json()["electromechanical"]] == pytest.approx([2.098, 0.052])

@@ -8,7 +8,8 @@ import pytest
 from orchestrator.cases import network_import
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.flow_newton import solve
+from orchestrator.cases.flow_failure import explain
+from orchestrator.cases.flow_newton import _newton, solve
 from orchestrator.cases.network_sources import _pandapower_tables
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
 from orchestrator.errors import InputError
@@ -128,3 +129,17 @@ def test_stray_capacitance_behind_a_large_reactance_is_named():
     assert abs(flow(0.0).voltages["b"]) < 1
     with pytest.raises(InputError, match=r"It has a solution with 75% of stray_B: .*lower stray_B"):
         flow(0.5)
+
+
+def test_a_collapsed_voltage_is_no_solution():
+    """With P below the limit of a line the equations have two solutions; the lower one is not taken for the state."""
+    P, X = 0.5, 0.2
+    buses, line = ["a", "b"], FlowLine("l", "a", "b", 0.0, X, 0.0)
+    equations = FlowEquations.of(buses, [line], [FlowLoad("b", 100 * P, 0.0)], [], {"a": 0.0}, {"a": 1.0}, "a")
+    low = np.sqrt((1 - np.sqrt(1 - 4 * X**2 * P**2)) / 2)
+    start = np.array([1.0, low * np.exp(-1j * np.arcsin(P * X / low))])
+    result = _newton(equations, start)
+    assert result.history[-1][0] < 1e-9
+    assert abs(result.voltages[1]) == pytest.approx(low, abs=1e-9)
+    assert not result.converged
+    assert "collapsed voltages, 0.101 pu at bus 'b'" in explain(equations, result, None)
