@@ -149,9 +149,8 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
         limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
         numbers = {**figures, **limits}
-        unit = UnitRow(
-            entry["bus"], bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=_parts_in(entry)
-        )  # type: ignore[arg-type]
+        parts = _parts_in(entry)
+        unit = UnitRow(entry["bus"], bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(_checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:
@@ -166,7 +165,10 @@ def _known_rows(path: Path) -> list[Row]:
     for column in rows[0] if rows else ():
         kind = column.partition(".")[0]
         if column not in (*known, *_REMARKS, PLACE) and not ("." in column and kind in UNIT_KINDS):
-            hint = close_names(column, known, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter")
+            similar = [] if "." in column else known
+            hint = close_names(
+                column, similar, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter"
+            )
             raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
     return rows
 
