@@ -200,6 +200,7 @@ def test_the_units_of_a_table_are_questioned_together_with_their_place(tmp_path)
 name = "units"
 [power_flow]
 grid = "grid"
+reactive_limits = false
 [components.grid]
 model = "grid"
 [network]
@@ -216,7 +217,7 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     (prepared,) = load_case(tmp_path / "case.toml").prepare()
     common, own = sorted(map(str, prepared.questions), key=lambda text: "machine.H" in text)
-    assert re.match(r"line 13, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
+    assert re.match(r"line 14, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
     assert re.match(r".*units.csv, line 5, sg33.machine.H: sg33: machine.H = 6500 s", own)
 
 
