@@ -51,7 +51,9 @@ def of_pandapower(name, **options):
 def test_voltages_are_pandapowers(name):
     elements, voltages = of_pandapower(name)
     flow = solve_power_flow(*elements)
-    assert max(abs(flow.voltages[bus] - v) for bus, v in voltages.items()) < 1e-9
+    # a branch of negative reactance is merged with its star point, which is no bus then
+    assert len(flow.voltages) >= len(voltages) - 1
+    assert max(abs(v - voltages[bus]) for bus, v in flow.voltages.items()) < 1e-9
     assert flow.residual < 1e-10
 
 
