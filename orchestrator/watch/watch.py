@@ -20,7 +20,7 @@ from orchestrator.watch.response import enough_looks, resting_signals, unsettled
 from orchestrator.watch.run_away import run_away, speed_signals
 from orchestrator.watch.seen import Seen, Watcher, look_every
 from orchestrator.watch.settings import Settings
-from orchestrator.watch.short_stretches import is_short, too_short
+from orchestrator.watch.short_stretches import is_short, still_departing, too_short
 from orchestrator.watch.stretches import Stretch, stretches
 from orchestrator.watch.synchronism import angle_signals, lost_synchronism
 from orchestrator.watch.undisturbed import undisturbed_motion
@@ -123,7 +123,7 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
         responses.short.append(parts[-1])
     found = [*found, *told, *not_judged(responses.masked)]
     if whole and not any(finding.kind in UNSTABLE for finding in found):
-        found += too_short(responses.short)
+        found += too_short(responses.short) or still_departing(seen, system, responses.clear)
     return found
 
 
@@ -136,18 +136,25 @@ class _Responses:
         The stretches whose motion may come from noise, with its sources.
     short
         The stretches whose motion may decay after they end.
+    clear
+        The stretches without a finding and without noise.
     """
 
     def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
         self.short: list[Stretch] = []
+        self.clear: list[Stretch] = []
 
     def found(self, part: Stretch) -> list[Finding]:
         """Findings in a stretch as a whole, or, if it shows no findings, between its unnoticed events."""
         pieces = list(part.parts())
-        whole = self._one(part, told=len(pieces) == 1)
-        return whole or [f for piece in pieces for f in self._one(piece)] if part.breaks else whole
+        told = self._one(part, told=len(pieces) == 1)
+        if part.breaks and not told:
+            told = [f for piece in pieces for f in self._one(piece)]
+        if not told and not among(self._disturbances, part):
+            self.clear.append(part)
+        return told
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)

@@ -74,3 +74,33 @@ def test_a_trip_half_a_second_before_the_end(tmp_path):
     assert [f.kind for f in result.findings] == ["not_judged"]
     assert not result.went_unstable
     assert summary_of(result)["stable_in_simulation"] is None
+
+
+# -- growth that shows no two periods ------------------------------------------------------------------
+
+
+def grows(rate, angular):
+    return lambda t: 0.05 * np.expm1(rate * t) * np.cos(angular * t)
+
+
+@pytest.mark.parametrize(("rate", "angular", "lasts"), [(5.0, 1.0, 2.5), (1.5, 3.0, 3.0), (1.0, 0.0, 4.0)])
+def test_growth_of_less_than_two_periods_is_not_judged_and_not_healthy(rate, angular, lasts):
+    (finding,) = found(STOP - lasts, grows(rate, angular))
+    assert (finding.kind, finding.component, finding.variable, finding.until) == ("not_judged", "a", "y", None)
+    assert "a.y moves more than before" in finding.message
+
+
+def test_growth_that_an_event_ends_is_not_healthy():
+    events = [ParameterChange(t, "a", "offset", t) for t in (8.0, 9.8)]
+    y = lambda t: 0.9 + np.where(t > 9.8, 0.0, (t > 8) * grows(5.0, 6.0)(np.maximum(t - 8, 0)))  # noqa: E731
+    (finding,) = judged(seen_of({"a.y": y}, STOP), system("a"), events)
+    assert (finding.kind, finding.time, finding.until) == ("not_judged", 8.0, 9.8)
+
+
+@pytest.mark.parametrize("course", [
+    lambda t: 0.05 * np.exp(-0.3 * t) * np.cos(3.6 * t), lambda t: 0.05 * -np.expm1(-t / 7), lambda t: 0.01 * t,
+    lambda t: 0.05 * -np.expm1(-t / 1.0) * np.exp(-t / 9),
+])  # fmt: skip
+@pytest.mark.parametrize("lasts", [3.0, 5.0, 10.0])
+def test_what_settles_or_runs_steadily_departs_from_nothing(course, lasts):
+    assert found(STOP - lasts, course) == []
