@@ -22,6 +22,7 @@ _HOMES = {
     "built_in_cases": "api.case",
     "check": "api.acceptance",
     "compare": "api.comparison",
+    "export_comtrade": "api.comtrade",
     "identify": "api.identification",
     "info": "api.fmu",
     "load": "api.case",

@@ -3,6 +3,7 @@ from orchestrator.api.case import Case as Case
 from orchestrator.api.case import built_in_cases as built_in_cases
 from orchestrator.api.case import load as load
 from orchestrator.api.comparison import compare as compare
+from orchestrator.api.comtrade import export_comtrade as export_comtrade
 from orchestrator.api.fmu import info as info
 from orchestrator.api.fmu import open_fmu as open_fmu
 from orchestrator.api.identification import identify as identify

@@ -236,6 +236,7 @@ ON_THE_FACE = {
     "check": {"api.acceptance.check"},
     "compare": {"api.comparison.compare"},
     "design": {"api.design.design_controller"},
+    "export_comtrade": {"api.comtrade.export_comtrade"},
     "identify": {"api.identification.identify"},
     "info": {"api.fmu.info"},
     "linearize": {"cli.case_arguments.chosen"},

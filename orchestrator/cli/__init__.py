@@ -20,6 +20,7 @@ COMMANDS = {
     "modes": "steady state and eigenvalues of a case's scenarios",
     "linearize": "write a scenario's linear model A, B, C, D for other tools",
     "export-ssp": "write a case's scenarios as SSP archives for other tools",
+    "export-comtrade": "write a run's signals as a COMTRADE recording for other tools",
     "sweep": "modes over a grid of parameters, followed from point to point",
     "compare": "two recorded runs: differences, and what each rings with",
     "identify": "the modes in a recorded signal (matrix pencil)",
@@ -49,6 +50,7 @@ examples:
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
+  gfor identify recorder.cfg "F NORTH" --start 12     the modes in a measured recording
   gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
   gfor run two_area --engine helics --federate gfor   the converter in a process of its own, over HELICS
   gfor federate two_area --component gfor --broker tcp://host:23405

@@ -15,7 +15,8 @@ from orchestrator.report.tables import PlainTable
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor compare``."""
-    parser.add_argument("first", type=Path, metavar="A", help="folder of a scenario's results, or its trajectory.nc")
+    parser.add_argument("first", type=Path, metavar="A",
+                        help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
     parser.add_argument("--signal", action="append", metavar="SIGNAL",
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip

@@ -14,7 +14,8 @@ from orchestrator.report.tables import PlainTable
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor identify``."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a scenario's results, or its trajectory.nc")
+    parser.add_argument("run", type=Path, metavar="RUN",
+                        help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
     parser.add_argument(
         "--start", type=seconds_or_none, default=2.0, metavar="T", help="beginning of the free response [s] (2)"

@@ -15,16 +15,22 @@ _AT_ONCE = 1_000_000
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     """``"a.b"`` or ``"a.b - c.d"`` from a recorded dataset; None if a variable was not recorded.
 
+    The name of a measured channel may hold `` - `` itself.
+
     Raises
     ------
     InputError
         If the expression has another form.
     """
-    names = variables_of(expression)
-    if any(name not in dataset for name in names):
-        return None
-    first = dataset[names[0]]
-    return first if len(names) == 1 else first - dataset[names[1]]
+    if expression in dataset:
+        return dataset[expression]
+    parts = expression.split(" - ")
+    for k in range(1, len(parts)):
+        first, second = " - ".join(parts[:k]), " - ".join(parts[k:])
+        if first.strip() in dataset and second.strip() in dataset:
+            return dataset[first.strip()] - dataset[second.strip()]
+    variables_of(expression)
+    return None
 
 
 def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.DataArray | None:

@@ -10,6 +10,7 @@ import xarray as xr
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
+from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
 from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
 from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
@@ -17,6 +18,7 @@ from orchestrator.results.signals import signal
 from orchestrator.results.staging import unfinished
 from orchestrator.safe_files import PARTIAL
 from orchestrator.study.common_times import common_times
+from orchestrator.study.measured import is_measured, measured_modes
 
 _WEAKEST = 1e-3
 
@@ -50,6 +52,8 @@ class Comparison:
 def open_trajectory(path: Path) -> xr.Dataset:
     """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
 
+    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE.
+
     Warns
     -----
     ResultsWarning
@@ -60,6 +64,8 @@ def open_trajectory(path: Path) -> xr.Dataset:
     InputError
         If there is none, or it is not as its run wrote it.
     """
+    if is_comtrade(path):
+        return read_comtrade(path)
     if parts_of(path / FOLDER):
         dataset = open_recording(path / FOLDER)
         if not dataset.sizes["time"]:
@@ -133,6 +139,9 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
     What has less than a thousandth of the strongest's amplitude is left out.
     """
     window = curve.sel(time=slice(start, stop))
+    if is_measured(window):
+        found = measured_modes(window)
+        return [m for m in found if m.amplitude >= _WEAKEST * found[0].amplitude]
     # Oscillations are small beside the value that they are around, and would count as noise beside it.
     found = identify_modes(window["time"].values, window.values - float(window.mean()))
     return [m for m in found if m.amplitude >= _WEAKEST * found[0].amplitude]
@@ -162,6 +171,12 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
         require_numbers(curve, expression, label)
     common = common_times(first["time"].values, second["time"].values, labels)
     y_1, y_2 = (common.values(run, curve.values) for run, curve in enumerate((first, second)))
+    for label, values in zip(labels, (y_1, y_2), strict=True):
+        if not np.isfinite(values).all():
+            raise InputError(
+                f"{label}: {expression!r} has samples that are missing, the first at t = "
+                f"{common.times[int((~np.isfinite(values)).argmax())]:g} s; compare a part without them"
+            )
     difference = y_2 - y_1
     worst = int(np.argmax(np.abs(difference)))
     return Comparison(

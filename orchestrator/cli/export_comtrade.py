@@ -1,0 +1,27 @@
+"""``gfor export-comtrade``: recorded signals as a COMTRADE recording for other tools."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.api.comtrade import export_comtrade
+from orchestrator.cli.arguments import positive
+from orchestrator.cli.terminal import saying_warnings
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor export-comtrade``."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a scenario's results, or its trajectory.nc")
+    parser.add_argument("--signal", action="append", metavar="SIGNAL", help="'a.b' or 'a.b - c.d' (repeatable; all)")
+    parser.add_argument("--out", type=Path, metavar="FILE.cfg", help="the recording (default: <RUN>/trajectory.cfg)")
+    parser.add_argument("--form", default="BINARY32", type=str.upper, metavar="FORM",
+                        help="ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)")  # fmt: skip
+    parser.add_argument("--frequency", type=positive, metavar="HZ", help="rated frequency [Hz] (the run's)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the recording and print the paths of its files."""
+    with saying_warnings():
+        files = export_comtrade(options.run, options.signal or (), options.out, options.form, options.frequency)
+    for file in files:
+        print(file)
+    return 0

@@ -1,0 +1,169 @@
+"""A COMTRADE recording as a dataset over the time, such as a run gives."""
+
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.arrays import Numbers
+from orchestrator.errors import InputError
+from orchestrator.results.comtrade.configuration import Configuration, read_configuration
+from orchestrator.results.comtrade.samples import read_samples
+from orchestrator.results.manifest import ResultsWarning
+
+SUFFIXES = (".cfg", ".cff", ".dat")
+"""Files by which a recording is named, in small letters."""
+
+LINE_FREQUENCY = "line_frequency_hz"
+"""Coordinate of a recording's signals: frequency of the line [Hz], 0 where the file leaves it open."""
+
+MOST_BYTES = 2_000_000_000
+"""Of a file of samples: an hour of forty channels at 5 kHz."""
+
+_MOST_TEXT = 20_000_000
+_SECTION = re.compile(rb"^--- *file type: *(\w+)(?: +(\w+))?(?: *: *(\d+))? *---\s*?\r?$", re.IGNORECASE | re.MULTILINE)
+_TIMES_DIFFER = 0.01
+"""Part of the whole time by which time stamps may differ from the sampling rates before it is said."""
+
+
+def is_comtrade(path: Path) -> bool:
+    """Whether a path names a COMTRADE recording."""
+    return path.suffix.lower() in SUFFIXES
+
+
+def read_comtrade(path: Path) -> xr.Dataset:
+    """Read a recording.
+
+    Parameters
+    ----------
+    path
+        ``.cfg`` (or ``.dat``) with the other file beside it, or ``.cff``.
+
+    Returns
+    -------
+    Dataset
+        Channels by name over the time since the first sample [s], in the file's units, referred to the primary side;
+        missing samples are NaN.
+
+    Warns
+    -----
+    ResultsWarning
+        If time stamps contradict the sampling rates, or a channel's skew exceeds a tenth of a sample.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, too large, or not as the standard says.
+    """
+    text, content, places = _joint(path) if path.suffix.lower() == ".cff" else _apart(path)
+    configuration = read_configuration(text, places[0])
+    stamps, values = read_samples(content, configuration, places[1])
+    times = _times(configuration, stamps, places[1])
+    _warn_of_skew(configuration, times)
+    channels = (*configuration.analog, *configuration.status)
+    data = {
+        channel.name: ("time", np.ascontiguousarray(values[:, k]), {"units": channel.unit, "long_name": channel.name})
+        for k, channel in enumerate(channels)
+    }
+    attributes = {
+        "scenario": str(path),
+        "station": configuration.station,
+        "device": configuration.device,
+        "comtrade_revision": configuration.revision,
+        "first_sample": configuration.start,
+        "trigger": configuration.trigger,
+        "referred_to_primary": ", ".join(channel.name for channel in channels if channel.secondary),
+    }
+    coordinates = {"time": ("time", times, {"units": "s"}), LINE_FREQUENCY: configuration.frequency}
+    return xr.Dataset(data, coords=coordinates, attrs=attributes)
+
+
+def _apart(path: Path) -> tuple[str, bytes, tuple[str, str]]:
+    """Text of the configuration, samples, and the two paths."""
+    found = []
+    for suffix in (".cfg", ".dat"):
+        same = [p for p in path.parent.glob(f"{_escaped(path.stem)}.*") if p.suffix.lower() == suffix]
+        if not same:
+            missing = path.with_suffix(suffix)
+            raise InputError(f"{missing}: there is no such file; a recording needs both its .cfg and its .dat")
+        found.append(path if path in same else same[0])
+    configuration, samples = found
+    text = _content(configuration, _MOST_TEXT)
+    return _decoded(text), _content(samples, MOST_BYTES), (str(configuration), str(samples))
+
+
+def _joint(path: Path) -> tuple[str, bytes, tuple[str, str]]:
+    """The same from a ``.cff``, which holds all files of a recording."""
+    content = _content(path, MOST_BYTES)
+    sections: dict[str, bytes] = {}
+    position = 0
+    while heading := _SECTION.search(content, position):
+        kind, begin = heading[1].decode().upper(), heading.end() + 1
+        if kind == "DAT" and heading[3]:  # binary: a heading's text could stand among the samples
+            position = begin + int(heading[3])
+            if position > len(content):
+                raise InputError(f"{path}: its samples have fewer bytes than the {int(heading[3])} that it names")
+        else:
+            following = _SECTION.search(content, begin)
+            position = following.start() if following else len(content)
+        sections[kind] = content[begin:position]
+    missing = [kind for kind in ("CFG", "DAT") if kind not in sections]
+    if missing:
+        raise InputError(f"{path}: it has no part '--- file type: {missing[0]} ---', so it is no recording in one file")
+    return _decoded(sections["CFG"]), sections["DAT"], (f"{path} (CFG)", f"{path} (DAT)")
+
+
+def _content(path: Path, most: int) -> bytes:
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the .cfg or .cff of a COMTRADE recording")
+    if (size := path.stat().st_size) > most:
+        raise InputError(f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts")
+    return path.read_bytes()
+
+
+def _escaped(name: str) -> str:
+    return re.sub(r"([*?\[])", r"[\1]", name)
+
+
+def _decoded(content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _times(configuration: Configuration, stamps: Numbers, place: str) -> Numbers:
+    """Times since the first sample [s]: from the sampling rates, or from time stamps where there are none."""
+    if configuration.rates[0][0] == 0:
+        rising = np.diff(stamps) > 0
+        if not np.isfinite(stamps).all() or not rising.all():
+            wrong = int(np.flatnonzero(~rising)[0]) + 2 if not rising.all() else 1
+            raise InputError(
+                f"{place}: the recording has no sampling rate, and the time stamp of sample {wrong} is missing or not "
+                "later than the one before; write the sampling rate into the .cfg"
+            )
+        return np.asarray(stamps - stamps[0], dtype=float)
+    lengths, last = [], 0
+    for rate, end in configuration.rates:
+        lengths.append(np.full(end - last, 1 / rate))
+        last = end
+    steps = np.concatenate(lengths)
+    times = np.concatenate([[0.0], np.cumsum(steps[1:])]) if len(configuration.rates) > 1 else np.arange(last) * steps
+    known = np.isfinite(stamps)
+    if known.all() and len(stamps) > 1 and stamps[-1] > stamps[0]:
+        stamped = stamps[-1] - stamps[0]
+        if abs(stamped - times[-1]) > _TIMES_DIFFER * times[-1]:
+            text = f"{place}: time stamps span {stamped:.6g} s, the sampling rates {times[-1]:.6g} s; the rates count"
+            warnings.warn(text, ResultsWarning, stacklevel=3)
+    return np.asarray(times, dtype=float)
+
+
+def _warn_of_skew(configuration: Configuration, times: Numbers) -> None:
+    interval = float(np.diff(times).min()) if len(times) > 1 else np.inf
+    late = [c for c in configuration.analog if abs(c.skew) > 0.1 * interval]
+    if late:
+        shown = ", ".join(f"{c.name} ({c.skew:.3g} s)" for c in late[:5])
+        text = f"{configuration.place}: samples are skewed by more than a tenth of a sample: {shown}; the times "
+        warnings.warn(f"{text}of all channels are taken as equal", ResultsWarning, stacklevel=3)

@@ -1,0 +1,135 @@
+"""Measured recordings, made ready for the identification of modes: what they cannot show is refused."""
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
+from orchestrator.arrays import Numbers
+from orchestrator.errors import AnalysisError
+from orchestrator.results.comtrade.reading import LINE_FREQUENCY
+
+_UNEVEN = 0.01
+"""Part of the interval by which samples may be off."""
+
+_WAVEFORM = 0.5
+"""Part of a signal's power near the line's frequency from which it is an instantaneous value of the grid."""
+
+_NEAR = 0.15
+_LEAST_NOISE = 1e-5
+"""Singular values below this part of the largest are noise: the resolution of 16 bits."""
+
+
+def is_measured(curve: xr.DataArray) -> bool:
+    """Whether a signal is of a COMTRADE recording."""
+    return LINE_FREQUENCY in curve.coords
+
+
+def measured_modes(window: xr.DataArray) -> list[IdentifiedMode]:
+    """The modes of a measured signal.
+
+    Where samples are dense they are averaged before they are thinned out, so that a faster oscillation does not appear
+    as a slower one. An average over equal times leaves the eigenvalues of a free response as they are.
+
+    Parameters
+    ----------
+    window
+        The part of the signal that is a free response.
+
+    Raises
+    ------
+    AnalysisError
+        If samples are missing or uneven, or the signal is an instantaneous voltage or current.
+    """
+    times, values = window["time"].values, np.asarray(window.values, dtype=float)
+    _check(times, values, float(window.coords[LINE_FREQUENCY]))
+    deviation = values - float(values.mean())
+    thin = round(interval_used(times) / _interval(times))
+    half = 2 * thin
+    if thin <= 1 or len(values) <= 2 * half + 1:
+        return identify_modes(times, deviation, tolerance=_noise(deviation[::thin]))
+    weights = np.asarray(np.hanning(2 * half + 3)[1:-1], dtype=float)
+    weights = weights / weights.sum()
+    smooth = np.convolve(deviation, weights, mode="valid")[::thin]
+    found = identify_modes(times[half : len(times) - half : thin], smooth, tolerance=_noise(smooth))
+    lags: Numbers = np.asarray((np.arange(len(weights)) - half) * _interval(times), dtype=np.float64)
+    passed = [
+        IdentifiedMode(m.eigenvalue, m.amplitude / _gain(m.eigenvalue, weights, lags, half * _interval(times)))
+        for m in found
+    ]
+    return sorted(passed, key=lambda m: -m.amplitude)
+
+
+def _noise(values: Numbers) -> float:
+    """Singular values of the signal's Hankel matrix that are noise, as a part of the largest: those below 2.2 times the
+    median, for a matrix with half as many columns as rows.
+
+    Gavish and Donoho, "The optimal hard threshold for singular values is 4/sqrt(3)", IEEE Trans. Information Theory
+    60(8), 2014, equation 5.
+    """
+    if len(values) < 6:
+        return _LEAST_NOISE
+    hankel = np.lib.stride_tricks.sliding_window_view(values, len(values) // 3 + 1)
+    singular = np.linalg.svd(hankel, compute_uv=False)
+    beta = hankel.shape[1] / hankel.shape[0]
+    factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
+    return max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
+
+
+def _gain(eigenvalue: complex, weights: Numbers, lags: Numbers, delay: float) -> float:
+    """What the average leaves of an exponential, and the exponential's own change until the first average."""
+    return float(abs((weights * np.exp(eigenvalue * lags)).sum() * np.exp(eigenvalue * delay)))
+
+
+def _interval(times: Numbers) -> float:
+    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
+    if len(times) < 2:
+        raise AnalysisError("no mode can be identified in a signal of fewer than 2 samples; give an earlier start")
+    if (missing := ~np.isfinite(values)).any():
+        begin, end = _longest(~missing)
+        remedy = (
+            f"the longest stretch without a gap is from {times[begin]:.6g} to {times[end]:.6g} s; choose it by the "
+        )
+        raise AnalysisError(
+            f"{int(missing.sum())} of {len(values)} samples are missing, the first at t = "
+            f"{times[int(missing.argmax())]:.6g} s; {remedy}start and the stop"
+        )
+    steps = np.diff(times)
+    off = np.abs(steps - steps[0]) > _UNEVEN * steps[0]
+    if off.any():
+        at = times[int(off.argmax())]
+        raise AnalysisError(
+            f"the sampling rate changes at t = {at:.6g} s, and modes need one rate; choose a start and a stop on one "
+            "side of it"
+        )
+    share = _share_near(times, values, line_frequency)
+    if share > _WAVEFORM:
+        raise AnalysisError(
+            f"{100 * share:.0f} % of the signal's power lies near the line's frequency of {line_frequency:g} Hz: it is "
+            "an instantaneous voltage or current, whose electromechanical modes cannot be read; use a channel of its "
+            "RMS value, frequency, angle or power"
+        )
+
+
+def _share_near(times: Numbers, values: Numbers, frequency: float) -> float:
+    """Part of the power within 15 % of a frequency."""
+    interval = _interval(times)
+    deviation = (values - values.mean()) * np.hanning(len(values))
+    power = np.abs(np.fft.rfft(deviation)) ** 2
+    if not frequency or not power.sum() or frequency > 0.5 / interval:
+        return 0.0
+    at = np.fft.rfftfreq(len(values), interval)
+    near = np.abs(at - frequency) < _NEAR * frequency
+    return float(power[near].sum() / power.sum())
+
+
+def _longest(good: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
+    """First and last index of the longest run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    if not len(edges):
+        return 0, 0
+    begins, ends = edges[::2], edges[1::2] - 1
+    k = int((ends - begins).argmax())
+    return int(begins[k]), int(ends[k])
