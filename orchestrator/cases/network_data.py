@@ -1,6 +1,7 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
@@ -8,7 +9,9 @@ from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
+from orchestrator.cases.psse.raw import read_raw
 from orchestrator.cases.schema import NetworkTable
+from orchestrator.errors import InputError, Problem
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,8 @@ class NetworkData:
         Rated frequency [Hz]; None leaves every model's own.
     places
         File and line of the lines that a file holds, by name.
+    changes
+        What the source holds and was taken over in another form, each with its place.
     """
 
     buses: tuple[str, ...]
@@ -37,6 +42,7 @@ class NetworkData:
     stray_B: float = 0.0
     places: dict[str, str] = field(default_factory=dict)
     transformers: tuple[ThreeWinding, ...] = ()
+    changes: tuple[Problem, ...] = ()
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -48,7 +54,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         If a file is missing, lacks a column, holds something that is not a number, or a source holds something
         that the grid model does not have.
     """
-    source = _source(table, directory)
+    source, changes = _source(table, directory)
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
@@ -78,6 +84,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         table.stray_B,
         {line.name: place for line, place in in_file},
         (*source.transformers, *transformers),
+        changes,
     )
 
 
@@ -92,13 +99,30 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _source(table: NetworkTable, directory: Path) -> ImportedNetwork:
+def _source(table: NetworkTable, directory: Path) -> tuple[ImportedNetwork, tuple[Problem, ...]]:
+    """The network of another program, and what was taken over in another form."""
     imported = ImportedNetwork()
+    if table.raw is not None:
+        return _from_raw(directory / table.raw, table.leave_out)
+    if table.leave_out:
+        raise InputError("leave_out is for networks of PSS/E; remove the key, or give the file as 'raw'")
     if table.matpower is not None:
         imported = import_network(read_matpower(directory / table.matpower))
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
-    return imported
+    return imported, ()
+
+
+def _from_raw(path: Path, leaving_out: Sequence[str]) -> tuple[ImportedNetwork, tuple[Problem, ...]]:
+    """A network of PSS/E; the ratings of the machines are those of the file."""
+    raw = read_raw(path, leaving_out)
+    imported = import_network(raw.tables)
+    ratings: dict[str, float] = {}
+    for machine in raw.machines:
+        bus = bus_name(raw.tables.labels[machine.bus])
+        ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
+    generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
+    return replace(imported, generation=generation), raw.changes
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:

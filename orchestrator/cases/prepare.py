@@ -221,12 +221,15 @@ class Preparer:
         table = self.draft.case.network
         if table is None:
             return
-        if table.matpower is not None and table.pandapower is not None:
-            self.draft.note_network(self.draft.place("network"), "give either 'matpower' or 'pandapower', not both")
+        given = [key for key in ("matpower", "pandapower", "raw") if getattr(table, key) is not None]
+        if len(given) > 1:
+            names = " or ".join(map(repr, given))
+            self.draft.note_network(self.draft.place("network"), f"give either {names}, not both")
             return
-        source = next((key for key in ("matpower", "pandapower") if getattr(table, key) is not None), None)
+        source = given[0] if given else None
         try:
             self.draft.data = network_data(table, self.draft.directory)
+            self.draft.questions += self.draft.data.changes
         except InputError as error:
             where = self.draft.place("network", source) if source else self.draft.place("network")
             self.draft.note_network(where, str(error))

@@ -146,6 +146,8 @@ class NetworkTable(Table):
 
     matpower: str | None = None
     pandapower: str | None = None
+    raw: str | None = None
+    leave_out: list[str] = []
     frequency: Hertz | None = Field(default=None, gt=0)
     stray_B: PerUnit = 0.0
 

@@ -1,0 +1,1 @@
+"""Networks of PSS/E: power flow data (RAW)."""

@@ -1,0 +1,238 @@
+"""A PSS/E RAW file of revision 33 to 36 as tables of a network source."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.psse.changes import Changes, leave_out
+from orchestrator.cases.psse.records import RawFile, Record, read_records
+from orchestrator.cases.psse.transformers import Transformer, star, transformers
+from orchestrator.errors import InputError, Problem
+
+_BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
+_REFERENCE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """One generator in service.
+
+    Attributes
+    ----------
+    bus, name
+        Number of its bus, and its identifier there.
+    line
+        Of its record.
+    p_mw, v_pu
+        Active power [MW], and voltage that it holds at its bus [pu].
+    rating_mva
+        MBASE [MVA].
+    source
+        ZSORCE [pu of the rating].
+    """
+
+    bus: int
+    name: str
+    line: int
+    p_mw: float
+    v_pu: float
+    rating_mva: float
+    source: complex
+
+
+@dataclass(frozen=True)
+class RawNetwork:
+    """A file's tables, its machines in service, and what was taken over in another form."""
+
+    tables: SourceTables
+    machines: tuple[Machine, ...]
+    changes: tuple[Problem, ...]
+
+
+def read_raw(path: Path, leaving_out: Sequence[str] = ()) -> RawNetwork:
+    """Read the network of a RAW file.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    leaving_out
+        Kinds of elements that may be left out.
+
+    Raises
+    ------
+    InputError
+        If a record cannot be used; file, line and field are named.
+    """
+    raw = read_records(path)
+    return _Reading(raw, Changes(raw.place)).network(leaving_out)
+
+
+class _Reading:
+    """One file on its way to tables."""
+
+    def __init__(self, raw: RawFile, changes: Changes) -> None:
+        self._raw, self._changes = raw, changes
+        self._rows: dict[int, list[float]] = {}
+        self._kilovolts: dict[int, float] = {}
+        self._magnitudes: dict[int, float] = {}
+        self._branches: list[list[float]] = []
+        self._to_earth: list[tuple[complex, complex]] = []
+        self._labels: dict[int, str] = {}
+
+    def network(self, leaving_out: Sequence[str]) -> RawNetwork:
+        leave_out(self._raw, leaving_out, self._changes)
+        self._buses()
+        self._loads()
+        self._shunts()
+        self._lines()
+        for transformer in transformers(self._raw, self._kilovolts):
+            self._transformer(transformer)
+        machines = self._machines()
+        gen = np.zeros((len(machines), _GEN_COLUMNS))
+        for row, m in zip(gen, machines, strict=True):
+            row[[0, 1, 5, 7, 8]] = m.bus, m.p_mw, m.v_pu, 1, m.rating_mva
+        tables = SourceTables(
+            self._raw.place, self._raw.base_mva, np.array(list(self._rows.values())),
+            np.array(self._branches).reshape(-1, _BRANCH_COLUMNS), gen,
+            np.array(self._to_earth, dtype=complex).reshape(-1, 2), self._labels, self._raw.frequency,
+        )  # fmt: skip
+        return RawNetwork(tables, machines, tuple(self._changes.listed()))
+
+    def _bus(self, record: Record, index: int = 0) -> int:
+        bus = abs(record.whole(index, "the bus' number"))
+        if bus not in self._rows:
+            raise record.error(f"there is no bus {bus}")
+        return bus
+
+    def _add(self, bus: int, column: int, value: complex) -> None:
+        """Add to the active and the reactive part [MW, Mvar], which stand side by side."""
+        self._rows[bus][column] += value.real
+        self._rows[bus][column + 1] += value.imag
+
+    def _buses(self) -> None:
+        for record in self._raw.of("bus"):
+            number, kind = record.whole(0, "the bus' number"), record.whole(3, "IDE", 1)
+            if number <= 0 or number in self._rows:
+                raise record.error(f"the bus' number is {number}; numbers exceed 0, and each stands once")
+            if kind not in (1, 2, 3, 4):
+                raise record.error(f"IDE is {kind}; known are 1 to 4")
+            self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
+            self._kilovolts[number] = record.number(2, "BASKV", 0.0)
+            self._magnitudes[number] = record.number(7, "VM", 1.0)
+            self._labels[number] = str(number)
+
+    def _loads(self) -> None:
+        for record in self._raw.of("load"):
+            bus = self._bus(record)
+            if record.whole(2, "STATUS", 1) == 0:
+                continue
+            names = ("PL", "QL", "IP", "IQ", "YP", "YQ")
+            pl, ql, ip, iq, yp, yq = (record.number(5 + k, name, 0.0) for k, name in enumerate(names))
+            current = complex(ip, iq) * self._magnitudes[bus]
+            if current:
+                text = "load of constant current: a constant impedance that draws the same at the file's voltage"
+                self._changes.note(record.line, text)
+            own = 0j
+            if self._raw.revision >= 35 and record.whole(16, "DGENM", 0) == 1:
+                own = complex(record.number(14, "DGENP", 0.0), record.number(15, "DGENQ", 0.0))
+                if own:
+                    self._changes.note(record.line, "distributed generation: taken away from its load")
+            self._add(bus, 2, complex(pl, ql) + current - own)
+            self._add(bus, 4, complex(yp, yq))
+
+    def _shunts(self) -> None:
+        for record in self._raw.of("fixed shunt"):
+            bus = self._bus(record)
+            if record.whole(2, "STATUS", 1):
+                self._add(bus, 4, complex(record.number(3, "GL", 0.0), record.number(4, "BL", 0.0)))
+        status, mode, initial = (3, 1, 9) if self._raw.revision < 35 else (4, 2, 11)
+        for record in self._raw.of("switched shunt"):
+            bus = self._bus(record)
+            if record.whole(status, "STAT", 1) == 0:
+                continue
+            if record.whole(mode, "MODSW", 1):
+                self._changes.note(record.line, "switched shunt: held at BINIT")
+            self._add(bus, 4, complex(0.0, record.number(initial, "BINIT", 0.0)))
+
+    def _lines(self) -> None:
+        ends = 9 if self._raw.revision == 33 else 19
+        for record in self._raw.of("branch"):
+            start, end = self._bus(record), self._bus(record, 1)
+            z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
+            charging = 0.5j * record.number(5, "B", 0.0)
+            gi, bi, gj, bj = (record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ")))
+            state = record.whole(ends + 4, "ST", 1)
+            self._branch(start, end, z, state, (charging + complex(gi, bi), charging + complex(gj, bj)))
+        for record in self._raw.of("system switching device"):
+            start, end = self._bus(record), self._bus(record, 1)
+            closed = record.whole(16, "STAT", 1)
+            if closed:
+                self._changes.note(record.line, "switching device: a branch of its reactance")
+            self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
+
+    def _branch(
+        self, start: int, end: int, z: complex, state: int, to_earth: tuple[complex, complex] = (0j, 0j),
+        tap: float = 0.0, shift: float = 0.0,
+    ) -> None:  # fmt: skip
+        self._branches.append([start, end, z.real, z.imag, 0.0, 0.0, 0.0, 0.0, tap, shift, float(state != 0)])
+        self._to_earth.append(to_earth)
+
+    def _transformer(self, t: Transformer) -> None:
+        windings = t.windings
+        if t.controlled:
+            self._changes.note(t.record.line, "tap changer or phase-shift control: held at its position")
+        if t.corrected:
+            self._changes.note(t.record.line, "impedance correction table: not applied")
+        if t.off == (0, 1, 2):
+            return
+        if 0 not in t.off:
+            self._add(windings[0].bus, 4, t.magnetisation * self._raw.base_mva)
+        if len(windings) == 2:
+            first, second = windings
+            self._branch(
+                first.bus, second.bus, t.impedances[0] * second.ratio**2, 1, tap=first.ratio / second.ratio,
+                shift=first.shift - second.shift,
+            )  # fmt: skip
+            return
+        inner = max(self._rows) + 1
+        self._rows[inner] = [inner, 1, *[0.0] * (_BUS_COLUMNS - 2)]
+        self._labels[inner] = "_".join(map(str, (*(w.bus for w in windings), t.circuit.strip() or "1", "star")))
+        for k, (winding, z) in enumerate(zip(windings, star(t.impedances), strict=True)):
+            if z.imag <= 0 and k not in t.off:
+                raise t.record.error(
+                    f"the star of this transformer of three windings has X = {z.imag:.4g} pu at winding {k + 1}; the "
+                    "grid model needs a positive reactance: replace the transformer by two of two windings"
+                )
+            self._branch(winding.bus, inner, z, k not in t.off, tap=winding.ratio, shift=winding.shift)
+
+    def _machines(self) -> tuple[Machine, ...]:
+        mbase, status = (8, 14) if self._raw.revision < 35 else (9, 15)
+        machines = []
+        for record in self._raw.of("generator"):
+            bus = self._bus(record)
+            if record.whole(status, "STAT", 1) == 0 or self._rows[bus][1] == 4:
+                continue
+            rating = record.number(mbase, "MBASE [MVA]", self._raw.base_mva)
+            if not rating > 0:
+                raise record.error(f"MBASE is {rating:g} MVA; it must exceed 0")
+            remote = record.whole(7, "IREG", 0)
+            held = record.number(6, "VS", 1.0)
+            if remote not in (0, bus):
+                held = self._magnitudes[bus]
+                self._changes.note(record.line, "voltage control of another bus: its own is held at the file's voltage")
+            elif self._rows[bus][1] == 1:
+                held = self._magnitudes[bus]
+                self._changes.note(record.line, "generator at a bus of type 1: it holds the file's voltage")
+            if record.number(mbase + 4, "XT", 0.0):
+                self._changes.note(record.line, "step-up transformer within a generator's record: left out")
+            source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
+            machines.append(
+                Machine(bus, record.text(1, "1"), record.line, record.number(2, "PG", 0.0), held, rating, source)
+            )
+        if not any(row[1] == _REFERENCE for row in self._rows.values()):
+            raise InputError(f"{self._raw.place}: no bus is the reference (IDE = 3); set one in the case and export it")
+        return tuple(machines)

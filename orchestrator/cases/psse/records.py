@@ -1,0 +1,208 @@
+"""Records of a PSS/E power flow data file (RAW), by section."""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.errors import InputError
+
+REVISIONS = (33, 34, 35, 36)
+"""Revisions whose records are known."""
+
+MOST_BYTES = 200_000_000
+"""Of a file: ten times the largest interconnections."""
+
+_TAIL = (
+    "area", "two-terminal dc", "vsc dc line", "impedance correction", "multi-terminal dc", "multi-section line", "zone",
+    "inter-area transfer", "owner", "facts device", "switched shunt", "gne", "induction machine",
+)  # fmt: skip
+_HEAD = ("bus", "load", "fixed shunt", "generator", "branch")
+_ORDER: dict[int, tuple[str, ...]] = {33: (*_HEAD, "transformer", *_TAIL)}
+_ORDER[34] = ("system-wide", *_HEAD, "system switching device", "transformer", *_TAIL, "substation")
+_ORDER[35] = _ORDER[34]
+
+_ALIASES = {"two-terminal dc line": "two-terminal dc", "vsc dc": "vsc dc line", "facts": "facts device",
+            "multi-terminal dc line": "multi-terminal dc", "facts control device": "facts device",
+            "gne device": "gne", "multi-section line group": "multi-section line",
+            "transformer impedance correction": "impedance correction", "interarea transfer": "inter-area transfer",
+            "inter-area": "inter-area transfer", "switching device": "system switching device"}  # fmt: skip
+_TOKEN = re.compile(r"""'([^']*)'?|"([^"]*)"?|(,)|(/)|([^\s,'"/]+)""")
+_BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One line of data: the file and its number, and its fields as text; omitted fields are empty."""
+
+    place: str
+    line: int
+    fields: Sequence[str]
+
+    def text(self, index: int, default: str = "") -> str:
+        """A field as text, without quotes and blanks around it."""
+        return (self.fields[index] if index < len(self.fields) else "") or default
+
+    def number(self, index: int, name: str, default: float | None = None) -> float:
+        """A field as a number.
+
+        Raises
+        ------
+        InputError
+            If it is none, or is left out and has no default.
+        """
+        text = self.text(index)
+        if not text and default is not None:
+            return default
+        try:
+            value = float(text.replace("D", "E").replace("d", "e"))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.error(f"{name} is {text!r}; it must be a number")
+        return value
+
+    def whole(self, index: int, name: str, default: int | None = None) -> int:
+        """A field as a whole number.
+
+        Raises
+        ------
+        InputError
+            As `number`.
+        """
+        value = self.number(index, name, default)
+        if value != int(value):
+            raise self.error(f"{name} is {self.text(index)!r}; it must be a whole number")
+        return int(value)
+
+    def error(self, text: str) -> InputError:
+        """An error with the record's place."""
+        return InputError(f"{self.place}, line {self.line}: {text}")
+
+
+@dataclass(frozen=True)
+class RawFile:
+    """What a file holds.
+
+    Attributes
+    ----------
+    place
+        Path of the file.
+    base_mva, frequency
+        System base [MVA], and rated frequency [Hz] where the file says it.
+    sections
+        Records by the section's name in small letters; one with several lines is several records.
+    """
+
+    place: str
+    revision: int
+    base_mva: float
+    frequency: float | None
+    sections: dict[str, list[Record]] = field(default_factory=dict)
+
+    def of(self, section: str) -> list[Record]:
+        """Records of a section."""
+        return self.sections.get(section, [])
+
+
+def read_records(path: Path) -> RawFile:
+    """Read a RAW file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is no RAW file, or its revision is unknown.
+    """
+    lines = _numbered(_text_of(path))
+    first = next(lines, None)
+    if first is None:
+        raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
+    head = Record(str(path), first[0], _fields(first[1]))
+    if len(head.fields) < 3:
+        raise head.error(
+            "the first record has no revision; a RAW file begins with IC, SBASE, REV, XFRRAT, NXFRAT, BASFRQ"
+        )
+    revision = head.whole(2, "the revision REV", 0)
+    if revision not in REVISIONS:
+        known = ", ".join(map(str, REVISIONS))
+        raise head.error(f"the revision REV is {revision}; {known} are read: export the case from PSS/E as one of them")
+    if head.whole(0, "IC", 0) != 0:
+        raise head.error(f"IC is {head.text(0)}: the file changes another case; export the whole case (IC = 0)")
+    base = head.number(1, "the system base SBASE [MVA]", 100.0)
+    if not base > 0:
+        raise head.error(f"the system base SBASE is {base:g} MVA; it must exceed 0")
+    frequency = head.number(5, "the frequency BASFRQ [Hz]", 0.0)
+    for _ in range(2):  # two lines of titles
+        next(lines, None)
+    return RawFile(str(path), revision, base, frequency or None, _sections(path, revision, lines))
+
+
+def _text_of(path: Path) -> str:
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
+    if (size := path.stat().st_size) > MOST_BYTES:
+        raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
+    content = path.read_bytes()
+    if b"\x00" in content[:4096]:
+        raise InputError(f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW")
+    if content.lstrip()[:1] == b"{":
+        raise InputError(f"{path}: it is JSON, perhaps RAWX; export the case from PSS/E as RAW, revision 33 to 36")
+    return content.decode("utf-8-sig", errors="replace")
+
+
+def _numbered(text: str) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers, without those that only comment."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.startswith("@!"):
+            yield number, line
+
+
+def _sections(path: Path, revision: int, lines: Iterator[tuple[int, str]]) -> dict[str, list[Record]]:
+    sections: dict[str, list[Record]] = {}
+    order = list(_ORDER.get(revision, ()))
+    name = "bus" if revision == 33 else "system-wide"
+    for number, line in lines:
+        stripped = line.strip()
+        if not stripped:
+            continue
+        if stripped.upper() == "Q":
+            return sections
+        if re.match(r"0\s*(/|$)", stripped):
+            name = _following(path, number, stripped, name, order)
+        else:
+            sections.setdefault(name, []).append(Record(str(path), number, _fields(line)))
+    if not {"bus", "branch"} <= {*sections} or name in _HEAD:
+        raise InputError(f"{path}: it ends within its {name} data; export the case once more")
+    return sections
+
+
+def _following(path: Path, number: int, line: str, name: str, order: list[str]) -> str:
+    """The section that begins: the one that the line names, or else the next in the revision's order."""
+    if found := _BEGIN.search(line):
+        named = " ".join(found[1].lower().split())
+        return _ALIASES.get(named, named)
+    if "END OF" in line.upper():
+        return "end"
+    if name not in order:
+        raise InputError(
+            f"{path}, line {number}: the line does not say which data begin (such as '0 / END OF BUS DATA, BEGIN LOAD "
+            "DATA'), and their order is not known for this file; export the case from PSS/E as revision 35"
+        )
+    following = order.index(name) + 1
+    return order[following] if following < len(order) else "end"
+
+
+def _fields(line: str) -> list[str]:
+    """Fields of a record, separated by commas or blanks; what stands behind a slash is a comment."""
+    fields, empty = list[str](), True  # empty: nothing since the last comma
+    for token in _TOKEN.finditer(line):
+        quoted, other, comma, slash, plain = token.groups()
+        if slash:
+            break
+        if comma:
+            fields += [""] if empty else []
+        else:
+            fields.append((quoted or other or plain or "").strip())
+        empty = bool(comma)
+    return fields
