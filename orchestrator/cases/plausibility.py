@@ -44,7 +44,7 @@ def check_plausibility(draft: Draft) -> None:
             _check_rule(draft, name, plan, rule)
     _check_frequencies(draft)
     _check_meant(draft)
-    draft.questions = _merged([d for d in _doubts(draft) if not _is_meant(draft, d.name)])
+    draft.questions += _merged([d for d in _doubts(draft) if not _is_meant(draft, d.name)])
 
 
 def _check_meant(draft: Draft) -> None:

@@ -1,6 +1,7 @@
 """Networks of PSS/E: pandapower's voltages of the same network, transformers by hand, and what is refused."""
 
 import cmath
+import json
 import warnings
 
 import numpy as np
@@ -8,7 +9,6 @@ import pandapower as pp
 import pytest
 from pandapower import networks
 
-from orchestrator.cases.case import load_case
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.psse.raw import read_raw
 from orchestrator.cases.schema import NetworkTable
@@ -200,21 +200,23 @@ def test_what_the_network_does_not_have_is_refused_unless_the_user_lets_it_go(wr
         written(text, leave_out=["dc"])
 
 
-def test_a_case_says_what_was_changed(tmp_path):
+@pytest.mark.slow
+def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
+    """Sauer and Pai's two electromechanical modes lie near 1.3 and 2 Hz with their inertias; ours are the defaults."""
     found = records(35)
     found["SWITCHED SHUNT"] += ["6,'1 ',1,0,1,1.05,0.95,0,0,100,'',10.0"]
     (tmp_path / "grid.raw").write_text(raw(35, found))
     (tmp_path / "case.toml").write_text(
         'name = "wscc"\n[components.grid]\nmodel = "grid"\n[network]\nraw = "grid.raw"\nstray_B = 0.05\n'
         '[power_flow]\ngrid = "grid"\n[units]\nalpha = 0.0\ngenerator = "synchronous_generator_st1"\n'
-        'converter = "gfor"\n[scenarios.plain]\n'
+        'converter = "gfor"\n'
     )
-    preparer = load_case(tmp_path / "case.toml")._preparer("plain", None, ())
-    assert set(preparer._everything) >= {"sg1", "sg2", "sg3"}
-    assert preparer._everything["sg2"].parameters["S_n"] == 192
-    (question,) = preparer.draft.questions
-    assert "switched shunt: held at BINIT" in str(question)
-    assert "grid.raw, line" in str(question)
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json")
+    assert code == 0, error
+    assert "switched shunt: held at BINIT" in error
+    said = [text for text in json.loads(out)["scenarios"][0]["warnings"] if "grid.raw, line" in text]
+    assert len(said) == 1
+    assert "switched shunt: held at BINIT" in said[0]
 
 
 # -- files that cannot be used ---------------------------------------------------------------------
