@@ -9,9 +9,11 @@ from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
-from orchestrator.cases.psse.raw import read_raw
+from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.errors import InputError, Problem
+
+_Source = tuple[ImportedNetwork, tuple[Problem, ...], tuple[Machine, ...]]
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class NetworkData:
         File and line of the lines that a file holds, by name.
     changes
         What the source holds and was taken over in another form, each with its place.
+    machines
+        Machines in service, one by one, where the source is of PSS/E.
     """
 
     buses: tuple[str, ...]
@@ -43,6 +47,7 @@ class NetworkData:
     places: dict[str, str] = field(default_factory=dict)
     transformers: tuple[ThreeWinding, ...] = ()
     changes: tuple[Problem, ...] = ()
+    machines: tuple[Machine, ...] = ()
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -54,7 +59,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         If a file is missing, lacks a column, holds something that is not a number, or a source holds something
         that the grid model does not have.
     """
-    source, changes = _source(table, directory)
+    source, changes, machines = _source(table, directory)
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
@@ -85,6 +90,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         {line.name: place for line, place in in_file},
         (*source.transformers, *transformers),
         changes,
+        machines,
     )
 
 
@@ -99,8 +105,8 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _source(table: NetworkTable, directory: Path) -> tuple[ImportedNetwork, tuple[Problem, ...]]:
-    """The network of another program, and what was taken over in another form."""
+def _source(table: NetworkTable, directory: Path) -> _Source:
+    """The network of another program, what was taken over in another form, and its machines."""
     imported = ImportedNetwork()
     if table.raw is not None:
         return _from_raw(directory / table.raw, table.leave_out)
@@ -110,10 +116,10 @@ def _source(table: NetworkTable, directory: Path) -> tuple[ImportedNetwork, tupl
         imported = import_network(read_matpower(directory / table.matpower))
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
-    return imported, ()
+    return imported, (), ()
 
 
-def _from_raw(path: Path, leaving_out: Sequence[str]) -> tuple[ImportedNetwork, tuple[Problem, ...]]:
+def _from_raw(path: Path, leaving_out: Sequence[str]) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
     raw = read_raw(path, leaving_out)
     imported = import_network(raw.tables)
@@ -122,7 +128,7 @@ def _from_raw(path: Path, leaving_out: Sequence[str]) -> tuple[ImportedNetwork, 
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return replace(imported, generation=generation), raw.changes
+    return replace(imported, generation=generation), raw.changes, raw.machines
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:

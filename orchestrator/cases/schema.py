@@ -169,6 +169,8 @@ class UnitsTable(Table):
     """
 
     file: str | None = None
+    dyr: str | None = None
+    dyr_leave_out: list[str] = []
     alpha: Number = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str

@@ -2,7 +2,12 @@
 share each unit.
 """
 
+<<<<<<< HEAD
 import math
+=======
+import re
+from collections import Counter
+>>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +19,8 @@ from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
+from orchestrator.cases.psse.dyr import machine_models, read_dyr
+from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.errors import InputError
 
@@ -76,11 +83,19 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         return {}
     generation = draft.data.generation if draft.data else {}
     try:
-        rows = unit_rows(table, draft.directory, generation)
+        if table.dyr is None:
+            rows = unit_rows(table, draft.directory, generation)
+        else:
+            rows = _rows_of_dyr(table, draft.directory, draft.data.machines if draft.data else ())
     except InputError as error:
         if draft.network_failed:
             return {}  # figures that the source would have given are missing
+<<<<<<< HEAD
         draft.note_network(draft.place("units", "file") if table.file else draft.place("units"), str(error))
+=======
+        key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
+        draft.note(draft.place("units", key) if key else draft.place("units"), str(error))
+>>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
@@ -158,6 +173,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
     return rows
 
 
+<<<<<<< HEAD
 def _known_rows(path: Path) -> list[Row]:
     """The rows of a units' file; a column that nothing reads may be a misspelt one."""
     rows = rows_of(path, ("bus",))
@@ -170,6 +186,27 @@ def _known_rows(path: Path) -> list[Row]:
                 column, similar, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter"
             )
             raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
+=======
+def _rows_of_dyr(table: UnitsTable, directory: Path, machines: Sequence[Machine]) -> list[UnitRow]:
+    """A unit for each machine of a RAW file, of the parts that the DYR file names."""
+    if table.file is not None:
+        raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
+    if not machines:
+        raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
+    path = directory / (table.dyr or "")
+    models = machine_models(read_dyr(path), machines, table.dyr_leave_out)
+    together = Counter(machine.bus for machine in machines)
+    rows = []
+    for machine in machines:
+        name = re.sub(r"\W", "_", machine.name.strip())
+        label = str(machine.bus) if together[machine.bus] == 1 else f"{machine.bus}_{name}"
+        model = models[machine.bus, machine.name.strip()]
+        row = UnitRow(
+            label, bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu,
+            parameters={"sg": model.parameters}, place=str(path), parts=model.parts,
+        )  # fmt: skip
+        rows.append(_checked(row, str(path)))
+>>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
     return rows
 
 

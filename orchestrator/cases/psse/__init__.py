@@ -1,1 +1,1 @@
-"""Networks of PSS/E: power flow data (RAW)."""
+"""Networks of PSS/E: power flow data (RAW) and dynamics data (DYR)."""

@@ -202,11 +202,6 @@ class _Reading:
         self._rows[inner] = [inner, 1, *[0.0] * (_BUS_COLUMNS - 2)]
         self._labels[inner] = "_".join(map(str, (*(w.bus for w in windings), t.circuit.strip() or "1", "star")))
         for k, (winding, z) in enumerate(zip(windings, star(t.impedances), strict=True)):
-            if z.imag <= 0 and k not in t.off:
-                raise t.record.error(
-                    f"the star of this transformer of three windings has X = {z.imag:.4g} pu at winding {k + 1}; the "
-                    "grid model needs a positive reactance: replace the transformer by two of two windings"
-                )
             self._branch(winding.bus, inner, z, k not in t.off, tap=winding.ratio, shift=winding.shift)
 
     def _machines(self) -> tuple[Machine, ...]:

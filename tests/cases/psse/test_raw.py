@@ -158,6 +158,19 @@ def test_three_windings_are_a_star(written):
     assert flow.residual < 1e-9
 
 
+def test_a_star_with_a_negative_reactance_is_a_transformer_of_three_windings(written):
+    """Z12 = 0.10, Z23 = 0.04, Z31 = 0.16 on 100 MVA: 0.11, -0.01 and 0.05."""
+    found = records(33)
+    found["TRANSFORMER"] += [
+        "4,8,6,'A ',1,1,1,0,0,2,'T',1,1,1", "0,0.10,50,0,0.04,50,0,0.16,50,1,0", "1.02,0,0", "1.0,0,0", "1.0,0,0"
+    ]  # fmt: skip
+    data = written(raw(33, found))
+    (transformer,) = data.transformers
+    assert "bus_4_8_6_A_star" not in data.buses
+    by_bus = dict(zip(transformer.buses, transformer.X, strict=True))
+    assert by_bus == {"bus_4": pytest.approx(0.11), "bus_8": pytest.approx(-0.01), "bus_6": pytest.approx(0.05)}
+
+
 # -- elements that change form ---------------------------------------------------------------------
 
 

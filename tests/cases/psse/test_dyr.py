@@ -1,0 +1,108 @@
+"""Dynamics data of PSS/E: from records to machines of a case, and what is refused."""
+
+import json
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.psse.dyr import read_dyr
+from orchestrator.errors import CaseError, InputError
+from tests.cases.psse import raw
+
+DYR = """\
+// WSCC, figures of Sauer and Pai on the machines' own ratings
+1 'GENROU' 1  8.96 0.04 0.31 0.06  9.55 0.0
+   0.3614 0.2398 0.1505 0.15 0.12 0.08 0.0 0.0 / hydro in the book
+2,'GENROU','1', 6.0,0.04,0.535,0.06, 3.33,0.0, 1.72,1.66,0.23,0.378,0.2,0.1, 0.0,0.0 /
+3 'GENCLS' 1  2.35 0.0 /
+1 'SEXS' 1  0.1 10.0 100.0 0.05 -5.0 5.0 /
+1 'TGOV1' 1  0.05 0.5 1.0 0.0 2.1 7.0 0.0 /
+"""
+CASE = """\
+name = "wscc"
+[components.grid]
+model = "grid"
+[network]
+raw = "grid.raw"
+stray_B = 0.05
+[power_flow]
+grid = "grid"
+[units]
+dyr = "grid.dyr"
+generator = "synchronous_generator"
+converter = "gfor"
+[scenarios.plain]
+"""
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Text of a DYR file → the units' tables of the case, or its problems."""
+
+    def build(dyr=DYR, case=CASE):
+        (tmp_path / "grid.raw").write_text(raw(33))
+        (tmp_path / "grid.dyr").write_text(dyr)
+        (tmp_path / "case.toml").write_text(case)
+        preparer = load_case(tmp_path / "case.toml")._preparer("plain", None, ())
+        if preparer.problems:
+            raise CaseError("case", preparer.problems)
+        return preparer._everything
+
+    return build
+
+
+def test_records_become_parts_and_parameters(tables):
+    found = tables()
+    first, second, third = (found[f"sg{n}"] for n in (1, 2, 3))
+    assert (first.machine, first.exciter, first.governor, first.stabilizer) == ("genrou", "sexs", "tgov1", "none")
+    assert (second.exciter, second.governor) == ("manual", "constant_power")
+    assert third.machine == "classical"
+    assert first.parameters["machine.H"] == 9.55
+    assert first.parameters["machine.X_d"] == 0.3614
+    assert first.parameters["exciter.T_A"] == pytest.approx(0.1 * 10.0)  # PSS/E gives the lead as T_A/T_B
+    assert first.parameters["S_n"] == 247.5
+    assert third.parameters["machine.X_d1"] == 0.2  # ZX of the RAW file
+    assert first.parameters["transformer.X_t"] == 0
+
+
+def test_records_over_lines_with_commas_or_blanks(tmp_path):
+    (tmp_path / "grid.dyr").write_text(DYR)
+    records = read_dyr(tmp_path / "grid.dyr")
+    assert [(r.bus, r.name, len(r.values)) for r in records] == [
+        (1, "GENROU", 14), (2, "GENROU", 14), (3, "GENCLS", 2), (1, "SEXS", 6), (1, "TGOV1", 7)
+    ]  # fmt: skip
+    assert records[0].place.endswith("grid.dyr, line 2")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("'SEXS'", "'OLDEXC'", r"grid.dyr, line 6: no part of ours stands for OLDEXC \(bus 1\)"),
+        ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
+        ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),
+        ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),
+        ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
+        ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
+        ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
+    ],
+)
+def test_what_cannot_be_taken_over(old, new, words, tables):
+    assert old in DYR
+    with pytest.raises((CaseError, InputError), match=words):
+        tables(DYR.replace(old, new, 1))
+
+
+def test_a_model_goes_at_the_users_word(tables):
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDEXC"]\nexciter = "sexs"')
+    found = tables(DYR.replace("'SEXS'", "'OLDEXC'"), case)
+    assert found["sg1"].exciter == "sexs"
+    assert found["sg2"].exciter == "manual"
+
+
+@pytest.mark.slow
+def test_the_machines_swing(tables, tmp_path, gfor):
+    tables()
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json", "--range", "0.5:5")
+    assert code == 0, error
+    modes = json.loads(out)["scenarios"][0]["modes"]
+    assert len([m for m in modes if 0.8 < m["frequency_hz"] < 3]) == 2
