@@ -2,12 +2,8 @@
 share each unit.
 """
 
-<<<<<<< HEAD
 import math
-=======
 import re
-from collections import Counter
->>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -90,12 +86,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     except InputError as error:
         if draft.network_failed:
             return {}  # figures that the source would have given are missing
-<<<<<<< HEAD
-        draft.note_network(draft.place("units", "file") if table.file else draft.place("units"), str(error))
-=======
         key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
-        draft.note(draft.place("units", key) if key else draft.place("units"), str(error))
->>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
+        draft.note_network(draft.place("units", key) if key else draft.place("units"), str(error))
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
@@ -173,7 +165,6 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
     return rows
 
 
-<<<<<<< HEAD
 def _known_rows(path: Path) -> list[Row]:
     """The rows of a units' file; a column that nothing reads may be a misspelt one."""
     rows = rows_of(path, ("bus",))
@@ -186,7 +177,9 @@ def _known_rows(path: Path) -> list[Row]:
                 column, similar, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter"
             )
             raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
-=======
+    return rows
+
+
 def _rows_of_dyr(table: UnitsTable, directory: Path, machines: Sequence[Machine]) -> list[UnitRow]:
     """A unit for each machine of a RAW file, of the parts that the DYR file names."""
     if table.file is not None:
@@ -195,18 +188,21 @@ def _rows_of_dyr(table: UnitsTable, directory: Path, machines: Sequence[Machine]
         raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
     path = directory / (table.dyr or "")
     models = machine_models(read_dyr(path), machines, table.dyr_leave_out)
-    together = Counter(machine.bus for machine in machines)
+    at_bus: dict[int, list[Machine]] = {}
+    for machine in machines:
+        at_bus.setdefault(machine.bus, []).append(machine)
     rows = []
     for machine in machines:
         name = re.sub(r"\W", "_", machine.name.strip())
-        label = str(machine.bus) if together[machine.bus] == 1 else f"{machine.bus}_{name}"
+        here = at_bus[machine.bus]
+        label = str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}"
         model = models[machine.bus, machine.name.strip()]
         row = UnitRow(
             label, bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu,
             parameters={"sg": model.parameters}, place=str(path), parts=model.parts,
+            q_min_mvar=sum(m.q_min_mvar for m in here), q_max_mvar=sum(m.q_max_mvar for m in here),
         )  # fmt: skip
         rows.append(_checked(row, str(path)))
->>>>>>> 2bca9a0 (Take machines and their controls from PSS/E's DYR)
     return rows
 
 

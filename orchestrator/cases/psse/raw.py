@@ -1,5 +1,6 @@
 """A PSS/E RAW file of revision 33 to 36 as tables of a network source."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from orchestrator.errors import InputError, Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _REFERENCE = 3
+_NO_LIMIT = 9999.0
+"""Mvar by which PSS/E says that a generator has no limit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,8 @@ class Machine:
         MBASE [MVA].
     source
         ZSORCE [pu of the rating].
+    q_min_mvar, q_max_mvar
+        Limits of reactive power [Mvar]; infinite where the file has none.
     """
 
     bus: int
@@ -41,6 +46,8 @@ class Machine:
     v_pu: float
     rating_mva: float
     source: complex
+    q_min_mvar: float
+    q_max_mvar: float
 
 
 @dataclass(frozen=True)
@@ -94,12 +101,17 @@ class _Reading:
         machines = self._machines()
         gen = np.zeros((len(machines), _GEN_COLUMNS))
         for row, m in zip(gen, machines, strict=True):
-            row[[0, 1, 5, 7, 8]] = m.bus, m.p_mw, m.v_pu, 1, m.rating_mva
+            row[[0, 1, 3, 4, 5, 7, 8]] = m.bus, m.p_mw, m.q_max_mvar, m.q_min_mvar, m.v_pu, 1, m.rating_mva
         tables = SourceTables(
-            self._raw.place, self._raw.base_mva, np.array(list(self._rows.values())),
-            np.array(self._branches).reshape(-1, _BRANCH_COLUMNS), gen,
-            np.array(self._to_earth, dtype=complex).reshape(-1, 2), self._labels, self._raw.frequency,
-        )  # fmt: skip
+            self._raw.place,
+            self._raw.base_mva,
+            np.array(list(self._rows.values())),
+            np.array(self._branches).reshape(-1, _BRANCH_COLUMNS),
+            gen,
+            np.array(self._to_earth, dtype=complex).reshape(-1, 2),
+            self._labels,
+            self._raw.frequency,
+        )
         return RawNetwork(tables, machines, tuple(self._changes.listed()))
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -194,9 +206,13 @@ class _Reading:
         if len(windings) == 2:
             first, second = windings
             self._branch(
-                first.bus, second.bus, t.impedances[0] * second.ratio**2, 1, tap=first.ratio / second.ratio,
+                first.bus,
+                second.bus,
+                t.impedances[0] * second.ratio**2,
+                1,
+                tap=first.ratio / second.ratio,
                 shift=first.shift - second.shift,
-            )  # fmt: skip
+            )
             return
         inner = max(self._rows) + 1
         self._rows[inner] = [inner, 1, *[0.0] * (_BUS_COLUMNS - 2)]
@@ -225,8 +241,21 @@ class _Reading:
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(record.line, "step-up transformer within a generator's record: left out")
             source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
+            most, least = (record.number(k, n, d) for k, n, d in ((4, "QT", _NO_LIMIT), (5, "QB", -_NO_LIMIT)))
+            if least > most:
+                raise record.error(f"the limit QB is {least:g} Mvar, more than QT of {most:g} Mvar; swap them")
             machines.append(
-                Machine(bus, record.text(1, "1"), record.line, record.number(2, "PG", 0.0), held, rating, source)
+                Machine(
+                    bus,
+                    record.text(1, "1"),
+                    record.line,
+                    record.number(2, "PG", 0.0),
+                    held,
+                    rating,
+                    source,
+                    least if least > -_NO_LIMIT else -math.inf,
+                    most if most < _NO_LIMIT else math.inf,
+                )
             )
         if not any(row[1] == _REFERENCE for row in self._rows.values()):
             raise InputError(f"{self._raw.place}: no bus is the reference (IDE = 3); set one in the case and export it")

@@ -81,7 +81,7 @@ def test_a_matpower_case_written_as_raw(written):
         found["BUS"].append(f"{row[0] + 1:.0f},'B',{row[9]},{row[1]:.0f},1,1,1,1,0")
         found["LOAD"].append(f"{row[0] + 1:.0f},'1',1,1,1,{row[2]:.12g},{row[3]:.12g},0,0,0,0,1,1,0")
     for row in ppc["gen"].real:
-        found["GENERATOR"].append(f"{row[0] + 1:.0f},'1',{row[1]:.12g},0,0,0,{row[5]:.12g},0,2000,0,1,0,0,1,1")
+        found["GENERATOR"].append(f"{row[0] + 1:.0f},'1',{row[1]:.12g},0,9999,-9999,{row[5]:.12g},0,2000,0,1,0,0,1,1")
     for row in ppc["branch"].real:
         i, j, r, x, b, tap, shift = row[0] + 1, row[1] + 1, *row[2:5], row[8] or 1.0, row[9]
         if tap == 1 and shift == 0:
@@ -189,6 +189,7 @@ def test_loads_shunts_and_machines(written):
         "bus_4": (5, pytest.approx(-3)), "bus_5": (pytest.approx(2), pytest.approx(30)), "bus_6": (0, pytest.approx(35))
     }  # fmt: skip
     assert (data.generation["bus_2"].p_mw, data.generation["bus_2"].rating_mva) == (183, 242)
+    assert (data.generation["bus_2"].q_min_mvar, data.generation["bus_2"].q_max_mvar) == (-309, 309)
     lines = raw(33, found).splitlines()
     listed = {text: place for place, text in ((p.place.rpartition(" ")[2], p.text) for p in data.changes)}
     (current,) = (n for text, n in listed.items() if text.startswith("load of constant current"))
@@ -245,6 +246,7 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
         ("4,5,'1 '", "4,55,'1 '", r"line \d+: there is no bus 55"),
         ("1,'BUS 1     ',16.5,3", "1,'BUS 1     ',16.5,2", r"no bus is the reference \(IDE = 3\)"),
         ("2,'BUS 2     ',18.0,2", "1,'BUS 2     ',18.0,2", r"line 5: the bus' number is 1; numbers exceed 0"),
+        ("300,-300,1.04", "-400,-300,1.04", r"the limit QB is -300 Mvar, more than QT of -400 Mvar; swap them"),
         ("1,1,1,0,0,2", "1,4,1,0,0,2", r"line \d+: CZ is 4; known are 1 to 3"),
         ("BEGIN BRANCH DATA", "BEGIN RELAY DATA", r"grid.raw: the network has no such elements: relay \(line"),
     ],
