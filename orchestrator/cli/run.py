@@ -142,8 +142,8 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         return code
     calls.over = True
     kept.end(whole=True)
-    gone_bad = options.fail_unstable and any(r.went_unstable for r in results)
-    return int(gone_bad) or exit_code(options, [r.modes.stability for r in results])
+    unsound = options.fail_unstable and not all(r.stable_in_simulation for r in results)
+    return int(unsound) or exit_code(options, [r.modes.stability for r in results])
 
 
 def _say_unfinished(folder: Path) -> None:
@@ -238,6 +238,11 @@ def _print(console: Console, results: Sequence[RunResult]) -> None:
         for finding in r.went_unstable:
             words = escape(f"{r.modes.prepared.title}: {finding.message}")
             console.print(f"[bold red]UNSTABLE in the simulation[/]: {words}", soft_wrap=True, highlight=False)
+        if r.stable_in_simulation is None:
+            words = f"{escape(r.modes.prepared.title)}: not judged throughout; the warnings above say where and why"
+            console.print(f"[bold yellow]stability in the simulation[/]: {words}", soft_wrap=True, highlight=False)
+    if not all(r.stable_in_simulation for r in results):
+        console.print("[bold]By the modes at the operating point:[/]")
     print_verdicts(console, modes)
     console.print(tables.steady_states(modes), "")
     print_named_modes(console, modes)

@@ -23,6 +23,9 @@ _SLACK = 1_000_000
 
 Attributes = Mapping[str, str | float]
 
+DAMAGED = (OSError, KeyError, RuntimeError, ValueError)
+"""What h5py raises on a file that is cut short or damaged."""
+
 
 def stored_name(name: str) -> str:
     """A column's name in a file: a ``/``, which FMI allows and HDF5 takes for a group, is written as ``%2F``."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
-from orchestrator.results.netcdf import name_of, stored_name
+from orchestrator.results.netcdf import DAMAGED, name_of, stored_name
 from orchestrator.results.recording import ENDED_EARLY, parts_of
 
 IN_MEMORY = 256_000_000
@@ -58,8 +58,11 @@ class _Column(xr.backends.BackendArray):
         for piece in self._pieces:
             first, last = max(begin, piece.first), min(end, piece.first + piece.rows)
             if first < last:
-                with _opened(piece.path) as file:
-                    found[first - begin : last - begin] = file[stored][first - piece.first : last - piece.first]
+                try:
+                    with _opened(piece.path) as file:
+                        found[first - begin : last - begin] = file[stored][first - piece.first : last - piece.first]
+                except DAMAGED as error:
+                    raise InputError(f"{piece.path}: {self._name!r} cannot be read: {error}") from error
         return found
 
 
@@ -95,7 +98,7 @@ def open_recording(folder: Path) -> xr.Dataset:
                 pieces.append(_Piece(part, rows, len(file["time"])))
                 if part == parts[0]:
                     attributes, units = dict(file.attrs), _columns(file)
-        except (OSError, KeyError) as error:
+        except DAMAGED as error:
             raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
         rows += pieces[-1].rows
     return _dataset(pieces, attributes, units)
@@ -132,7 +135,7 @@ def _of_ours(path: Path) -> xr.Dataset | None:
             if rows * len(units) * 8 > IN_MEMORY:
                 return _dataset([_Piece(path, 0, rows)], attributes, units)
             data = {name: ("time", file[stored_name(name)][...], about) for name, about in units.items()}
-    except OSError:  # no HDF5, as NetCDF-3 is not, or damaged; xarray says which
+    except DAMAGED:  # no HDF5, as NetCDF-3 is not, or damaged; xarray says which
         return None
     return xr.Dataset(data, attrs=attributes)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.rows import Block
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.netcdf import Attributes, join_netcdf, netcdf_image, stored_name
+from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, stored_name
 from orchestrator.results.room import require_room
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
@@ -150,7 +150,7 @@ def rows_in(parts: Sequence[Path]) -> int:
                 if int(part.stem) != rows:
                     break
                 rows += len(file["time"])
-        except (OSError, KeyError):
+        except DAMAGED:
             break
     return rows
 
@@ -161,5 +161,5 @@ def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArra
     try:
         with h5py.File(part, "r") as file:
             return file["time"][...], np.column_stack([file[stored_name(name)][...] for name in names])
-    except (OSError, KeyError) as error:
+    except DAMAGED as error:
         raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error

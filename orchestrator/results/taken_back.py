@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.results.netcdf import stored_name
+from orchestrator.results.netcdf import DAMAGED, stored_name
 from orchestrator.results.recording import RecordingFolder, parts_of, rows_in
 
 
@@ -49,6 +49,6 @@ def take_back(
                     values = np.column_stack([file[stored_name(name)][part] for name in names])
                     recording.keep(first, file["time"][part], values)
                 return True
-        except (OSError, KeyError):  # it is not there, or not whole
+        except DAMAGED:  # it is not there, or not whole
             continue
     return False

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
@@ -226,8 +226,11 @@ def _unit(dataset: xr.Dataset, expression: str) -> str:
 
 
 def _strongest(curve: xr.DataArray, start: float) -> IdentifiedMode | None:
+    """Above a quarter of the sampling frequency there is perhaps no oscillation of the system."""
+    times = curve["time"].values
+    highest = 0.25 / interval_used(times) if len(times) > 1 else 0.0
     try:
-        found = [m for m in strongest_modes(curve, start) if m.frequency_hz > 0.05]
+        found = [m for m in strongest_modes(curve, start) if 0.05 < m.frequency_hz <= highest]
     except AnalysisError:
         return None
     return found[0] if found else None

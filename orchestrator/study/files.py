@@ -19,7 +19,6 @@ from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, pl
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
-from orchestrator.watch.finding import NOT_JUDGED
 
 _LEAST_PARTICIPATION = 1e-3
 """Smaller factors are left out of the files."""
@@ -177,7 +176,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "linearised": modes.linearised,
         "fit_errors": modes.fit_errors,
         "warnings": list(modes.warnings),
-        "stable_in_simulation": _stable_in_simulation(result),
+        "stable_in_simulation": result.stable_in_simulation,
         "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
         "isolated": {name: [asdict(p) for p in found] for name, found in result.protections.items()},
@@ -202,10 +201,3 @@ def _linear_differences(result: RunResult) -> dict[str, float] | None:
     if result.linear is None:
         return None
     return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}
-
-
-def _stable_in_simulation(result: RunResult) -> bool | None:
-    """None where a part of the run was not judged and nothing else was wrong."""
-    if result.went_unstable:
-        return False
-    return None if any(finding.kind == NOT_JUDGED for finding in result.findings) else True

@@ -7,7 +7,7 @@ import xarray as xr
 
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used, nearest
+from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.state_access import obstacle
@@ -34,16 +34,13 @@ from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.protection import Protection, missing
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
-from orchestrator.results.signals import signal
 from orchestrator.results.storage import trajectory_dataset
 from orchestrator.study.checkpoints import Checkpoints
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
-from orchestrator.watch.finding import UNSTABLE, Finding
+from orchestrator.study.ring_down import ring_down_of
+from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE, Finding
 from orchestrator.watch.watch import Watch
-
-_COARSEST = 0.25
-"""Record interval [periods of the mode] up to which a ring-down is shown."""
 
 STEPS = (0.5, 1.0, 2.0, 5.0)
 """Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""
@@ -98,6 +95,13 @@ class RunResult:
     def went_unstable(self) -> list[Finding]:
         """The findings that no stable system gives, whatever its linear model says."""
         return [finding for finding in self.findings if finding.kind in UNSTABLE]
+
+    @property
+    def stable_in_simulation(self) -> bool | None:
+        """None where a part of the run was not judged and nothing else was wrong."""
+        if self.went_unstable:
+            return False
+        return None if any(finding.kind == NOT_JUDGED for finding in self.findings) else True
 
 
 def run_scenario(
@@ -189,7 +193,8 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    ring_down, why_none = (None, "") if failure else _ring_down(modes, dataset)
+    findings = watch.findings(failure, master.late_starts)
+    ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
         for name, found in protections.items()
@@ -210,7 +215,7 @@ def _run(
         shifts,
         follows,
         failure,
-        watch.findings(failure, master.late_starts),
+        findings,
         protections,
     )
 
@@ -258,26 +263,3 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
             value = nearest_eigenvalue(compose(at_step, schedule), exact)
             shifts.append(ModeShift(name, step_size, exact, value))
     return shifts
-
-
-def _ring_down(modes: ModesResult, dataset: xr.Dataset) -> tuple[IdentifiedMode | None, str]:
-    """The case's first mode as the simulated response shows it; else None and why, where that is to be said."""
-    table, mode = modes.prepared.case.table.analysis.ring_down, modes.electromechanical
-    recorded = None if table is None else signal(dataset, table.signal)
-    if table is None or mode is None or recorded is None:
-        return None, ""
-    window = recorded.sel(time=slice(table.start, None))
-    interval, times = 0.0, window["time"].values
-    if len(times) > 1:
-        interval = interval_used(times)
-    if interval * mode.frequency_hz > _COARSEST:
-        return None, (
-            f"no ring-down is shown: {table.signal} is known every {interval:g} s, more than a quarter of the period "
-            f"of {1 / mode.frequency_hz:.3g} s of the mode at {mode.frequency_hz:.4g} Hz, which it would show at "
-            "another frequency; make solver.record_interval shorter"
-        )
-    try:
-        found = identify_modes(times, window.values)
-    except AnalysisError:
-        return None, ""
-    return nearest(found, mode.eigenvalue), ""

@@ -47,7 +47,7 @@ def runs(subject: Subject) -> CheckResult:
     with subject.running() as running:
         begin, spent, k = perf_counter(), spent_since(), 0
         sizes = subject.memory["bytes"] = []
-        while k * h < LONGEST and spent() < (least if k * h >= ends else _PATIENCE * least):
+        while k * h < max(ends, LONGEST) and spent() < (least if k * h >= min(ends, LONGEST) else _PATIENCE * least):
             steps, running.time = _HELD * _ROUNDS, k * h
             try:
                 values = running.record(steps, h, stimulus)
@@ -75,7 +75,8 @@ def runs(subject: Subject) -> CheckResult:
         )
     return passed(
         "runs",
-        f"{k} steps of {h:g} s, {k * h:.3g} s in all, at {1e6 * seconds:.1f} µs a step; outputs were read at each",
+        f"{k} steps of {h:g} s, {k * h:.3g} s in all, at {1e6 * seconds:.1f} µs a step; outputs were read at each"
+        + ("" if k * h >= ends - 0.5 * h else f"; its experiment's rest, to t = {ends:g} s, was not run"),
         steps=k,
         step_size=h,
         microseconds_per_step=1e6 * seconds,

@@ -55,7 +55,16 @@ def findings(results: Results) -> str:
             items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
         if verdict := s.get("stability"):
             shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")
-            items.append(f'{escape(s["title"])}: <b class="{shade}">{escape(verdict["sentence"])}</b>')
+            by_modes = f'<b class="{shade}">{escape(verdict["sentence"])}</b>'
+            in_simulation = s.get("stable_in_simulation", True)
+            if in_simulation:
+                items.append(f"{escape(s['title'])}: {by_modes}")
+            else:
+                shade, words = ("bad", "UNSTABLE") if in_simulation is False else ("soft", "not judged throughout")
+                items.append(
+                    f'{escape(s["title"])}: in the simulation <b class="{shade}">{words}</b>; by the modes at the '
+                    f"operating point {by_modes}"
+                )
         items += [
             f'{escape(s["title"])}: <span class="{_shade(f)}">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
             f"{escape(f['message'])}"
