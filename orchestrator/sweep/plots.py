@@ -26,7 +26,7 @@ def save_sweep_plots(samples: Samples, folder: Path) -> list[Path]:
     plots: list[tuple[Callable[[Samples, Path], bool], str]] = [
         (plot_trajectories, "trajectories.png"),
         (plot_named, "named_modes.png"),
-        (plot_swing, "participation.png"),
+        (plot_swing, "sweep_participation.png"),
     ]
     return [folder / name for plot, name in plots if plot(samples, folder / name)]
 

@@ -81,7 +81,7 @@ def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 7 * 2
     assert {"scenario", "a1.gain [1/s]", "trajectory", "damping [%]", "participation a1.x", "beginning"} <= set(rows[0])
-    for name in ("trajectories.png", "named_modes.png", "participation.png"):
+    for name in ("trajectories.png", "named_modes.png", "sweep_participation.png"):
         assert (out / name).stat().st_size > 5000
 
 
