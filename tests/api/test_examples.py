@@ -9,7 +9,7 @@ import pytest
 import orchestrator
 
 MODULES = (
-    *("acceptance", "case", "comparison", "design", "fmu", "identification", "linear", "models", "results"),
+    *("acceptance", "case", "comparison", "comtrade", "design", "fmu", "identification", "linear", "models", "results"),
     *("scenario", "sweep"),
 )
 
