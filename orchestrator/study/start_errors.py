@@ -9,8 +9,9 @@ _PREFACE = "parameters cannot be used: "
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError | None:
-    """The error of a component that refused to initialise; None for any other call."""
-    if _INITIALISATION not in error.call or error.component not in prepared.places:
+    """The error of a component that refused to initialise; None for any other call, and where its process died."""
+    refused = error.status.removeprefix("fmi2").removeprefix("fmi3") in ("Error", "Discard", "an error in the log")
+    if not refused or _INITIALISATION not in error.call or error.component not in prepared.places:
         return None
     name, plan = error.component, prepared.system.components[error.component]
     said = (

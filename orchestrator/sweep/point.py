@@ -12,7 +12,7 @@ from orchestrator.analysis.threads import alone
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import AnalysisError, CaseError, CosimError
+from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.key import fingerprint, key_of, reference_to, same_case, scenario_content
 from orchestrator.points.store import Arrays
@@ -163,7 +163,8 @@ def compute_point(task: SweepPointTask) -> PointRecord:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
             return _record(compute_modes(prepared, task.frequency_range))
         except CaseError as error:
-            return PointRecord(error="; ".join(str(problem) for problem in error.problems))
+            of_fmu = isinstance(error.__cause__, ComponentError)  # which may start another time
+            return PointRecord(error="; ".join(str(problem) for problem in error.problems), lasting=not of_fmu)
         except CosimError as error:
             return PointRecord(error=str(error), lasting=isinstance(error, AnalysisError))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points

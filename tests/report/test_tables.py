@@ -22,7 +22,7 @@ def studied(tmp_path_factory):
     """A run of two scenarios: its folder, and what it printed."""
     folder, printed = tmp_path_factory.mktemp("tables"), StringIO()
     with redirect_stdout(printed):
-        assert main(["run", "two_area", *SCENARIOS, "--stop", "3", "--out", str(folder)]) == 0
+        assert main(["run", "two_area", *SCENARIOS, "--stop", "5", "--out", str(folder)]) == 0
     return folder, printed.getvalue()
 
 
