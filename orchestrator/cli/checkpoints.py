@@ -194,8 +194,6 @@ class StudyCheckpoints:
             remove_at_once(self._folder, self.run)
         elif any(one.exist for one in self._of.values()):
             _say(f"gfor run --resume {self._results} goes on from there")
-        elif self._folder.is_dir():
-            _say(f"gfor run --resume {self._results} does what was asked for; there was no checkpoint yet")
 
 
 def _name_those_not_kept(scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> None:

@@ -56,7 +56,7 @@ def ring_down_of(
 def _obstacle(modes: ModesResult, times: Numbers, findings: Sequence[Finding]) -> str:
     """Why a swing in a window is not the mode, if that is known; else empty."""
     mode = modes.electromechanical
-    if mode is None or not len(times):
+    if mode is None or len(times) < 2:
         return ""
     lost = next((finding for finding in findings if finding.kind in _ENDS), None)
     if lost is not None:
