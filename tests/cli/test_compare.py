@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.cli import main
-from orchestrator.study.run import _ring_down
+from orchestrator.study.ring_down import ring_down_of
 
 TIMES = np.arange(0, 15, 0.01)
 
@@ -131,9 +131,9 @@ def test_a_ring_down_that_is_recorded_too_coarsely_is_left_out(tmp_path, interva
     folder = save(tmp_path / "run", value, times=np.arange(0, 100, interval))
     ring_down = SimpleNamespace(signal="a.omega", start=2.0)
     case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(ring_down=ring_down)))
-    prepared = SimpleNamespace(case=case)
+    prepared = SimpleNamespace(case=case, events=())
     modes = SimpleNamespace(prepared=prepared, electromechanical=SimpleNamespace(eigenvalue=value, frequency_hz=0.5733))
     with xr.open_dataset(folder / "trajectory.nc", engine="scipy") as data:
-        seen, why = _ring_down(modes, data)
+        seen, why = ring_down_of(modes, data, [])
     assert (seen is not None, "no ring-down is shown: a.omega is known every" in why) == (shown, not shown)
     assert seen is None or seen.frequency_hz == pytest.approx(0.5733, abs=1e-3)
