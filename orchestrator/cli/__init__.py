@@ -80,11 +80,20 @@ def _run(words: Sequence[str]) -> int:
     try:
         code = _done(words)
         calls.over = True
-    except KeyboardInterrupt:
+    except BaseException as error:
+        if not _interrupted(error):
+            raise
         calls.over = True
         print(calls.how, file=sys.stderr)
         code = INTERRUPTED
     return code
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether it is Ctrl-C or SIGTERM, or what a library in C made of one that came while it called Python."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _done(words: Sequence[str]) -> int:

@@ -85,7 +85,11 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
         _, error = again.communicate(timeout=300)
         if again.returncode != 0:
             wrong.append(f"resumed: exit code {again.returncode}: {error[-3000:]}")
-    found = values_of(out)
+    try:
+        found = values_of(out)
+    except ValueError as error:  # a file that nobody can read
+        there = [f"{path.relative_to(out)} ({path.stat().st_size} B)" for path in sorted(out.rglob("*"))]
+        return where, [*wrong, f"exit code {code}; {' '.join(str(error).split())[:200]}; there is: {', '.join(there)}"]
     names = [name for name in {*found, *wanted} if found.get(name) != wanted.get(name)]
     return where, [*wrong, *(f"other values: {name}" for name in sorted(names))]
 

@@ -65,3 +65,14 @@ def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
 
     monkeypatch.setattr(study, "run_scenario", none)
     assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")
+
+
+def test_a_library_in_c_made_another_error_of_the_interrupt(gfor, monkeypatch, tmp_path):
+    def as_h5py_does(*_, **__):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as interrupt:
+            raise SystemError("returned a result with an exception set") from interrupt
+
+    monkeypatch.setattr(study, "run_scenario", as_h5py_does)
+    assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")
