@@ -85,6 +85,7 @@ def _run(words: Sequence[str]) -> int:
             raise
         calls.over = True
         print(calls.how, file=sys.stderr)
+        exec("")  # clears CPython's note of an interrupt inside exec(), as of dataclasses; it would end us by SIGINT
         code = INTERRUPTED
     return code
 

@@ -1,6 +1,9 @@
 """`gfor run` that ends before its time: what was computed is kept, and said to be there."""
 
 import json
+import os
+import subprocess
+import sys
 
 import pytest
 import xarray as xr
@@ -76,3 +79,18 @@ def test_a_library_in_c_made_another_error_of_the_interrupt(gfor, monkeypatch, t
 
     monkeypatch.setattr(study, "run_scenario", as_h5py_does)
     assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")
+
+
+def test_an_interrupt_inside_exec_leaves_the_exit_code_alone(tmp_path):
+    code = """
+import sys
+from orchestrator import cli
+cli._done = lambda words: exec("raise KeyboardInterrupt")
+sys.exit(cli.main())
+"""
+    (tmp_path / "planted.py").write_text(code, encoding="utf-8")
+    call = [sys.executable, "-m", "planted", "modes"]  # of a script, Python forgets the interrupt
+    done = subprocess.run(
+        call, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(tmp_path)}
+    )
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
