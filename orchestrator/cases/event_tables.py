@@ -8,6 +8,7 @@ from fmus.grid.names import lines_among
 from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
+from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import (
     BranchChangeTable,
@@ -68,6 +69,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
                 events.append((checked, where))
     where = "--stop" if stop != draft.case.solver.stop_time else draft.place("solver", "stop_time")
     _is_point(draft, clock, stop, "the stop", where)
+    question_islands(draft, [(event, where) for event, where in events if event.time < stop])
     return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
 
 

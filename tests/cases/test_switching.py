@@ -248,3 +248,23 @@ def test_all_loads_of_a_bus_without_capacitance_switched_off_is_refused_with_the
     rule = "the voltage of b2 hangs on its loads; leave one of them switched on"
     with Master(ready.system, ready.schedule, ready.step_size) as master, pytest.raises(ComponentError, match=rule):
         master.run(0.2, ready.events)
+
+
+def trip(kind, element, time="0.1 s"):
+    return f'[[events]]\ntime = "{time}"\ntype = "{kind}_trip"\n{kind} = "{element}"\n'
+
+
+@pytest.mark.parametrize(
+    ("events", "asked"),
+    [
+        (trip("line", "l23") + trip("line", "l31"), "from t = 0.1 s on no unit is connected to b3"),
+        (trip("line", "l23") + trip("line", "l31", "0.2 s"), "from t = 0.2 s on no unit is connected to b3"),
+        (trip("line", "l12") + trip("line", "l23") + trip("unit", "vsc"), "no unit is connected to b2"),
+        (trip("line", "l23") + trip("line", "l31") + trip("load", "town"), ""),
+        (trip("line", "l12") + trip("line", "l23"), ""),
+        (trip("line", "l31"), ""),
+    ],
+)
+def test_loads_without_any_unit_are_asked_about(prepared, events, asked):
+    texts = [q.text for q in prepared(events).questions if "no unit is connected" in q.text]
+    assert (len(texts) == 1 and asked in texts[0]) if asked else not texts

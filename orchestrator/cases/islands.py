@@ -1,0 +1,80 @@
+"""Parts of a network that events leave without any unit: nothing holds their voltages and frequency."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fmus.grid.network import Network
+from orchestrator.cases.draft import Draft
+from orchestrator.coupling.events import Event
+from orchestrator.errors import Problem
+
+_SHOWN = 5
+"""Buses that a question names; the others are counted."""
+
+
+def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
+    """Ask about every part of the network that an event leaves with loads and without a unit.
+
+    Parameters
+    ----------
+    draft
+        With the network and its components; takes the questions.
+    events
+        Those of the run, each with its place in the file.
+    """
+    plan = draft.system.components.get(draft.grid or "")
+    if draft.network is None or draft.network_failed or plan is None or draft.grid is None:
+        return
+    values = {name: plan.value(name) for name in plan.description.parameters}
+    units = {port.name: port.bus for port in draft.network.ports if port.name in draft.system.components}
+    asked = {frozenset(part) for part in _without_unit(draft.network, units, values)}
+    for time, group in groupby(sorted(events, key=lambda pair: pair[0].time), key=lambda pair: pair[0].time):
+        where = ""
+        for event, place in group:
+            where = where or place
+            values |= event.changes().get(draft.grid, {})
+        for part in _without_unit(draft.network, units, values):
+            if frozenset(part) not in asked:
+                asked.add(frozenset(part))
+                more = f" and {len(part) - _SHOWN} more" if len(part) > _SHOWN else ""
+                draft.questions.append(
+                    Problem(
+                        where,
+                        f"from t = {time:g} s on no unit is connected to {', '.join(part[:_SHOWN])}{more}: nothing "
+                        "holds the voltage and the frequency of the loads there, and no verdict speaks of them; trip "
+                        "these loads at the same time",
+                    )
+                )
+
+
+def _without_unit(network: Network, units: Mapping[str, str], values: Mapping[str, object]) -> list[list[str]]:
+    """Buses of each connected part that has a load and no unit.
+
+    Parameters
+    ----------
+    network
+        The grid's.
+    units
+        Bus of each unit.
+    values
+        Of the grid's parameters; what is missing is as it was built.
+    """
+    row = {bus: k for k, bus in enumerate(network.buses)}
+    ends = [(line.from_bus, line.to_bus) for line in network.lines if values.get(line.variable("connected"), True)]
+    for winding in network.transformers:
+        if values.get(f"{winding.name}.connected", True):
+            ends += [(winding.buses[0], bus) for bus in winding.buses[1:]]
+    starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
+    links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
+    _, part_of = connected_components(links, directed=False)
+    fed = {part_of[row[bus]] for unit, bus in units.items() if values.get(f"{unit}.connected", True)}
+    drawn = {
+        part_of[row[load.bus]]
+        for load in network.loads
+        if (load.p_mw or load.q_mvar) and values.get(f"{load.name}.scale", 1.0)
+    }
+    return [[bus for bus in network.buses if part_of[row[bus]] == part] for part in sorted(drawn - fed)]
