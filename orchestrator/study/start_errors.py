@@ -28,6 +28,18 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError 
             f"; {by} P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu of S_n = {given['S_n']:g} MVA{voltage}"
         )
         if computed:
-            rating = f"rating_mva of its unit ({prepared.places[name]})" if name in prepared.of_units else "its S_n"
-            text += f". Q_0 is a result and cannot be set: raise {rating}, or change the voltages or loads around it"
+            text += (
+                f". Where that is too much for it, raise {_rating(prepared, name)}, or change the voltages or loads "
+                "around it; Q_0 is a result and cannot be set"
+            )
     return CaseError(str(prepared.case.path), [Problem(prepared.places[name], text)])
+
+
+def _rating(prepared: PreparedScenario, name: str) -> str:
+    """What the case calls the rating of a component."""
+    if name not in prepared.of_units:
+        return "its S_n"
+    units = prepared.case.table.units
+    if units is not None and units.dyr is not None:
+        return "MBASE of its machine in the RAW file"
+    return f"rating_mva of its unit ({prepared.places[name]})"
