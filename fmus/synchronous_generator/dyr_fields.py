@@ -29,6 +29,8 @@ class DyrField:
         Name of another field that must have the same value, because our part has one parameter for both.
     not_zero
         Whether 0, by which PSS/E means that it chooses a value itself, must be refused.
+    switch
+        Whether the parameters are truth values; 0 is false.
     """
 
     name: str
@@ -38,6 +40,7 @@ class DyrField:
     only: tuple[float, ...] = ()
     same_as: str = ""
     not_zero: bool = False
+    switch: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,9 +50,10 @@ class DyrRecord:
     Attributes
     ----------
     kind
-        Key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``.
+        Key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for a
+        record that is a whole component.
     part
-        Its value, the name of our part.
+        Its value, the name of our part; for a whole component, its model.
     fields
         In the file's order.
     """

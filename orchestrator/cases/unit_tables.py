@@ -2,10 +2,7 @@
 share each unit.
 """
 
-import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,57 +12,19 @@ from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
-from orchestrator.cases.psse.dyr import machine_models, read_dyr
-from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.psse.dyr_units import rows_of_machines, with_records
 from orchestrator.cases.schema import ComponentTable, UnitsTable
+from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError
 
 UNIT_KINDS = ("sg", "gfor")
 """First parts of the names of a unit's generator and converter."""
-
-_MOST_VOLTAGE = 2.0
-"""Largest voltage [pu] that a unit can hold."""
 
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
 
 _COLUMNS = ("bus", "rating_mva", "p_mw", "v_pu", "alpha", *_LIMITS)
-
-
-@dataclass(frozen=True, slots=True)
-class UnitRow:
-    """One generating unit.
-
-    Attributes
-    ----------
-    label, bus
-        Name of the unit, and its bus.
-    rating_mva, p_mw, v_pu
-        Rating [MVA], active power [MW] and voltage [pu].
-    alpha
-        Share of the converter, if the row gives it; otherwise None.
-    parameters
-        Parameters of the generator and of the converter, by kind.
-    place
-        File and line of the row; empty where the unit comes from the network's source.
-    parts
-        Parts of the generator that the row itself chooses.
-    q_min_mvar, q_max_mvar
-        Limits of reactive power [Mvar]; infinite without.
-    """
-
-    label: str
-    bus: str
-    rating_mva: float
-    p_mw: float
-    v_pu: float
-    alpha: float | None = None
-    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    place: str = ""
-    parts: Mapping[str, str] = field(default_factory=dict)
-    q_min_mvar: float = -math.inf
-    q_max_mvar: float = math.inf
 
 
 def unit_components(draft: Draft) -> dict[str, ComponentTable]:
@@ -79,10 +38,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         return {}
     generation = draft.data.generation if draft.data else {}
     try:
-        if table.dyr is None:
-            rows = unit_rows(table, draft.directory, generation)
-        else:
-            rows = _rows_of_dyr(table, draft.directory, draft.data.machines if draft.data else ())
+        rows = unit_rows(table, draft.directory, generation) if table.dyr is None else _rows_of_dyr(draft, table)
     except InputError as error:
         if draft.network_failed:
             return {}  # figures that the source would have given are missing
@@ -112,7 +68,9 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
                 parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
-                components[name] = ComponentTable(model=model, bus=row.bus, parameters=values, **parts)
+                if row.converter is not None:  # its record says all
+                    values = {**row.parameters.get(kind, {}), **own}
+                components[name] = ComponentTable(model=row.converter or model, bus=row.bus, parameters=values, **parts)
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
                 draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key)
     return components
@@ -138,7 +96,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
             )
             for bus, g in generation.items()
         ]  # fmt: skip
-        return [_checked(row, "the network's source") for row in rows]
+        return [checked(row, "the network's source") for row in rows]
     rows = []
     for entry in _known_rows(directory / table.file):
         bus = bus_name(entry["bus"])
@@ -158,7 +116,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         numbers = {**figures, **limits}
         parts = _parts_in(entry)
         unit = UnitRow(entry["bus"], bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
-        rows.append(_checked(unit, place_of(entry)))
+        rows.append(checked(unit, place_of(entry)))
     repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
     if repeated:
         raise InputError(f"{directory / table.file}: bus {', '.join(repeated)} has more than one row; merge its units")
@@ -180,59 +138,24 @@ def _known_rows(path: Path) -> list[Row]:
     return rows
 
 
-def _rows_of_dyr(table: UnitsTable, directory: Path, machines: Sequence[Machine]) -> list[UnitRow]:
-    """A unit for each machine of a RAW file, of the parts that the DYR file names."""
+def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
+    """A unit for each machine of a RAW file, of what the DYR file names; a converter alone needs no record."""
     if table.file is not None:
         raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
+    machines = draft.data.machines if draft.data else ()
     if not machines:
         raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
-    path = directory / (table.dyr or "")
-    models = machine_models(read_dyr(path), machines, table.dyr_leave_out)
-    at_bus: dict[int, list[Machine]] = {}
-    for machine in machines:
-        at_bus.setdefault(machine.bus, []).append(machine)
-    rows = []
-    for machine in machines:
-        name = re.sub(r"\W", "_", machine.name.strip())
-        here = at_bus[machine.bus]
-        label = str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}"
-        model = models[machine.bus, machine.name.strip()]
-        row = UnitRow(
-            label, bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu,
-            parameters={"sg": model.parameters}, place=str(path), parts=model.parts,
-            q_min_mvar=sum(m.q_min_mvar for m in here), q_max_mvar=sum(m.q_max_mvar for m in here),
-        )  # fmt: skip
-        rows.append(_checked(row, str(path)))
-    return rows
+    path = draft.directory / (table.dyr or "")
+    rows = rows_of_machines(machines, str(path))
+    alphas = _alphas(draft, table, rows)
+    replaced = [row.label for row in rows if alphas[row.label] == 1]
+    return with_records(rows, machines, path, table.dyr_leave_out, replaced)
 
 
 def _figure(entry: Row, column: str, given: Generation | None) -> float | None:
     """The figure of the file, or otherwise of the source."""
     value = optional_number(entry, column)
     return getattr(given, column, None) if value is None else value
-
-
-def _checked(row: UnitRow, place: str) -> UnitRow:
-    if not row.rating_mva > 0:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"
-        )
-    if abs(row.p_mw) > row.rating_mva:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} feeds {row.p_mw:g} MW, more than its rating of "
-            f"{row.rating_mva:g} MVA; raise the rating or lower p_mw"
-        )
-    if not row.q_min_mvar <= row.q_max_mvar:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = "
-            f"{row.q_max_mvar:g}; swap them"
-        )
-    if not 0 < row.v_pu <= _MOST_VOLTAGE:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it is in pu of the nominal voltage, and "
-            f"must lie between 0 and {_MOST_VOLTAGE:g}"
-        )
-    return row
 
 
 def _parameters(entry: Row, kind: str) -> dict[str, Any]:
@@ -261,6 +184,7 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
     Within a layer, a choice for this unit goes before the one for all.
     """
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
+    converters = {row.label: row.converter for row in rows if row.converter is not None}
     for choice in (choice for layer in draft.layers for choice in layer.shares):
         label = choice.label
         if label and label not in alphas:
@@ -271,4 +195,8 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
             alphas |= {label: choice.share} if label else dict.fromkeys(alphas, choice.share)
         except ValueError as error:
             draft.note(choice.place, str(error))
-    return alphas
+            continue
+        if label in converters and choice.share != 1:
+            text = f"the unit {label!r} is a converter by its record ({converters[label]}); alpha is 1 there"
+            draft.note(choice.place, text)
+    return alphas | dict.fromkeys(converters, 1.0)

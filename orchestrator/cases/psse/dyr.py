@@ -1,11 +1,12 @@
-"""PSS/E dynamics data (DYR): machines, exciters, governors and stabilisers of the generators of a RAW file."""
+"""PSS/E dynamics data (DYR): machines with their controls, and converters, of the generators of a RAW file."""
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.errors import InputError
@@ -13,10 +14,15 @@ from orchestrator.errors import InputError
 MOST_BYTES = 100_000_000
 """Of a file."""
 
+_KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
+
 _TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
 _MOST_SHOWN = 20
 _WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
 """Parts of a generator for which a file has no record: what PSS/E assumes."""
+
+_FOLLOWING = ("REGC", "REEC", "REPC", "WTG", "WT4", "WT3", "PVGU", "PVEU", "PLNTB")
+"""How the names of grid-following converters and their controls begin."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +38,11 @@ class DynamicRecord:
 
 @dataclass(frozen=True)
 class MachineModel:
-    """What a generator is made of, and the parameters that its records set."""
+    """What a generator is made of, and the parameters that its records set; or the model of a converter."""
 
     parts: Mapping[str, str]
     parameters: Mapping[str, float]
+    converter: str | None = None
 
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
@@ -76,7 +83,10 @@ def _record(place: str, tokens: Sequence[str]) -> DynamicRecord:
 
 
 def machine_models(
-    records: Sequence[DynamicRecord], machines: Sequence[Machine], leaving_out: Sequence[str] = ()
+    records: Sequence[DynamicRecord],
+    machines: Sequence[Machine],
+    leaving_out: Sequence[str] = (),
+    replaced: Collection[tuple[int, str]] = (),
 ) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines in service, by bus and identifier.
 
@@ -88,6 +98,8 @@ def machine_models(
         Of the RAW file.
     leaving_out
         Models whose records may be left out; their generators keep what the case says of that part.
+    replaced
+        Machines in whose place a converter of the case stands: they need no record.
 
     Raises
     ------
@@ -104,9 +116,14 @@ def machine_models(
         key = (record.bus, record.machine)
         if key not in at or record.name in left:
             continue
-        known = DYR_RECORDS.get(record.name)
+        known = _KNOWN.get(record.name)
         if known is None:
             problems.append(f"{record.place}: no part of ours stands for {record.name} (bus {record.bus})")
+            if record.name.startswith(_FOLLOWING):
+                problems[-1] += (
+                    ", a grid-following converter; name its records in dyr_leave_out, and give its unit alpha = 1 with "
+                    "a converter of ours"
+                )
         elif known.kind in parts[key]:
             problems.append(f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}")
         else:
@@ -115,9 +132,14 @@ def machine_models(
                 values[key] |= _values(record, known)
             except InputError as error:
                 problems.append(str(error))
-    bare = [f"machine {name!r} at bus {bus} has no record of a machine" for bus, name in at
-            if "machine" not in parts[bus, name]]  # fmt: skip
-    problems += bare
+    for (bus, name), own in parts.items():
+        if "converter" in own and len(own) > 1:
+            others = ", ".join(kind for kind in own if kind != "converter")
+            problems.append(
+                f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
+            )
+        elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
+            problems.append(f"machine {name!r} at bus {bus} has no record of a machine")
     if problems:
         more = f"\n  and {len(problems) - _MOST_SHOWN} more" if len(problems) > _MOST_SHOWN else ""
         raise InputError(
@@ -125,11 +147,18 @@ def machine_models(
             "dyr_leave_out:\n  " + "\n  ".join(problems[:_MOST_SHOWN]) + more
         )
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
-    return {key: _model(at[key], parts[key], values[key], key in open_) for key in at}
+    return {
+        key: _model(at[key], parts[key], values[key], key in open_)
+        for key in at
+        if {"machine", "converter"} & {*parts[key]}
+    }
 
 
 def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
     """The model of a machine; ``partial``: a record of it was left out, and the case says what stands for it."""
+    if "converter" in parts:
+        coupling = {"RL": machine.source.real, "XL": machine.source.imag}
+        return MachineModel({}, {**coupling, **values}, parts["converter"])
     absent = {} if partial else {kind: part for kind, part in _WITHOUT.items() if kind not in parts}
     source = {"machine.R_s": machine.source.real} if machine.source.real else {}
     if parts["machine"] == "classical":
@@ -163,7 +192,7 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
             raise InputError(
                 f"{record.place}: {record.name} has {field.name} = 0, which PSS/E replaces; give its value"
             )
-        product = value * given[field.times] if field.times else value
+        product = bool(value) if field.switch else value * given[field.times] if field.times else value
         found |= dict.fromkeys(field.parameters, product) | dict.fromkeys(field.negated, -product)
     return found
 

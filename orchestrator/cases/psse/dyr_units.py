@@ -1,0 +1,82 @@
+"""Units of a case from the machines of a RAW file and their records in a DYR file."""
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.psse.dyr import machine_models, read_dyr
+from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.unit_row import UnitRow, checked
+
+
+def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
+    """A unit for each machine, in their order, without what it is made of.
+
+    Parameters
+    ----------
+    machines
+        In service.
+    place
+        Path of the DYR file.
+
+    Raises
+    ------
+    InputError
+        If a machine's figures cannot be.
+    """
+    at_bus: dict[int, list[Machine]] = {}
+    for machine in machines:
+        at_bus.setdefault(machine.bus, []).append(machine)
+    rows = []
+    for machine in machines:
+        here = at_bus[machine.bus]
+        name = re.sub(r"\W", "_", machine.name.strip())
+        row = UnitRow(
+            str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}",
+            bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu, place=place,
+            q_min_mvar=sum(m.q_min_mvar for m in here), q_max_mvar=sum(m.q_max_mvar for m in here),
+        )  # fmt: skip
+        rows.append(checked(row, place))
+    return rows
+
+
+def with_records(
+    rows: Sequence[UnitRow],
+    machines: Sequence[Machine],
+    path: Path,
+    leaving_out: Sequence[str],
+    without: Collection[str],
+) -> list[UnitRow]:
+    """The units with what the records say of them.
+
+    Parameters
+    ----------
+    rows, machines
+        In the same order.
+    path
+        Of the DYR file.
+    leaving_out
+        Models whose records may be left out.
+    without
+        Labels of units that are converters of the case alone, and need no record.
+
+    Raises
+    ------
+    InputError
+        As `read_dyr` and `machine_models`.
+    """
+    keys = [(machine.bus, machine.name.strip()) for machine in machines]
+    replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
+    models = machine_models(read_dyr(path), machines, leaving_out, replaced)
+    found = []
+    for key, row in zip(keys, rows, strict=True):
+        model = models.get(key)
+        if model is None:
+            found.append(row)
+        elif model.converter is None:
+            found.append(replace(row, parameters={"sg": model.parameters}, parts=model.parts))
+        else:
+            found.append(replace(row, parameters={"gfor": model.parameters}, converter=model.converter))
+    return found

@@ -1,0 +1,86 @@
+"""One generating unit of a case: its figures, and whether they can be."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from orchestrator.errors import InputError
+
+_MOST_VOLTAGE = 2.0
+"""Largest voltage [pu] that a unit can hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class UnitRow:
+    """One generating unit.
+
+    Attributes
+    ----------
+    label, bus
+        Name of the unit, and its bus.
+    rating_mva, p_mw, v_pu
+        Rating [MVA], active power [MW] and voltage [pu].
+    alpha
+        Share of the converter, if the row gives it; otherwise None.
+    parameters
+        Parameters of the generator and of the converter, by kind.
+    place
+        File and line of the row; empty where the unit comes from the network's source.
+    parts
+        Parts of the generator that the row itself chooses.
+    q_min_mvar, q_max_mvar
+        Limits of reactive power [Mvar]; infinite without.
+    converter
+        Model of the converter that the whole unit is by its record.
+    """
+
+    label: str
+    bus: str
+    rating_mva: float
+    p_mw: float
+    v_pu: float
+    alpha: float | None = None
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    place: str = ""
+    parts: Mapping[str, str] = field(default_factory=dict)
+    q_min_mvar: float = -math.inf
+    q_max_mvar: float = math.inf
+    converter: str | None = None
+
+
+def checked(row: UnitRow, place: str) -> UnitRow:
+    """The row itself.
+
+    Parameters
+    ----------
+    row
+        With its figures.
+    place
+        Where they stand, for the error.
+
+    Raises
+    ------
+    InputError
+        If a figure cannot be.
+    """
+    if not row.rating_mva > 0:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"
+        )
+    if abs(row.p_mw) > row.rating_mva:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} feeds {row.p_mw:g} MW, more than its rating of "
+            f"{row.rating_mva:g} MVA; raise the rating or lower p_mw"
+        )
+    if not row.q_min_mvar <= row.q_max_mvar:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = "
+            f"{row.q_max_mvar:g}; swap them"
+        )
+    if not 0 < row.v_pu <= _MOST_VOLTAGE:
+        raise InputError(
+            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it is in pu of the nominal voltage, and "
+            f"must lie between 0 and {_MOST_VOLTAGE:g}"
+        )
+    return row
