@@ -1,12 +1,20 @@
-"""How loads follow voltage and frequency: each load's own keys, then those of ``[network.load_model]``."""
+"""How loads follow voltage and frequency: each load's own keys, then those of ``[network.load_model]``, and parts of
+constant impedance and current that a source tells apart.
+"""
 
 from dataclasses import replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
+from orchestrator.errors import InputError
+
+_LARGEST_SHARE = 100.0
+"""Of a part by the whole: above, the parts cancel, and the whole is none to take shares of."""
 
 
-def with_laws(load: Load, table: NetworkTable, own: LoadModelTable | None = None) -> Load:
+def with_laws(
+    load: Load, table: NetworkTable, own: LoadModelTable | None = None, parts: tuple[complex, complex] = (0j, 0j)
+) -> Load:
     """The load with its laws.
 
     Without a key, a load is a constant impedance, and static generation (P < 0) a constant current.
@@ -19,14 +27,33 @@ def with_laws(load: Load, table: NetworkTable, own: LoadModelTable | None = None
         The network, with the models of all loads and of all static generation.
     own
         The load's own keys, which decide first.
+    parts
+        What of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
+
+    Raises
+    ------
+    InputError
+        If the parts of P or Q cancel each other.
     """
     feeds = load.p_mw < 0
     models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]
     usual: LoadLaw = "current" if feeds else "impedance"
     return replace(
         load,
-        active=_law(next((m.active for m in models if m.active is not None), usual)),
-        reactive=_law(next((m.reactive for m in models if m.reactive is not None), usual)),
+        active=_mixed(
+            load,
+            "P",
+            _law(next((m.active for m in models if m.active is not None), usual)),
+            load.p_mw,
+            (parts[0].real, parts[1].real),
+        ),
+        reactive=_mixed(
+            load,
+            "Q",
+            _law(next((m.reactive for m in models if m.reactive is not None), usual)),
+            load.q_mvar,
+            (parts[0].imag, parts[1].imag),
+        ),
         k_pf=next((m.k_pf for m in models if m.k_pf is not None), 0.0),
         k_qf=next((m.k_qf for m in models if m.k_qf is not None), 0.0),
         v_min=next((m.v_min for m in models if m.v_min is not None), None),
@@ -36,3 +63,19 @@ def with_laws(load: Load, table: NetworkTable, own: LoadModelTable | None = None
 
 def _law(law: LoadLaw) -> Zip:
     return LAWS[law] if isinstance(law, str) else Zip(law.z, law.i, law.p)
+
+
+def _mixed(load: Load, quantity: str, rest: Zip, total: float, parts: tuple[float, float]) -> Zip:
+    """The law of a load of which two parts are known; the rest follows a law of its own."""
+    impedance, current = parts
+    if not (impedance or current):
+        return rest
+    others = total - impedance - current
+    if max(abs(impedance), abs(current), abs(others)) > _LARGEST_SHARE * abs(total):
+        raise InputError(
+            f"{load.name} at {load.bus}: its {quantity} is {total:g}, the sum of {others:g}, {current:g} of constant "
+            f"current and {impedance:g} of constant impedance [MW, Mvar]; a load that cancels itself has no shares: "
+            "remove keep_load_parts, or give the parts in [network.loads]"
+        )
+    z, i, p = (share / total for share in (impedance, current, others))
+    return Zip(z + rest.z * p, i + rest.i * p, rest.p * p)

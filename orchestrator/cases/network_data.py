@@ -1,6 +1,5 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -81,7 +80,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
-        (*(with_laws(load, table) for load in source.loads), *loads),
+        (*(with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j))) for x in source.loads), *loads),
         (*source.shunts, *shunts),
         source.generation,
         source.slack,
@@ -109,9 +108,10 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     """The network of another program, what was taken over in another form, and its machines."""
     imported = ImportedNetwork()
     if table.raw is not None:
-        return _from_raw(directory / table.raw, table.leave_out)
-    if table.leave_out:
-        raise InputError("leave_out is for networks of PSS/E; remove the key, or give the file as 'raw'")
+        return _from_raw(directory / table.raw, table)
+    for key in ("leave_out", "keep_load_parts"):
+        if getattr(table, key):
+            raise InputError(f"{key} is for networks of PSS/E; remove the key, or give the file as 'raw'")
     if table.matpower is not None:
         imported = import_network(read_matpower(directory / table.matpower))
     if table.pandapower is not None:
@@ -119,9 +119,9 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     return imported, (), ()
 
 
-def _from_raw(path: Path, leaving_out: Sequence[str]) -> _Source:
+def _from_raw(path: Path, table: NetworkTable) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
-    raw = read_raw(path, leaving_out)
+    raw = read_raw(path, table.leave_out, keep_load_parts=table.keep_load_parts)
     imported = import_network(raw.tables)
     ratings: dict[str, float] = {}
     for machine in raw.machines:

@@ -44,7 +44,9 @@ class _Member:
 
 @dataclass(frozen=True)
 class ImportedNetwork:
-    """Elements of a network, and the generation at each bus."""
+    """Elements of a network, the generation at each bus, and the parts of constant impedance and current of loads [MW,
+    Mvar], by the load's name.
+    """
 
     buses: tuple[str, ...] = ()
     lines: tuple[Line, ...] = ()
@@ -54,6 +56,7 @@ class ImportedNetwork:
     slack: str | None = None
     frequency: float | None = None
     transformers: tuple[ThreeWinding, ...] = ()
+    load_parts: dict[str, tuple[complex, complex]] = field(default_factory=dict)
 
 
 def import_network(source: SourceTables) -> ImportedNetwork:
@@ -96,6 +99,7 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         bus_of(labels[reference[0]]) if reference else None,
         source.frequency,
         tuple(transformers),
+        {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
     )
 
 
@@ -157,13 +161,16 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
 
 
 def _loads(source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]) -> list[Load]:
-    """Loads; a negative one is static generation. At a generator's bus it is added to the generators there."""
+    """Loads; a negative one is static generation. At a generator's bus it is added to the generators there, unless it
+    has parts that follow the voltage.
+    """
     loads = []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])
-        if p < -_NEGLIGIBLE and number in at_bus:
+        parts = source.load_parts.get(number, ())
+        if p < -_NEGLIGIBLE and number in at_bus and not parts:
             at_bus[number].append(_Member(-p, at_bus[number][0].v_pu, -p / _POWER_FACTOR))
-        elif abs(p) > _NEGLIGIBLE or abs(q) > _NEGLIGIBLE:
+        elif max(map(abs, (p, q, *parts))) > _NEGLIGIBLE:
             loads.append(Load(f"load_{label}", bus_of(label), _clean(p), _clean(q)))
     return loads
 

@@ -7,7 +7,7 @@ everything out of service are dealt with there.
 import logging
 import re
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,9 @@ class SourceTables:
         Number of a bus → what people call it.
     frequency
         Rated frequency [Hz], where the source knows it.
+    load_parts
+        Number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
+        tells them apart; the rest of the bus' load is as the case says.
     """
 
     name: str
@@ -46,6 +49,7 @@ class SourceTables:
     branch_to_earth: NDArray[np.complex128]
     labels: dict[int, str]
     frequency: float | None = None
+    load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)
 
 
 def read_matpower(path: Path) -> SourceTables:

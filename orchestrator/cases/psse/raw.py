@@ -59,7 +59,7 @@ class RawNetwork:
     changes: tuple[Problem, ...]
 
 
-def read_raw(path: Path, leaving_out: Sequence[str] = ()) -> RawNetwork:
+def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
     """Read the network of a RAW file.
 
     Parameters
@@ -68,6 +68,9 @@ def read_raw(path: Path, leaving_out: Sequence[str] = ()) -> RawNetwork:
         Of the file.
     leaving_out
         Kinds of elements that may be left out.
+    keep_load_parts
+        Whether parts of loads stay of constant current and of constant impedance; else the first are noted as changed,
+        and the second are shunts.
 
     Raises
     ------
@@ -75,20 +78,21 @@ def read_raw(path: Path, leaving_out: Sequence[str] = ()) -> RawNetwork:
         If a record cannot be used; file, line and field are named.
     """
     raw = read_records(path)
-    return _Reading(raw, Changes(raw.place)).network(leaving_out)
+    return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
 
 
 class _Reading:
     """One file on its way to tables."""
 
-    def __init__(self, raw: RawFile, changes: Changes) -> None:
-        self._raw, self._changes = raw, changes
+    def __init__(self, raw: RawFile, changes: Changes, keep_load_parts: bool) -> None:
+        self._raw, self._changes, self._keep_load_parts = raw, changes, keep_load_parts
         self._rows: dict[int, list[float]] = {}
         self._kilovolts: dict[int, float] = {}
         self._magnitudes: dict[int, float] = {}
         self._branches: list[list[float]] = []
         self._to_earth: list[tuple[complex, complex]] = []
         self._labels: dict[int, str] = {}
+        self._load_parts: dict[int, tuple[complex, complex]] = {}
 
     def network(self, leaving_out: Sequence[str]) -> RawNetwork:
         leave_out(self._raw, leaving_out, self._changes)
@@ -111,6 +115,7 @@ class _Reading:
             np.array(self._to_earth, dtype=complex).reshape(-1, 2),
             self._labels,
             self._raw.frequency,
+            self._load_parts,
         )
         return RawNetwork(tables, machines, tuple(self._changes.listed()))
 
@@ -144,8 +149,9 @@ class _Reading:
                 continue
             names = ("PL", "QL", "IP", "IQ", "YP", "YQ")
             pl, ql, ip, iq, yp, yq = (record.number(5 + k, name, 0.0) for k, name in enumerate(names))
-            current = complex(ip, iq) * self._magnitudes[bus]
-            if current:
+            v = self._magnitudes[bus]
+            current, admittance = complex(ip, iq) * v, complex(yp, yq)
+            if current and not self._keep_load_parts:
                 text = "load of constant current: a constant impedance that draws the same at the file's voltage"
                 self._changes.note(record.line, text)
             own = 0j
@@ -154,7 +160,13 @@ class _Reading:
                 if own:
                     self._changes.note(record.line, "distributed generation: taken away from its load")
             self._add(bus, 2, complex(pl, ql) + current - own)
-            self._add(bus, 4, complex(yp, yq))
+            if self._keep_load_parts and (current or admittance):
+                impedance = admittance.conjugate() * v**2  # YQ is positive where it generates, as with shunts
+                self._add(bus, 2, impedance)
+                z, i = self._load_parts.get(bus, (0j, 0j))
+                self._load_parts[bus] = (z + impedance, i + current)
+            else:
+                self._add(bus, 4, admittance)
 
     def _shunts(self) -> None:
         for record in self._raw.of("fixed shunt"):
