@@ -8,6 +8,7 @@ EXTRAS = {
     "ziglang": "build",
     "matpowercaseframes": "networks",
     "pandapower": "networks",
+    "pypowsybl": "cgmes",
     "skrf": "black-box",
     "distributed": "cluster",
     "helics": "federation",

@@ -4,9 +4,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
+from orchestrator.cases.cgmes.network import read_cgmes
 from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
 from orchestrator.cases.load_models import with_laws
-from orchestrator.cases.network_import import Generation, ImportedNetwork, import_network
+from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
@@ -109,9 +110,12 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     imported = ImportedNetwork()
     if table.raw is not None:
         return _from_raw(directory / table.raw, table)
-    for key in ("leave_out", "keep_load_parts"):
-        if getattr(table, key):
-            raise InputError(f"{key} is for networks of PSS/E; remove the key, or give the file as 'raw'")
+    if table.keep_load_parts:
+        raise InputError("keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'")
+    if table.cgmes is not None:
+        return _from_cgmes(directory / table.cgmes, table)
+    if table.leave_out:
+        raise InputError("leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'")
     if table.matpower is not None:
         imported = import_network(read_matpower(directory / table.matpower))
     if table.pandapower is not None:
@@ -129,6 +133,15 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
     return replace(imported, generation=generation), raw.changes, raw.machines
+
+
+def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
+    """A network of CGMES; the ratings of the units are those of the model where it knows them."""
+    model = read_cgmes(path, table.leave_out)
+    imported = import_network(model.tables)
+    ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
+    generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
+    return replace(imported, generation=generation), model.changes, ()
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:

@@ -221,7 +221,7 @@ class Preparer:
         table = self.draft.case.network
         if table is None:
             return
-        given = [key for key in ("matpower", "pandapower", "raw") if getattr(table, key) is not None]
+        given = [key for key in ("matpower", "pandapower", "raw", "cgmes") if getattr(table, key) is not None]
         if len(given) > 1:
             names = " or ".join(map(repr, given))
             self.draft.note_network(self.draft.place("network"), f"give either {names}, not both")

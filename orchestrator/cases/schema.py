@@ -147,6 +147,7 @@ class NetworkTable(Table):
     matpower: str | None = None
     pandapower: str | None = None
     raw: str | None = None
+    cgmes: str | None = None
     leave_out: list[str] = []
     keep_load_parts: Annotated[bool, Field(strict=True)] = False
     frequency: Hertz | None = Field(default=None, gt=0)

@@ -1,10 +1,10 @@
 """What a file holds and our network does not, or holds in another form: listed, and refused without the user's word."""
 
-from collections import defaultdict
 from collections.abc import Sequence
 
 from orchestrator.cases.psse.records import RawFile
-from orchestrator.errors import InputError, Problem
+from orchestrator.cases.source_changes import Changes
+from orchestrator.errors import InputError
 
 _LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}
 """Lines of a record."""
@@ -18,25 +18,6 @@ _WITHOUT_EFFECT = {
 }  # fmt: skip
 _KNOWN = {"bus", "load", "fixed shunt", "generator", "branch", "system switching device", "transformer",
           "switched shunt"}  # fmt: skip
-
-
-class Changes:
-    """What was taken over in another form, by kind, with the lines of the records."""
-
-    def __init__(self, place: str) -> None:
-        self._place = place
-        self._lines: dict[str, list[int]] = defaultdict(list)
-
-    def note(self, line: int, text: str) -> None:
-        """Add a record; those with the same text become one row."""
-        self._lines[text].append(line)
-
-    def listed(self) -> list[Problem]:
-        """One row for each kind, complete: how many records, what was done, and every line."""
-        return [
-            Problem(f"{self._place}, line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines))}", text)
-            for text, lines in self._lines.items()
-        ]
 
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:

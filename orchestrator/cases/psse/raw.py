@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.network_sources import SourceTables
-from orchestrator.cases.psse.changes import Changes, leave_out
+from orchestrator.cases.psse.changes import leave_out
 from orchestrator.cases.psse.records import RawFile, Record, read_records
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
+from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import InputError, Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10

@@ -1,0 +1,1 @@
+"""Networks of CGMES (CIM), read with pypowsybl."""

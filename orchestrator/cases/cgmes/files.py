@@ -1,0 +1,90 @@
+"""CGMES files, as pypowsybl reads them: a zip of profiles, a zip of such zips, or a folder of either."""
+
+import io
+import logging
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from fmus.toolchain.extras import require
+from orchestrator.errors import InputError
+
+MOST_BYTES = 2_000_000_000
+"""Of all profiles together, unpacked: twenty times a national grid of 10,000 buses."""
+
+_NEEDED = {"EQ": "EquipmentCore", "SSH": "SteadyStateHypothesis", "TP": "Topology", "SV": "StateVariables"}
+"""Profile → word in the address of its version, in the file's head."""
+
+_HEAD = 64 * 1024
+"""Bytes of a file in which its profile is looked for."""
+
+
+def load_cgmes(path: Path) -> Any:
+    """The network of a CGMES model, as pypowsybl holds it.
+
+    Raises
+    ------
+    MissingLibraryError
+        If pypowsybl is not installed.
+    InputError
+        If there is no such file, it holds no CGMES, a profile is missing, or pypowsybl refuses it.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV")
+    profiles = _profiles(path)
+    require(f"reading the CGMES model {path.name}", "pypowsybl")
+    logging.getLogger("powsybl").setLevel(logging.CRITICAL)
+    import pypowsybl.network as powsybl  # noqa: PLC0415 - seconds to import, and needed only here
+
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in profiles.items():
+            archive.writestr(name, content)
+    packed.seek(0)
+    try:
+        return powsybl.load_from_binary_buffers([packed])
+    except Exception as error:  # whatever comes through from Java
+        said = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise InputError(f"{path}: pypowsybl cannot read it as CGMES: {said}; check the export") from error
+
+
+def _profiles(path: Path) -> dict[str, bytes]:
+    """Name → content of the profiles' files."""
+    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+    found: dict[str, bytes] = {}
+    try:
+        for file in files:
+            if file.suffix.lower() == ".zip":
+                _unpack(path, file.read_bytes(), found)
+            elif file.suffix.lower() == ".xml":
+                found[file.name] = file.read_bytes()
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+        raise InputError(
+            f"{file}: it is no zip archive that can be read: {error}; export the model once more"
+        ) from error
+    if not found:
+        raise InputError(f"{path}: it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV")
+    heads = [content[:_HEAD].decode("utf-8", errors="replace") for content in found.values()]
+    missing = [profile for profile, word in _NEEDED.items()
+               if not any(word in head or f"/{profile}/" in head for head in heads)
+               and not any(f"_{profile}" in name.upper() for name in found)]  # fmt: skip
+    if missing:
+        raise InputError(
+            f"{path}: the {'profiles' if len(missing) > 1 else 'profile'} {', '.join(missing)} "
+            f"{'are' if len(missing) > 1 else 'is'} missing among {', '.join([*found][:8])}; export the solved model "
+            "with EQ, SSH, TP and SV"
+        )
+    return found
+
+
+def _unpack(path: Path, content: bytes, found: dict[str, bytes], depth: int = 0) -> None:
+    """Add the .xml files of a zip, and those of zips in it; what else lies in it is left."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        for entry in archive.infolist():
+            suffix = Path(entry.filename).suffix.lower()
+            if sum(map(len, found.values())) + entry.file_size > MOST_BYTES:
+                raise InputError(f"{path}: its profiles have more than {MOST_BYTES} bytes; no larger model is read")
+            if suffix == ".xml":
+                found[Path(entry.filename).name] = archive.read(entry)
+            elif suffix == ".zip" and depth == 0:
+                _unpack(path, archive.read(entry), found, 1)

@@ -1,0 +1,304 @@
+"""A CGMES model as tables of a network source."""
+
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.cases.cgmes.branches import BASE_MVA, Branch, branch, finite, lines, stars, transformers
+from orchestrator.cases.cgmes.files import load_cgmes
+from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.source_changes import Changes
+from orchestrator.errors import InputError, Problem
+
+_TABLES = {
+    "static var compensator": "get_static_var_compensators",
+    "hvdc line": "get_hvdc_lines",
+    "dc line": "get_dc_lines",
+    "battery": "get_batteries",
+}
+LEFT_OUT = (*_TABLES, "island")
+"""Elements that our network does not have, and parts of it that nothing joins to the largest; `leave_out` of the case
+names those that may go."""
+
+_NO_LIMIT = 9998.0
+"""Mvar and MW by which exports say that there is no limit."""
+
+_MOST_RATING = 9998.0
+"""MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is."""
+
+
+@dataclass(frozen=True)
+class CgmesNetwork:
+    """A model's tables, what was taken over in another form, and known ratings [MVA] by the bus' label."""
+
+    tables: SourceTables
+    changes: tuple[Problem, ...]
+    ratings: dict[str, float]
+
+
+def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
+    """Read the network of a CGMES model.
+
+    Parameters
+    ----------
+    path
+        Of a zip, or of a folder.
+    leaving_out
+        Kinds of `LEFT_OUT` that the user lets go.
+
+    Raises
+    ------
+    MissingLibraryError
+        If pypowsybl is not installed.
+    InputError
+        If the model cannot be read or used.
+    """
+    unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
+    if unknown:
+        raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")
+    files = sorted(path.iterdir()) if path.is_dir() else [path] if path.exists() else []
+    return _read(path, tuple((str(f), f.stat().st_mtime_ns) for f in files), tuple(leaving_out))
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[str, ...]) -> CgmesNetwork:
+    """The network; ``versions`` keep newer contents apart. Every scenario of a case asks."""
+    return convert(str(path), load_cgmes(path), leaving_out)
+
+
+def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
+    """Tables of a network that pypowsybl holds.
+
+    Parameters
+    ----------
+    place
+        Path of its source, for messages.
+    source
+        pypowsybl's network.
+    leaving_out
+        Kinds of `LEFT_OUT` that may go.
+
+    Raises
+    ------
+    InputError
+        If it holds what our network does not have.
+    """
+    return _Reading(place, source).network(leaving_out)
+
+
+class _Reading:
+    """One model on its way to tables."""
+
+    def __init__(self, place: str, source: Any) -> None:
+        self._place, self._source = place, source
+        self._changes = Changes(place, "element")
+        self._nominal: dict[str, float] = {}
+        self._numbers: dict[str, int] = {}
+        self._labels: dict[str, str] = {}
+        self._volts: dict[str, float] = {}
+        self._rows: list[list[float]] = []
+        self._branches: list[Branch] = []
+
+    def network(self, leaving_out: Sequence[str]) -> CgmesNetwork:
+        self._refuse(leaving_out)
+        self._buses(leaving_out)
+        self._injections()
+        self._branches += [*lines(self._source, self._nominal), *transformers(self._source, self._nominal)]
+        for star, legs in stars(self._source, self._nominal):
+            self._inner(star)
+            self._branches += legs
+        self._boundaries()
+        self._taps()
+        gen = self._generators()
+        numbers = self._numbers
+        rows = [
+            [numbers[b.start], numbers[b.end], b.z.real, b.z.imag, 0, 0, 0, 0, b.tap, b.shift, 1]
+            for b in self._branches
+        ]
+        tables = SourceTables(
+            self._place, BASE_MVA, np.array(self._rows), np.array(rows, dtype=float).reshape(-1, 11), gen,
+            np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
+            {number: self._labels[bus] for bus, number in numbers.items()},
+        )  # fmt: skip
+        ratings: dict[str, float] = {}
+        for row in gen:
+            label = tables.labels[int(row[0])]
+            ratings[label] = ratings.get(label, 0.0) + row[6]
+        return CgmesNetwork(
+            tables, tuple(self._changes.listed()), {n: r for n, r in ratings.items() if r < _MOST_RATING}
+        )
+
+    def _refuse(self, leaving_out: Sequence[str]) -> None:
+        refused = {}
+        for kind, getter in _TABLES.items():
+            names = [str(name) for name in getattr(self._source, getter)().index]
+            for name in names if kind in leaving_out else ():
+                self._changes.note(name, f"{kind}: left out, as leave_out says")
+            if names and kind not in leaving_out:
+                refused[kind] = names
+        if refused:
+            listed = "; ".join(f"{kind} ({', '.join(names[:8])})" for kind, names in refused.items())
+            raise InputError(
+                f"{self._place}: the network has no such elements: {listed}; to go on without them, write leave_out = "
+                f"{[*refused]} in [network], and put what they feed or draw into loads"
+            )
+
+    # -- buses -------------------------------------------------------------------------------------
+
+    def _buses(self, leaving_out: Sequence[str]) -> None:
+        buses = self._source.get_buses(all_attributes=True)
+        levels = self._source.get_voltage_levels()["nominal_v"]
+        generators = self._source.get_generators(all_attributes=True)
+        fed = set(generators[generators.connected].bus_id)
+        islands: dict[int, list[str]] = {}
+        for row in buses.itertuples():
+            islands.setdefault(int(row.synchronous_component), []).append(row.Index)
+        live = [members for members in islands.values() if fed & {*members}]
+        if not live:
+            raise InputError(f"{self._place}: no generator in service feeds a bus; export the solved model")
+        live.sort(key=len, reverse=True)
+        if len(live) > 1 and "island" not in leaving_out:
+            sizes = ", ".join(str(len(members)) for members in live)
+            raise InputError(
+                f"{self._place}: {len(live)} parts of the network with generators are not joined by lines (buses: "
+                f"{sizes}); study each on its own: write leave_out = ['island'] in [network] to keep the largest"
+            )
+        kept = {*live[0]}
+        named = self._bus_names(buses)
+        for row in buses.itertuples():
+            if row.Index not in kept:
+                text = "bus: left out, as leave_out says" if any(row.Index in x for x in live[1:]) else (
+                    "bus without a generator on its part of the network: left out")  # fmt: skip
+                self._changes.note(named[row.Index], text)
+                continue
+            nominal = float(levels[row.voltage_level_id])
+            if not nominal > 0:
+                raise InputError(
+                    f"{self._place}: bus {named[row.Index]} has the nominal voltage {nominal:g} kV; it must exceed 0"
+                )
+            self._nominal[row.Index] = nominal
+            self._volts[row.Index] = float(row.v_mag) / nominal
+            self._add_bus(row.Index, named[row.Index])
+        slack = {*self._source.get_extensions("slackTerminal").bus_id} & kept
+        for bus in slack:
+            self._rows[self._numbers[bus]][1] = 3
+
+    def _bus_names(self, buses: Any) -> dict[str, str]:
+        """The topological node's name where a bus is one and every name stands once, else the bus' own name or id."""
+        nodes = self._source.get_bus_breaker_view_buses()
+        of_bus: dict[str, list[str]] = {}
+        for row in nodes.itertuples():
+            of_bus.setdefault(row.bus_id, []).append(row.name or row.Index)
+        found = {}
+        for candidates in (
+            {bus: of_bus[bus][0] if len(of_bus.get(bus, ())) == 1 else buses.name[bus] for bus in buses.index},
+            dict(buses.name),
+            {bus: bus for bus in buses.index},
+        ):
+            found = {bus: re.sub(r"\W+", "_", str(name)).strip("_") for bus, name in candidates.items()}
+            if all(found.values()) and max(Counter(found.values()).values(), default=0) <= 1:
+                break
+        return {bus: re.sub(r"^bus_+(?=\w)", "", name, flags=re.IGNORECASE) for bus, name in found.items()}
+
+    def _add_bus(self, bus: str, label: str) -> None:
+        self._numbers[bus] = number = len(self._numbers)
+        self._labels[bus] = label
+        self._rows.append([number, 1, *[0.0] * 7])
+
+    def _inner(self, bus: str) -> None:
+        """Add a bus that the model itself does not have."""
+        self._add_bus(bus, re.sub(r"\W+", "_", bus))
+
+    def _add(self, bus: str, column: int, value: complex) -> None:
+        self._rows[self._numbers[bus]][column] += value.real
+        self._rows[self._numbers[bus]][column + 1] += value.imag
+
+    # -- injections ----------------------------------------------------------------------------------
+
+    def _injections(self) -> None:
+        for row in self._source.get_loads(all_attributes=True).itertuples():
+            if row.connected and row.bus_id in self._numbers:
+                self._add(row.bus_id, 2, complex(row.p0, row.q0))
+        for row in self._source.get_shunt_compensators(all_attributes=True).itertuples():
+            if row.connected and row.bus_id in self._numbers:
+                if row.voltage_regulation_on:
+                    self._changes.note(row.Index, "switched shunt: held at its number of sections")
+                self._add(row.bus_id, 4, complex(row.g, row.b) * self._nominal[row.bus_id] ** 2)
+
+    def _boundaries(self) -> None:
+        """Lines to a boundary: a pair meets at one bus; at the open end of another its exchange is a load."""
+        table = self._source.get_boundary_lines(all_attributes=True)
+        ties = self._source.get_tie_lines()
+        meeting = {half: tie for tie, row in ties.iterrows() for half in (row.boundary_line1_id, row.boundary_line2_id)}
+        made: set[str] = set()
+        for row in table.itertuples():
+            if not row.connected or row.bus_id not in self._nominal:
+                continue
+            bus = f"{meeting.get(row.Index, row.Index)}_boundary"
+            if bus not in made:
+                made.add(bus)
+                self._inner(bus)
+            nominal = self._nominal[row.bus_id]
+            ends = row.bus_id, bus
+            # the admittance stands at the model's side
+            self._branches.append(
+                branch(row.Index, ends, (nominal, nominal), complex(row.r, row.x), (complex(row.g, row.b), 0j))
+            )
+            if row.Index not in meeting:
+                fed = complex(getattr(row, "target_p", 0.0) or 0.0, getattr(row, "target_q", 0.0) or 0.0)
+                self._changes.note(row.Index, "line to a boundary: what it exchanges there is a load")
+                self._add(bus, 2, complex(row.p0, row.q0) - fed)
+
+    def _taps(self) -> None:
+        for kind, table in (
+            ("ratio", self._source.get_ratio_tap_changers(all_attributes=True)),
+            ("phase", self._source.get_phase_tap_changers(all_attributes=True)),
+        ):
+            for row in table.itertuples():
+                name = row.Index[0] if isinstance(row.Index, tuple) else row.Index
+                if row.regulating:
+                    self._changes.note(name, f"control of a {kind} tap changer: held at its position")
+                if math.isfinite(row.solved_tap_position) and row.solved_tap_position != row.tap:
+                    self._changes.note(
+                        name, f"{kind} tap changer: at SSH's position, which is not that of SV's solution"
+                    )
+
+    # -- generators ----------------------------------------------------------------------------------
+
+    def _generators(self) -> Any:
+        rows = []
+        for row in self._source.get_generators(all_attributes=True).itertuples():
+            if not row.connected or row.bus_id not in self._numbers:
+                continue
+            held = self._held(row)
+            least, most = (finite(float(q), _NO_LIMIT) for q in (row.min_q_at_target_p, row.max_q_at_target_p))
+            rating = float(row.rated_s) if 0 < row.rated_s < _MOST_RATING else _MOST_RATING  # unknown
+            largest = float(row.max_p) if 0 < row.max_p < _NO_LIMIT else 0.0
+            rows.append([self._numbers[row.bus_id], row.target_p, 0, most, least, held, rating, 1, largest, 0])
+        return np.array(rows, dtype=float).reshape(-1, 10)
+
+    def _held(self, row: Any) -> float:
+        """Voltage that a generator holds at its bus [pu]."""
+        bus = row.bus_id
+        if row.voltage_regulator_on and row.regulated_bus_id == bus and row.target_v > 0:
+            return float(row.target_v) / self._nominal[bus]
+        remote = row.voltage_regulator_on and row.regulated_bus_id != bus
+        text = (
+            "voltage control of another bus: its own is held at SV's voltage"
+            if remote
+            else "generator without voltage control: it holds SV's voltage"
+        )
+        self._changes.note(row.Index, text)
+        if not math.isfinite(self._volts[bus]):
+            raise InputError(
+                f"{self._place}: the generator {row.Index} holds no voltage of its own, and SV has none of its bus; "
+                "export the solved model"
+            )
+        return self._volts[bus]

@@ -1,0 +1,24 @@
+"""What a network's source holds and our network has in another form, or not at all: listed, by kind."""
+
+from collections import defaultdict
+
+from orchestrator.errors import Problem
+
+
+class Changes:
+    """What was taken over in another form, by kind, with the lines or names of all that it concerns."""
+
+    def __init__(self, place: str, what: str = "line") -> None:
+        self._place, self._what = place, what
+        self._items: dict[str, list[int | str]] = defaultdict(list)
+
+    def note(self, item: int | str, text: str) -> None:
+        """Add a record by its line, or an element by its name; those with the same text become one row."""
+        self._items[text].append(item)
+
+    def listed(self) -> list[Problem]:
+        """One row for each kind, complete: how many, what was done, and every line or name."""
+        return [
+            Problem(f"{self._place}, {self._what}{'s' if len(items) > 1 else ''} {', '.join(map(str, items))}", text)
+            for text, items in self._items.items()
+        ]

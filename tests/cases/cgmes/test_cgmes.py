@@ -1,0 +1,219 @@
+"""Networks of CGMES: the voltages of pypowsybl's own load flow and of pandapower, and what is refused."""
+
+import cmath
+import math
+import re
+import shutil
+import zipfile
+from types import SimpleNamespace
+
+import pandapower.networks
+import pytest
+
+from fmus.toolchain.extras import MissingLibraryError
+from orchestrator.cases.cgmes.files import load_cgmes
+from orchestrator.cases.cgmes.network import convert, read_cgmes
+from orchestrator.cases.network_data import network_data
+from orchestrator.cases.network_import import import_network
+from orchestrator.cases.schema import NetworkTable
+from orchestrator.errors import InputError
+from tests.cases.psse.test_raw import pandapowers
+from tests.cases.test_network_sources import solved
+
+
+@pytest.fixture(scope="module")
+def powsybl():
+    return pytest.importorskip("pypowsybl", reason="pypowsybl is not installed")
+
+
+@pytest.fixture(scope="module")
+def ieee14(powsybl, tmp_path_factory):
+    """The IEEE 14-bus system as CGMES."""
+    path = tmp_path_factory.mktemp("cgmes") / "ieee14.zip"
+    powsybl.network.create_ieee14().save(str(path), format="CGMES")
+    return path
+
+
+def flows(powsybl, network, slack):
+    """pypowsybl's voltages [pu] of its own load flow, without any control but generators' voltages."""
+    loadflow = powsybl.loadflow
+    parameters = loadflow.Parameters(
+        distributed_slack=False, use_reactive_limits=False, transformer_voltage_control_on=False,
+        phase_shifter_regulation_on=False, shunt_compensator_voltage_control_on=False,
+        provider_parameters={
+            "newtonRaphsonConvEpsPerEq": "1e-10", "slackBusSelectionMode": "NAME", "slackBusesIds": slack,
+        },
+    )  # fmt: skip
+    (result,) = loadflow.run_ac(network, parameters)
+    assert result.status == loadflow.ComponentStatus.CONVERGED
+    nominal = network.get_voltage_levels().nominal_v
+    return {
+        bus: cmath.rect(row.v_mag / nominal[row.voltage_level_id], math.radians(row.v_angle))
+        for bus, row in network.get_buses().iterrows()
+    }
+
+
+def compare(powsybl, network, ids, slack):
+    """Our voltages and pypowsybl's; ``ids``: our bus → pypowsybl's."""
+    imported = import_network(convert("model", network).tables)
+    ours, theirs = solved(with_slack(imported, slack)).voltages, flows(powsybl, network, ids[slack])
+    turn = cmath.phase(theirs[ids[slack]]) - cmath.phase(ours[slack])
+    assert {*ids} <= {*ours}
+    for bus, bus_id in ids.items():
+        assert ours[bus] * cmath.exp(1j * turn) == pytest.approx(theirs[bus_id], abs=1e-9)
+
+
+def with_slack(data, slack):
+    """The elements of a network with a slack bus."""
+    names = ("buses", "lines", "loads", "shunts", "generation")
+    return SimpleNamespace(**{name: getattr(data, name) for name in names}, slack=slack)
+
+
+@pytest.mark.parametrize("name", ["case14", "case39"])
+def test_pandapowers_networks_as_cgmes_have_its_voltages(name, powsybl, tmp_path):
+    """From pandapower to pypowsybl, to CGMES, to our network: voltages to 1e-6 pu."""
+    net = getattr(pandapower.networks, name)()
+    powsybl.network.convert_from_pandapower(net).save(str(tmp_path / "model.zip"), format="CGMES")
+    data = network_data(NetworkTable(cgmes="model.zip"), tmp_path)
+    wanted = pandapowers(net)
+    slack = f"bus_{net.ext_grid.bus.iloc[0] + 1}"
+    ours = solved(with_slack(data, slack)).voltages
+    turn = cmath.phase(wanted[slack]) - cmath.phase(ours[slack])
+    assert {*ours} == {*wanted}
+    for bus, v in ours.items():
+        assert v * cmath.exp(1j * turn) == pytest.approx(wanted[bus], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["ieee9", "ieee14", "ieee57"])
+def test_factory_networks_as_cgmes_have_pypowsybls_voltages(name, powsybl, tmp_path):
+    """Not those whose lines join two nominal voltages: the export to CGMES loses a part of them."""
+    path = tmp_path / f"{name}.zip"
+    getattr(powsybl.network, f"create_{name}")().save(str(path), format="CGMES")
+    network = powsybl.network.load(str(path))
+    ids = bus_ids(network)
+    compare(powsybl, network, ids, strongest(network, ids))
+
+
+def strongest(network, ids):
+    power = generation(network)
+    return max(ids, key=lambda bus: power.get(ids[bus], 0.0))
+
+
+def generation(network):
+    return network.get_generators().groupby("bus_id").target_p.sum().to_dict()
+
+
+def bus_ids(network):
+    """Our name of a bus → pypowsybl's id, where a bus is one topological node."""
+    nodes = network.get_bus_breaker_view_buses()
+    return {f"bus_{re.sub('^bus_', '', re.sub(r'[^A-Za-z0-9]+', '_', row['name'] or node), flags=re.I)}": row.bus_id
+            for node, row in nodes.iterrows()}  # fmt: skip
+
+
+def test_three_windings_phase_shifter_and_boundaries(powsybl):
+    """ENTSO-E's micro grid of Belgium: 220/400/110/21/10.5 kV, one transformer of three windings, a phase shifter, five
+    lines to a boundary. Its remote voltage control is made a local one, as ours holds SV's voltage there.
+    """
+    network = powsybl.network.create_micro_grid_be_network()
+    remote = next(name for name, row in network.get_generators(all_attributes=True).iterrows()
+                  if row.regulated_element_id != name)  # fmt: skip
+    bus = network.get_generators().bus_id[remote]
+    nominal = network.get_voltage_levels().nominal_v[network.get_buses().voltage_level_id[bus]]
+    network.update_generators(id=remote, regulated_element_id=remote, target_v=1.02 * nominal)
+    ids = bus_ids(network)
+    said = {change.text: change.place for change in convert("model", network).changes}
+    compare(powsybl, network, ids, strongest(network, ids))
+    assert said["line to a boundary: what it exchanges there is a load"].count(",") == 5
+    assert "control of a phase tap changer: held at its position" in said
+    assert "phase tap changer: at SSH's position, which is not that of SV's solution" in said
+
+
+def test_remote_voltage_control_is_said(powsybl):
+    said = [change.text for change in convert("m", powsybl.network.create_micro_grid_be_network()).changes]
+    assert "voltage control of another bus: its own is held at SV's voltage" in said
+
+
+def test_what_the_network_does_not_have_is_refused_by_name(powsybl):
+    network = powsybl.network.create_four_substations_node_breaker_network()
+    with pytest.raises(
+        InputError, match=r"model: .*static var compensator \(SVC\); hvdc line \(HVDC1, HVDC2\); .*leave_out"
+    ):
+        convert("model", network)
+    allowed = ("static var compensator", "hvdc line")
+    with pytest.raises(InputError, match=r"2 parts of the network with generators .* leave_out = \['island'\]"):
+        convert("model", network, allowed)
+    found = convert("model", network, (*allowed, "island"))
+    said = {change.text: change.place for change in found.changes}
+    assert "hvdc line: left out, as leave_out says" in said
+    assert "bus: left out, as leave_out says" in said
+
+
+# -- files -----------------------------------------------------------------------------------------
+
+
+def test_a_folder_and_a_zip_of_zips_are_the_same_model(ieee14, tmp_path):
+    folder, nested = tmp_path / "folder", tmp_path / "nested.zip"
+    with zipfile.ZipFile(ieee14) as archive:
+        archive.extractall(folder)
+    shutil.copy(ieee14, tmp_path / "inner.zip")
+    with zipfile.ZipFile(nested, "w") as archive:
+        archive.write(tmp_path / "inner.zip", "inner.zip")
+    wanted = read_cgmes(ieee14).tables
+    for path in (folder, nested):
+        assert (read_cgmes(path).tables.branch == wanted.branch).all()
+
+
+@pytest.mark.parametrize(
+    ("profile", "words"),
+    [("_SV", r"the profile SV is missing among .*_EQ.xml.*; export the solved model"), ("_SSH", "the profile SSH is")],
+)
+def test_a_missing_profile_is_named(profile, words, ieee14, tmp_path):
+    with zipfile.ZipFile(ieee14) as archive:
+        archive.extractall(tmp_path)
+    next(tmp_path.glob(f"*{profile}.xml")).unlink()
+    with pytest.raises(InputError, match=words):
+        load_cgmes(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"not a zip", "it is no zip archive that can be read: .*; export the model once more"),
+        (None, "it holds no .xml"),
+    ],
+)
+def test_a_file_of_another_kind(content, words, tmp_path):
+    path = tmp_path / "model.zip"
+    if content is None:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("readme.txt", "nothing")
+    else:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        load_cgmes(path)
+    with pytest.raises(InputError, match="there is no such file; give a zip or a folder"):
+        load_cgmes(tmp_path / "none.zip")
+
+
+def test_xml_that_is_broken_is_one_error(ieee14, tmp_path):
+    with zipfile.ZipFile(ieee14) as archive:
+        archive.extractall(tmp_path)
+    equipment = next(tmp_path.glob("*_EQ.xml"))
+    equipment.write_text(equipment.read_text()[:20000])
+    with pytest.raises(InputError, match=r"pypowsybl cannot read it as CGMES: .*; check the export"):
+        load_cgmes(tmp_path)
+
+
+def test_without_pypowsybl_the_extra_is_named(tmp_path, monkeypatch):
+    path = tmp_path / "model.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        for profile in ("EQ", "SSH", "TP", "SV"):
+            archive.writestr(f"model_{profile}.xml", "<rdf/>")
+    monkeypatch.setattr("fmus.toolchain.extras.find_spec", lambda name: None)
+    with pytest.raises(MissingLibraryError, match=r"reading the CGMES model model.zip needs .*gfor-cosim\[cgmes\]"):
+        load_cgmes(path)
+
+
+def test_names_to_leave_out_are_those_of_cgmes(tmp_path):
+    with pytest.raises(InputError, match=r"leave_out: 'facts device' is unknown for CGMES; choose from static var"):
+        read_cgmes(tmp_path, ["facts device"])
