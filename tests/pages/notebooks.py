@@ -7,6 +7,7 @@ import base64
 import io
 import os
 import re
+import shutil
 import sys
 import sysconfig
 from pathlib import Path
@@ -36,8 +37,11 @@ _WIDTH = 96
 def execute(path: Path, folder: Path, more: str = "") -> NotebookNode:
     """Execute a notebook in a folder, with this environment's ``gfor``; returns it with its outputs.
 
-    Raises ``CellExecutionError`` where a cell fails. ``more`` is executed behind the last cell.
+    Raises ``CellExecutionError`` where a cell fails. ``more`` is executed behind the last cell. The folder beside the
+    notebook that has its name holds files that it needs.
     """
+    if path.with_suffix("").is_dir():
+        shutil.copytree(path.with_suffix(""), folder / path.stem)
     notebook = nbformat.read(path, as_version=4)
     if more:
         notebook.cells.append(nbformat.v4.new_code_cell(more))
