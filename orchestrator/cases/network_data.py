@@ -125,7 +125,7 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
 
 def _from_raw(path: Path, table: NetworkTable) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
-    raw = read_raw(path, table.leave_out, keep_load_parts=table.keep_load_parts)
+    raw = read_raw(seen_from_here(path), table.leave_out, keep_load_parts=table.keep_load_parts)
     imported = import_network(raw.tables)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
@@ -137,11 +137,16 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     """A network of CGMES; the ratings of the units are those of the model where it knows them."""
-    model = read_cgmes(path, table.leave_out)
+    model = read_cgmes(seen_from_here(path), table.leave_out)
     imported = import_network(model.tables)
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
     generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
     return replace(imported, generation=generation), model.changes, ()
+
+
+def seen_from_here(path: Path) -> Path:
+    """The path as a user in the working directory writes it; places in messages are read there."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:

@@ -10,7 +10,7 @@ from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
-from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.network_data import bus_name, seen_from_here
 from orchestrator.cases.network_import import Generation
 from orchestrator.cases.psse.dyr_units import rows_of_machines, with_records
 from orchestrator.cases.schema import ComponentTable, UnitsTable
@@ -143,13 +143,23 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     if table.file is not None:
         raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
     machines = draft.data.machines if draft.data else ()
+    if not machines and draft.case.network is not None and draft.case.network.raw is not None:
+        raise InputError(f"{draft.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine")
     if not machines:
         raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
-    path = draft.directory / (table.dyr or "")
+    path = seen_from_here(draft.directory / (table.dyr or ""))
     rows = rows_of_machines(machines, str(path))
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
-    return with_records(rows, machines, path, table.dyr_leave_out, replaced)
+    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced)
+    phasors = [row for row in rows if row.converter is not None]
+    if phasors and not table.generator.endswith("_phasor"):
+        raise InputError(
+            f"{path}: the unit at bus {phasors[0].label} is the phasor model {phasors[0].converter}, and the generator "
+            f"{table.generator!r} is none; phasor models go together: write generator = "
+            "'synchronous_generator_phasor', a converter that ends in _phasor, and model = 'phasor_grid' for the grid"
+        )
+    return rows
 
 
 def _figure(entry: Row, column: str, given: Generation | None) -> float | None:

@@ -26,6 +26,15 @@ CLAIMS = {
         "f'requirement of {design.table().required_percent.iloc[-1]:.1f} % is met' if design.met else 'not met'",
         "f'needs K = {refined.parameters[\"gfor.pod_p.K\"]:.0f} pu only' if refined.met else 'not met'",
     ],
+    "psse": [
+        'f\'{modes["base"].named["inter-area"].frequency_hz:.2f} Hz with \''
+        'f\'{modes["base"].named["inter-area"].damping_percent:.1f} % of damping\'',
+        'f\'slows to {modes["outage"].named["inter-area"].frequency_hz:.2f} Hz\'',
+        'f\'to {modes["gfor"].named["inter-area"].damping_percent:.1f} % with both circuits\'',
+        'f\'to {modes["outage_gfor"].named["inter-area"].damping_percent:.2f} % with one\'',
+        "f'gives {damping[\"outage_gfor\"]:.1f} % with the outage'",
+        "f'same setting gives {damping[\"gfor\"]:.1f} %' if dv < 1e-5 and da < 1e-4 else 'another power flow'",
+    ],
     "vendor-fmu": [
         "f'asks {len(report.table())} questions'",
         f"f'{{plain.{MODE}.damping_percent:.1f}} % of damping as delivered'",

@@ -16,6 +16,10 @@ DISTRIBUTIONS = {"skrf": "scikit-rf"}
 """Name in an import → name on PyPI, where they differ."""
 
 
+LARGE = {"cgmes"}
+"""Extras that `all` leaves out: pypowsybl alone has 250 MB."""
+
+
 def test_the_table_of_extras_is_that_of_the_distribution():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
@@ -25,7 +29,7 @@ def test_the_table_of_extras_is_that_of_the_distribution():
     always = [re.split(r"[^\w.-]", text)[0] for text in project["dependencies"]]
     assert not {DISTRIBUTIONS.get(library, library) for library in EXTRAS} & set(always)
     (everything,) = extras["all"]
-    assert set(EXTRAS.values()) == set(re.findall(r"\[(.*)\]", everything)[0].split(","))
+    assert set(EXTRAS.values()) - LARGE == set(re.findall(r"\[(.*)\]", everything)[0].split(","))
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):

@@ -64,7 +64,7 @@ def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")
     files = sorted(path.iterdir()) if path.is_dir() else [path] if path.exists() else []
-    return _read(path, tuple((str(f), f.stat().st_mtime_ns) for f in files), tuple(leaving_out))
+    return _read(path, tuple((str(f.resolve()), f.stat().st_mtime_ns) for f in files), tuple(leaving_out))
 
 
 @lru_cache(maxsize=4)

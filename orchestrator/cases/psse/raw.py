@@ -141,6 +141,10 @@ class _Reading:
             self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
             self._kilovolts[number] = record.number(2, "BASKV", 0.0)
             self._magnitudes[number] = record.number(7, "VM", 1.0)
+            if kind != 4 and not self._magnitudes[number] > 0:
+                raise record.error(
+                    f"VM is {self._magnitudes[number]:g} pu; it must exceed 0: export the solved case, or give 1"
+                )
             self._labels[number] = str(number)
 
     def _loads(self) -> None:
