@@ -139,8 +139,8 @@ def machine_models(
                 f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
             )
         elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
-            others = sorted({r.machine for r in records if r.bus == bus and (bus, r.machine) not in at})
-            hint = f"; the file has records of {', '.join(map(repr, others))} there" if others else ""
+            ids = sorted({r.machine for r in records if r.bus == bus and (bus, r.machine) not in at})
+            hint = f"; the file has records of {', '.join(map(repr, ids))} there" if ids else ""
             problems.append(f"machine {name!r} at bus {bus} has no record of a machine{hint}")
     if problems:
         more = f"\n  and {len(problems) - _MOST_SHOWN} more" if len(problems) > _MOST_SHOWN else ""
