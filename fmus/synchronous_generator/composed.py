@@ -37,13 +37,18 @@ def synchronous_generator(
     Raises
     ------
     ValueError
-        If there is no such part, or the parts do not fit each other.
+        If there is no such part, the parts do not fit each other, or the machine is one for phasors alone.
     """
     parts = chosen_parts(machine, exciter, governor, stabilizer)
     m = ModelBuilder(parts.model_name(), parts.title("EMT-type"))
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, flux_state)
+    if g.at_rated_speed:
+        raise ValueError(
+            f"machine = {machine!r}: its emf is that of rated speed, which stator transients contradict; take "
+            "machine = 'genrou', or model = 'synchronous_generator_phasor'"
+        )
     v_s = _signal(m, parts, g, port)
     E_fd, v_t = parts.exciter(m, g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
     P_m = parts.governor(m, g.w, g.start.T_e)
@@ -66,14 +71,14 @@ def synchronous_generator_phasor(
     Raises
     ------
     ValueError
-        As `synchronous_generator`.
+        If there is no such part, or the parts do not fit each other.
     """
     parts = chosen_parts(machine, exciter, governor, stabilizer)
     m = phasor_builder(parts.model_name("phasor"), parts.title("phasor type"))
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
-    emf = Phasor(g.d.emf, g.q.emf) * g.w
+    emf = Phasor(g.d.emf, g.q.emf) * (1.0 if g.at_rated_speed else g.w)
     close_stator(m, g, port, emf)
     v_t = phasor_terminal_voltage(g, port, emf)
     v_s = _signal(m, parts, g, port)

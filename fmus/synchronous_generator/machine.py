@@ -40,7 +40,11 @@ class Start:
 
 @dataclass(frozen=True)
 class Machine:
-    """Parameters, states and operating point of the machine; ``salient`` where its last reactances may differ."""
+    """Parameters, states and operating point of the machine.
+
+    ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'', which
+    only a phasor model can have.
+    """
 
     R: ca.SX
     R_t: ca.SX
@@ -53,6 +57,7 @@ class Machine:
     delta: ca.SX
     start: Start
     salient: bool = True
+    at_rated_speed: bool = False
 
     @property
     def current(self) -> Phasor:

@@ -17,7 +17,7 @@ from fmus.synchronous_generator.excitation.st4b import st4b
 from fmus.synchronous_generator.exciters import Exciter
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
-from fmus.synchronous_generator.machines.standard import genrou, gensal, two_axis
+from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
 from fmus.synchronous_generator.stabilization.pss1a import pss1a
 from fmus.synchronous_generator.stabilization.pss2 import pss2a, pss2b
 from fmus.synchronous_generator.turbines.constant import constant_power, constant_torque
@@ -40,7 +40,10 @@ StabilizerPart = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
 NONE = "none"
 """The stabiliser of a generator that has none."""
 
-MACHINES: dict[str, MachinePart] = {"classical": classical, "two_axis": two_axis, "gensal": gensal, "genrou": genrou}
+MACHINES: dict[str, MachinePart] = {
+    "classical": classical, "two_axis": two_axis, "gensal": gensal, "genrou": genrou,
+    "genrou_rated_speed": genrou_rated_speed,
+}  # fmt: skip
 EXCITERS: dict[str, Exciter] = {
     "manual": manual, "sexs": sexs, "ieeet1": ieeet1, "dc1a": dc1a, "ac1a": ac1a, "ac4a": ac4a, "st1a": st1a,
     "st4b": st4b,

@@ -3,11 +3,14 @@
     two_axis  4th order: field, one winding on the q axis          X_d, X'_d, T'_d0; X_q, X'_q, T'_q0
     gensal    5th order: field and damper, one damper on the q axis  X_d, X'_d, X'', T'_d0, T''_d0; X_q, T''_q0
     genrou    6th order: field and damper, two windings on the q axis
+    genrou_rated_speed  the same with the emf at rated speed, for phasors alone: RMS simulation of stability programs
 
 Their stator is that of `machine`: with stator transients EMT-type, algebraic in the phasor model. As in stability
 programs' models of these names X''_q = X''_d, and saturation is that of `windings`. X'_q = X_q (genrou, two_axis) says
 that the slow winding of the q axis is missing.
 """
+
+from dataclasses import replace
 
 import casadi as ca
 
@@ -95,6 +98,17 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
     return declare_wound_machine(
         m, port, common, WoundAxis(d, (_FIELD, _DAMPER)), WoundAxis(q, (_FIRST_Q, _SECOND_Q)), stator_flux, saturation
     )
+
+
+def genrou_rated_speed(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+    """Declare `genrou` with the emf e'' instead of w·e'', as most stability programs have it.
+
+    Parameters
+    ----------
+    m, port, S_n, stator_flux
+        As `genrou`.
+    """
+    return replace(genrou(m, port, S_n, stator_flux), at_rated_speed=True)
 
 
 def _synchronous(m: ModelBuilder, axis: str) -> ca.SX:
