@@ -8,6 +8,7 @@ from fmus.synchronous_generator.parts import MACHINES
 from tests.models.parts import AT_BUS, BUS, refused
 from tests.support.evaluated import Evaluated
 
+BOTH_KINDS = [name for name in MACHINES if name != "genrou_rated_speed"]
 WOUND = ("two_axis", "gensal", "genrou")
 DATA = {
     "R_s": 0.003, "H": 4.3, "D": 1.7, "X_l": 0.16, "X_d": 1.9, "X_d1": 0.36, "X_d2": 0.25, "T_d10": 6.1,
@@ -138,8 +139,10 @@ def test_the_classical_machine_swings_as_the_textbooks_formula_says(factory):
 # -- steady states ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize(
+    ("name", "factory"),
+    [(n, synchronous_generator) for n in BOTH_KINDS] + [(n, synchronous_generator_phasor) for n in MACHINES],
+)
 def test_a_machine_starts_in_its_steady_state_with_the_power_flows_power(name, factory):
     device = machine(name, factory, **{"transformer.R_t": 0.004, "transformer.X_t": 0.13})
     assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-10
@@ -172,7 +175,7 @@ def test_without_saturation_the_steady_state_is_the_phasor_diagrams(name):
 # -- bases and special data ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", BOTH_KINDS)
 def test_data_on_another_base_are_the_same_machine(name):
     """S_n = 247.5 MVA and data on 100 MVA, as textbooks print them."""
     own = machine(name, S_n=247.5)
@@ -224,3 +227,25 @@ def test_constant_torque_and_constant_power_differ_by_the_power_over_2H():
     H, P = 6.5, device.outputs([BUS.real, BUS.imag])["P_m"]
     assert slopes["constant_torque"] == pytest.approx(0.0, abs=1e-12)
     assert slopes["constant_power"] == pytest.approx(-P / (2 * H), rel=1e-9)
+
+
+# -- the emf at rated speed ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "factor"), [("genrou", 1.02), ("genrou_rated_speed", 1.0)])
+def test_at_rated_speed_the_emf_behind_the_subtransient_reactance_is_without_the_speed(name, factor):
+    device, p = machine(name, synchronous_generator_phasor), DATA
+    x = shifted(device, 3) | {"machine.omega": 1.02}
+    i_d, i_q = current(device, x)
+    to_E, to_E_d = ((p[X] - p[X1]) / (p[X] - p["X_l"]) for X, X1 in (("X_d", "X_d1"), ("X_q", "X_q1")))
+    d1, d2, q1 = p["X_d1"] - p["X_l"], p["X_d2"] - p["X_l"], p["X_q1"] - p["X_l"]
+    psi_d = x["machine.psi_f"] * to_E * d2 / d1 + x["machine.psi_1d"] * (d1 - d2) / d1
+    psi_q = x["machine.psi_1q"] * to_E_d * d2 / q1 + x["machine.psi_2q"] * (q1 - d2) / q1
+    v = BUS * np.exp(-1j * x["machine.delta"])
+    assert v.real == pytest.approx(factor * psi_d - p["R_s"] * i_q - p["X_d2"] * i_d, abs=1e-12)
+    assert -v.imag == pytest.approx(-factor * psi_q - p["R_s"] * i_d + p["X_d2"] * i_q, abs=1e-12)
+
+
+def test_a_machine_for_phasors_alone_is_refused_with_stator_transients():
+    with pytest.raises(ValueError, match="'genrou_rated_speed': its emf is that of rated speed.*take machine = 'genrou'"):
+        synchronous_generator(machine="genrou_rated_speed")
