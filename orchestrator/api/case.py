@@ -29,8 +29,8 @@ def built_in_cases() -> tuple[str, ...]:
     Examples
     --------
     >>> import orchestrator as gfor
-    >>> gfor.built_in_cases()
-    ('ieee118', 'ieee39', 'ieee39_tops', 'infinite_bus', 'k2a', 'kundur', 'norm631', 'two_area', 'two_area_rms', 'wscc9')
+    >>> print(*gfor.built_in_cases())
+    ieee118 ieee39 ieee39_tops infinite_bus k2a kundur norm631 two_area two_area_rms wscc9
     """
     return names_of_cases()
 

@@ -247,5 +247,5 @@ def test_at_rated_speed_the_emf_behind_the_subtransient_reactance_is_without_the
 
 
 def test_a_machine_for_phasors_alone_is_refused_with_stator_transients():
-    with pytest.raises(ValueError, match="'genrou_rated_speed': its emf is that of rated speed.*take machine = 'genrou'"):
+    with pytest.raises(ValueError, match="'genrou_rated_speed': its emf is that of rated speed"):
         synchronous_generator(machine="genrou_rated_speed")

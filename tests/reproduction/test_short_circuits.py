@@ -1,8 +1,9 @@
-"""The built-in cases k2a and ieee39_tops: PowerFactory's recorded speeds, TOPS' errors and modes, and equations of our own.
+"""The built-in cases k2a and ieee39_tops: PowerFactory's recorded speeds, TOPS' errors and modes, our own equations.
 
 Every figure of the two pages is held here.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,8 @@ pytestmark = pytest.mark.reproduction
 
 CASES = {"k2a": "k2a", "ieee39_tops": "ieee39"}
 DURATION = {"k2a": 0.1, "ieee39": 0.05}
-SPEEDS, CHANGES, MODES, CONVERTER = "Speeds after the short circuit", "What each difference does", "Modes", "With a converter"
+SPEEDS, CHANGES = "Speeds after the short circuit", "What each difference does"
+MODES, CONVERTER = "Modes", "With a converter"
 PAGES = {case: (BUILT_IN / case / "README.md").read_text(encoding="utf-8") for case in CASES}
 HERTZ, POINTS, MICRO = 6e-5, 6e-3, 0.06
 """Half of a last digit, and what rounding to it may add."""
@@ -33,7 +35,7 @@ def row(case, heading, label):
 
 @cache
 def errors_of_fmus(case, machine="genrou_rated_speed"):
-    (ready,) = load_case(case).prepare(["pss"], {"sg*.machine": machine} if machine != "genrou_rated_speed" else {})
+    (ready,) = load_case(case).prepare(["pss"], {"sg*.machine": machine})
     data = run_scenario(ready, stop_time=10.0).dataset
     names = tops_system(CASES[case]).bus + 1
     speeds = np.column_stack([np.interp(np.arange(2000) * 5e-3, data["time"], data[f"sg{k}.omega"]) for k in names])
@@ -133,6 +135,29 @@ def test_with_tops_machine_the_equations_have_the_modes_that_tops_finds(case, st
     scenario = "pss" if stabilisers else "no_pss"
     found = ShortCircuit(tops_system(CASES[case]), "tops", stabilisers=stabilisers).eigenvalues()
     assert_modes(found, wanted_modes(case, f"{scenario} | TOPS 0.3.0"))
+
+
+OF_K2A = {"exciter.T_E": 0.5, "governor.T_1": 0.1, "governor.T_2": 0.09, "governor.T_3": 0.2}
+"""In what TOPS' system k2a differs from its k2a_val."""
+
+
+@pytest.mark.parametrize("scenario", ["pss", "no_pss"])
+def test_the_modes_of_tops_system_k2a(scenario):
+    system = tops_system("k2a")
+    changed = {f"{'SEXS' if key[0] == 'e' else 'TGOV1'}.T_{key[-1].lower()}": v for key, v in OF_K2A.items()}
+    data = system.data | {key: np.full(4, value) for key, value in changed.items()}
+    assert data.keys() == system.data.keys()
+    found = ShortCircuit(replace(system, data=data), "tops", stabilisers=scenario == "pss").eigenvalues()
+    assert_modes(found, wanted_modes("k2a", f"{scenario}, k2a | TOPS 0.3.0"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["pss", "no_pss"])
+def test_the_fmus_modes_with_the_data_of_tops_system_k2a(scenario):
+    (ready,) = load_case("k2a").prepare([scenario], {f"sg*.{key}": value for key, value in OF_K2A.items()})
+    found = compute_modes(ready, (0.1, 3.0))
+    assert_modes([m.eigenvalue for m in found.modes], wanted_modes("k2a", f"{scenario}, k2a | FMUs"))
+    assert found.named["inter-area"].frequency_hz > 1  # the page says that it is given to another mode
 
 
 @pytest.mark.slow
