@@ -36,7 +36,7 @@ def row(case, heading, label):
 @cache
 def errors_of_fmus(case, machine="genrou_rated_speed"):
     (ready,) = load_case(case).prepare(["pss"], {"sg*.machine": machine})
-    data = run_scenario(ready, stop_time=10.0).dataset
+    data = run_scenario(ready).dataset
     names = tops_system(CASES[case]).bus + 1
     speeds = np.column_stack([np.interp(np.arange(2000) * 5e-3, data["time"], data[f"sg{k}.omega"]) for k in names])
     return rms_micro(speeds, recorded_speeds(CASES[case])), speeds
