@@ -105,7 +105,7 @@ def test_the_fmus_follow_the_independent_equations(case):
     _, speeds = errors_of_fmus(case)
     equations = ShortCircuit(tops_system(CASES[case]), "short-circuit", step=1e-3).speeds(DURATION[CASES[case]])
     swing = np.sqrt(np.mean((equations - 1) ** 2))
-    assert np.sqrt(np.mean((speeds - equations) ** 2)) < 2e-3 * swing
+    assert np.sqrt(np.mean((speeds - equations) ** 2)) < 3e-3 * swing
 
 
 @pytest.mark.slow
