@@ -30,7 +30,7 @@ def built_in_cases() -> tuple[str, ...]:
     --------
     >>> import orchestrator as gfor
     >>> print(*gfor.built_in_cases())
-    ieee118 ieee39 ieee39_tops infinite_bus k2a kundur norm631 two_area two_area_rms wscc9
+    ieee118 ieee39 ieee39_tops infinite_bus k2a kundur nordic44 norm631 two_area two_area_rms wscc9
     """
     return names_of_cases()
 

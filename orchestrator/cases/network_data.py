@@ -153,7 +153,12 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
     """The lines of a file, each with its place."""
     lines = []
     for row in rows_of(path, ("from", "to", "R", "X", "B")):
-        name = f"line_{row['from']}_{row['to']}"
+        circuit = (row.get("circuit") or "").strip()
+        if circuit and not (circuit.isascii() and circuit.isalnum()):
+            raise InputError(
+                f"{place_of(row)}: circuit = {circuit!r}; it becomes part of a name: use letters and digits"
+            )
+        name = "_".join(["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])])
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
         line = Line(name, *ends, number(row, "X"), number(row, "R"), number(row, "B"), tap, shift)

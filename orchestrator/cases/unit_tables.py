@@ -2,7 +2,10 @@
 share each unit.
 """
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +27,7 @@ _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
 
-_COLUMNS = ("bus", "rating_mva", "p_mw", "v_pu", "alpha", *_LIMITS)
+_COLUMNS = ("bus", "unit", "rating_mva", "p_mw", "v_pu", "alpha", *_LIMITS)
 
 
 def unit_components(draft: Draft) -> dict[str, ComponentTable]:
@@ -100,7 +103,8 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
     rows = []
     for entry in _known_rows(directory / table.file):
         bus = bus_name(entry["bus"])
-        given = generation.get(bus)
+        name = _name_in(entry)
+        given = None if name else generation.get(bus)  # the source's figures are those of all units of the bus
         figures = {column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")}
         missing = [column for column, value in figures.items() if value is None]
         if missing:
@@ -115,12 +119,36 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
         numbers = {**figures, **limits}
         parts = _parts_in(entry)
-        unit = UnitRow(entry["bus"], bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
+        label = f"{entry['bus']}_{name}" if name else entry["bus"]
+        unit = UnitRow(label, bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(checked(unit, place_of(entry)))
-    repeated = sorted({r.label for r in rows if [x.label for x in rows].count(r.label) > 1})
-    if repeated:
-        raise InputError(f"{directory / table.file}: bus {', '.join(repeated)} has more than one row; merge its units")
-    return rows
+    _require_names(rows, directory / table.file)
+    return [_with_limits_of_bus(row, [r for r in rows if r.bus == row.bus]) for row in rows]
+
+
+def _name_in(entry: Row) -> str:
+    """The unit's name among those of its bus; empty without one."""
+    name = (entry.get("unit") or "").strip()
+    if name and not re.fullmatch(r"\w+", name, re.ASCII):
+        raise InputError(f"{place_of(entry)}: unit = {name!r}; it becomes part of a name: use letters, digits and _")
+    return name
+
+
+def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
+    """Several units at a bus have names of their own."""
+    at_bus = Counter(row.bus for row in rows)
+    labels = Counter(row.label for row in rows)
+    for row in rows:
+        if labels[row.label] > 1 or (at_bus[row.bus] > 1 and bus_name(row.label) == row.bus):
+            raise InputError(
+                f"{path}: the bus of unit {row.label} has more than one row; give each row of this bus a name of its "
+                "own in the column 'unit', or merge the rows"
+            )
+
+
+def _with_limits_of_bus(row: UnitRow, units: Sequence[UnitRow]) -> UnitRow:
+    """The row with the limits of all units of its bus, which hold for them together."""
+    return replace(row, q_min_mvar=sum(u.q_min_mvar for u in units), q_max_mvar=sum(u.q_max_mvar for u in units))
 
 
 def _known_rows(path: Path) -> list[Row]:

@@ -78,7 +78,7 @@ BAD = [
         UNITS,
         "sg.machine.H",
         "gen.machine.H",
-        "line 21, units.file: units.csv, line 1: nothing reads the column 'gen.machine.H'; there are bus, rat",
+        "line 21, units.file: units.csv, line 1: nothing reads the column 'gen.machine.H'; there are bus, unit",
         id="unknown parameter prefix",
     ),
     pytest.param(
@@ -113,7 +113,8 @@ BAD = [
         UNITS,
         "2,250,100,1.01",
         "1,250,100,1.02",
-        "line 21, units.file: units.csv: bus 1 has more than one row; merge its units",
+        "line 21, units.file: units.csv: the bus of unit 1 has more than one row; give each row of this bus a name of its "
+        "own in the column 'unit', or merge the rows",
         id="two rows",
     ),
     pytest.param(

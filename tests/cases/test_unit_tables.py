@@ -134,6 +134,40 @@ def test_without_a_file_every_generator_bus_is_a_unit(case):
     assert v["sg20.P_0"] == pytest.approx(60 / 133.3)
 
 
+TWO = "bus,unit,rating_mva,p_mw,v_pu,alpha,q_min_mvar,q_max_mvar,sg.machine.H\n"
+AT_ONE_BUS = "7,a,300,60,1.02,0,-50,80,4.5\n7,b,100,30,1.02,1,-10,20,\n20,,150,45,1.01,,,,\n"
+
+
+def test_several_units_at_a_bus(case):
+    ready, scaled = case(units=TWO + AT_ONE_BUS).prepare(["plain", "shares"], {"units.alpha.7_a": 0.5})
+    assert set(ready.system.components) == {"grid", "sg7_a", "gfor7_a", "gfor7_b", "sg20", "gfor20"}
+    v = ready.values
+    assert (v["sg7_a.S_n"], v["gfor7_b.S_n"], v["sg7_a.machine.H"]) == (150, 100, 4.5)
+    powers = ready.power_flow.powers
+    assert powers["sg7_a"].imag == pytest.approx(powers["gfor7_b"].imag)  # pu of their ratings
+    assert scaled.values["gfor20.S_n"] == pytest.approx(75)
+
+
+def test_limits_of_reactive_power_of_several_units_hold_for_their_bus_together(case):
+    text = CASE.replace('grid = "grid"', 'grid = "grid"\nslack = "bus_20"\nreactive_limits = true', 1)
+    (ready,) = case(text, TWO + AT_ONE_BUS.replace("80", "1").replace("20,\n", "2,\n")).prepare(["plain"])
+    fed = sum(ready.power_flow.powers[n].imag * ready.values[f"{n}.S_n"] for n in ("sg7_a", "gfor7_b"))
+    assert fed == pytest.approx(3)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (AT_ONE_BUS.replace("7,b", "7,a"), "units.csv: the bus of unit 7_a has more than one row; give each row of"),
+        (AT_ONE_BUS.replace("7,b", "7,"), "units.csv: the bus of unit 7 has more than one row; give each row of this"),
+        (AT_ONE_BUS.replace("7,b", "7,b 2"), "line 3: unit = 'b 2'; it becomes part of a name: use letters, digits"),
+        (AT_ONE_BUS.replace("b,100,30", "b,100,"), "units.csv, line 3: the unit at bus 7 has no p_mw; add the column"),
+    ],
+)
+def test_a_mistake_in_the_names_of_units(case, rows, words):
+    assert any(words in problem for problem in problems(case(units=TWO + rows), ["plain"]))
+
+
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
@@ -159,7 +193,7 @@ def test_a_line_named_from_its_other_end_is_recognised(case):
         (UNITS + "7,300,,1.4,,,,\n20,150,,,,,,\n", "units.csv, line 2: alpha = 1.4; it must be a number from 0 to 1"),
         (UNITS + "7,300,,,,,,\n", "the source has generators at bus_20, where the case has no unit and no"),
         (UNITS + ROWS + "12,100,,,,,,\n", "units.csv, line 4: the unit at bus 12 has no p_mw, v_pu; add the column"),
-        (UNITS + ROWS + "20,100,,,,,,\n", "bus 20 has more than one row; merge its units"),
+        (UNITS + ROWS + "20,100,,,,,,\n", "the bus of unit 20 has more than one row; give each row of this bus a name"),
         (UNITS + "7,300,,,,,,\n20,30,,,,,,\n", "line 3: the unit at bus 20 feeds 60 MW, more than its rating of 30"),
         (UNITS + "7,0,,,,,,\n20,150,,,,,,\n", "line 2: the unit at bus 7 has a rating of 0 MVA; it must exceed 0"),
         (UNITS + "7,many,,,,,,\n20,150,,,,,,\n", "line 2: rating_mva = 'many' is not a number"),

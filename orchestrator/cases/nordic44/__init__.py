@@ -1,0 +1,1 @@
+"""Nordic 44, the aggregated Nordic system of TOPS."""
