@@ -113,8 +113,8 @@ BAD = [
         UNITS,
         "2,250,100,1.01",
         "1,250,100,1.02",
-        "line 21, units.file: units.csv: the bus of unit 1 has more than one row; give each row of this bus a name of its "
-        "own in the column 'unit', or merge the rows",
+        "line 21, units.file: units.csv: the bus of unit 1 has more than one row; give each row of this bus a name of "
+        "its own in the column 'unit', or merge the rows",
         id="two rows",
     ),
     pytest.param(
