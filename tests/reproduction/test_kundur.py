@@ -11,8 +11,8 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.study.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import KUNDUR_EXCITERS, kundur
-from tests.support.phasors import as_phasors
 from tests.support.tables import figures
+from tests.support.variants import as_phasors, with_load_model
 
 pytestmark = pytest.mark.reproduction
 
@@ -31,8 +31,8 @@ def assert_row(heading, label, found):
         assert damping == pytest.approx(percent, abs=POINTS)
 
 
-def of_fmus(scenario, overrides=None):
-    (ready,) = load_case("kundur").prepare([scenario], overrides or {})
+def of_fmus(scenario, overrides=None, case=None):
+    (ready,) = (case or load_case("kundur")).prepare([scenario], overrides or {})
     named = compute_modes(ready).named
     return [(named[name].frequency_hz, named[name].damping_percent) for name in ORDER]
 
@@ -98,6 +98,18 @@ def test_the_fmus_rows(scenario):
     for (f, damping), (hertz, percent) in zip(found, phasors, strict=True):
         assert f == pytest.approx(hertz, abs=6e-4)
         assert damping == pytest.approx(percent, abs=0.2 if damping < 10 else 0.6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", KUNDUR_EXCITERS)
+def test_the_rows_of_fmus_with_the_books_loads(scenario, tmp_path):
+    """And what the page says of their distance from the independent computation."""
+    found = of_fmus(scenario, case=with_load_model("kundur", tmp_path, 'active = "current"'))
+    assert_row(BOOK, f"{scenario} | FMUs, current", found)
+    phasors = independent(kundur(scenario, active=1.0, emf_with_speed=True, stray_B=0.05))
+    for (f, damping), (hertz, percent) in zip(found, phasors, strict=True):
+        assert f == pytest.approx(hertz, abs=7e-4)
+        assert damping == pytest.approx(percent, abs=0.2 if damping < 10 else 0.5)
 
 
 @pytest.mark.slow

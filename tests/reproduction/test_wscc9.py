@@ -10,8 +10,8 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.study.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import quadratic, with_subtransients, wscc9
-from tests.support.phasors import as_phasors
 from tests.support.tables import figures
+from tests.support.variants import as_phasors, with_load_model
 
 pytestmark = pytest.mark.reproduction
 
@@ -28,6 +28,8 @@ for _bus, _X_d1 in ((1, 0.0608), (2, 0.1198), (3, 0.1813)):
 IMPEDANCES = {"exponent": 2.0, "saturation": quadratic}
 MOVING = IMPEDANCES | {"emf_with_speed": True}
 STRAY = MOVING | {"stray_B": 0.05}
+QUARTER = {"grid.stray_B": 0.0125}
+POWERS = {"saturation": quadratic, "emf_with_speed": True}
 
 
 def swings(case, scenario="base", overrides=None):
@@ -53,6 +55,8 @@ ROWS = {
     "the book's assumptions": wscc9,
     "quadratic saturation of the exciter": lambda: wscc9(saturation=quadratic),
     "loads of constant impedance": lambda: wscc9(**IMPEDANCES),
+    "besides: constant power, the emf in proportion to speed": lambda: wscc9(**POWERS),
+    "besides: the same, stray capacitance of 0.05 pu": lambda: wscc9(**POWERS, stray_B=0.05),
     "independent, constant impedance": lambda: with_subtransients(wscc9(**IMPEDANCES)),
 }
 
@@ -97,13 +101,41 @@ def test_the_fmus_rows():
         assert abs(value - phasor) < 0.045
 
 
+def assert_near_andes(found, load, hertz, points):
+    """Each mode beside that of ANDES: frequency within so many Hz, damping within so many points."""
+    for value, kept in zip(found, ANDES[f"wscc9, {load}"], strict=False):
+        (f, damping), (f_andes, damping_andes) = hertz_and_percent(value), hertz_and_percent(complex(*kept))
+        assert f == pytest.approx(f_andes, abs=hertz)
+        assert damping == pytest.approx(damping_andes, abs=points)
+
+
 @pytest.mark.slow
-def test_the_fmus_row_beside_andes():
-    found = swings(load_case("wscc9"), overrides=DAMPERS)
+def test_the_fmus_rows_beside_andes():
+    case = load_case("wscc9")
+    found = swings(case, overrides=DAMPERS)
     assert_row(TABLES, "FMUs", found)
-    (f, damping), (hertz, percent) = (hertz_and_percent(z) for z in (found[0], complex(*ANDES["wscc9, impedance"][0])))
-    assert f == pytest.approx(hertz, abs=0.002)
-    assert damping == pytest.approx(percent, abs=0.2)
+    assert_near_andes(found[:1], "impedance", 0.001, 0.1)
+    assert_near_andes(found, "impedance", 0.0012, 0.32)
+    found = swings(case, overrides=DAMPERS | QUARTER)
+    assert_row(TABLES, "FMUs, stray capacitance of 0.0125 pu", found)
+    assert_near_andes(found, "impedance", 0.0003, 0.13)
+
+
+@pytest.mark.slow
+def test_the_fmus_rows_with_constant_power(tmp_path):
+    case = with_load_model("wscc9", tmp_path, 'active = "power"\nreactive = "power"')
+    found = swings(case)
+    assert_row(TABLES, "FMUs, constant power", found)
+    assert_row(TABLES, "besides: the same, stator and network transients: the FMUs", found)
+    found = swings(case, overrides=DAMPERS | QUARTER)
+    assert_row(TABLES, "FMUs, constant power, 0.0125 pu", found)
+    assert_near_andes(found, "power", 0.0004, 0.15)
+
+
+@pytest.mark.slow
+def test_a_quarter_of_the_stray_capacitance_is_enough_for_the_coupling():
+    (ready,) = load_case("wscc9").prepare(["base"], DAMPERS | QUARTER)
+    assert not [text for text in compute_modes(ready).warnings if "coupling" in text]
 
 
 @pytest.mark.slow
