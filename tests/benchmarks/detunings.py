@@ -25,7 +25,7 @@ from orchestrator.errors import CosimError
 from orchestrator.study.modes import compute_modes
 from tests.support.exact import exact_continuous, exact_step_map, network_of
 
-CASES = {"two_area": "two_area", "wscc9": str(Path(__file__).parents[1] / "support" / "wscc9" / "case.toml")}
+CASES = {"two_area": "two_area", "wscc9": str(Path(__file__).parent / "nine_buses" / "case.toml")}
 SEED, FORTY = 631, range(40)
 
 SECONDS = 60.0

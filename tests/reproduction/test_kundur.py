@@ -124,8 +124,7 @@ def test_the_rows_of_fmus_with_one_change():
     assert_row(
         STEPS, "besides: FMUs, constant power instead of torque", of_fmus("manual", {"sg*.governor": "constant_power"})
     )
-    unsaturated = {"sg*.machine.s_10": 0.0, "sg*.machine.s_12": 0.0}
-    assert_row(STEPS, "besides: FMUs, no saturation", of_fmus("manual", unsaturated))
+    assert_row(STEPS, "besides: FMUs, no saturation", of_fmus("manual", UNSATURATED))
 
 
 @pytest.mark.slow
@@ -136,6 +135,27 @@ def test_the_phasor_models_are_the_independent_computation(scenario, tmp_path):
     wanted = kundur(scenario, active=2.0, emf_with_speed=True, stray_B=0.05).swings()
     for name, value in zip(ORDER, wanted, strict=True):
         assert abs(named[name].eigenvalue - value) < 4e-4
+
+
+UNSATURATED = {"sg*.machine.s_10": 0.0, "sg*.machine.s_12": 0.0}
+CONSTANT_POWER = UNSATURATED | {"sg*.governor": "constant_power"}
+SOMEONE_ELSES = {
+    ("manual", "power"): [(0.5427, 4.03), (1.0835, 8.85), (1.1190, 8.64)],
+    ("manual", "torque"): [(0.5425, 3.11), (1.0834, 8.39), (1.1189, 8.17)],
+    ("thyristor", "power"): [(0.6079, -0.73), (1.1366, 8.85), (1.1713, 8.57)],
+    ("tgr", "power"): [(0.5452, -2.86), (1.0886, 8.23), (1.1241, 8.08)],
+}
+"""Scenario and what is constant of the turbines → modes of an EMT model without saturation in NumPy, written by someone
+else from Kundur's equations."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenario", "constant"), SOMEONE_ELSES)
+def test_the_modes_are_those_of_an_independent_emt_model(scenario, constant):
+    found = of_fmus(scenario, CONSTANT_POWER if constant == "power" else UNSATURATED)
+    for (hertz, percent), (wanted_hertz, wanted_percent) in zip(found, SOMEONE_ELSES[scenario, constant], strict=True):
+        assert hertz == pytest.approx(wanted_hertz, abs=3e-4)
+        assert percent == pytest.approx(wanted_percent, abs=0.02)
 
 
 @pytest.mark.slow
