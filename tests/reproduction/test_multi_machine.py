@@ -53,10 +53,18 @@ def test_all_that_is_compared_is_kept():
     assert list(ANDES["modes"]) == list(cases())
 
 
+@pytest.fixture(scope="module")
+def andes(tmp_path_factory):
+    """ANDES writes the code of its models into the home directory."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HOME", str(tmp_path_factory.mktemp("home")))
+        yield pytest.importorskip("andes", reason="ANDES is not installed")
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("andes")
 @pytest.mark.parametrize("name", ANDES["modes"])
 def test_andes_still_has_them(name):
-    pytest.importorskip("andes", reason="ANDES is not installed")
     assert modes_in_andes(cases()[name]) == pytest.approx([complex(*z) for z in ANDES["modes"][name]], abs=1e-5)
 
 
