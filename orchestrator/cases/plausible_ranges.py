@@ -135,6 +135,7 @@ _LINE = "lines and transformers on 100 MVA, from 20 kV cables to tie lines"
 LINE_X = Plausible(1e-5, 10, "pu", _LINE)
 LINE_B = Plausible(0, 10, "pu", _LINE)
 LINE_RATIO = Plausible(0.6, 1.6, "1", "tap changers and off-nominal ratios")
+COMPENSATION = Plausible(0.05, 0.9, "1", "series capacitors take 20 to 80 % of a line's reactance, widened")
 STRAY_B = Plausible(0, 1, "pu", "a stray capacitance is small")
 
 MOST_R_OVER_X = 5.0

@@ -175,6 +175,8 @@ def test_a_rating_in_kva_without_its_unit_is_questioned(questions):
         ("X = 0.02, R = 0.002", "X = 0.002, R = 0.02", "R_l23 = 0.02 pu is 10 times X_l23"),
         ("R = 0.002, B = 0.02", "R = 0.002, B = 20", "B_l23 = 20 pu is outside of 0 to 10 pu"),
         ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, tap = 230", "tap_l23 = 230 is outside of 0.6 to 1.6"),
+        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 0.019", "l23.X_C = 0.019 pu is 0.95 of X_l23 = 0.02 pu"),
+        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 2e-5", "l23.X_C = 2e-05 pu is 0.001 of X_l23 = 0.02 pu"),
     ],
 )
 def test_a_line_with_absurd_data_is_questioned_with_its_line(questions, old, new, said):
@@ -185,6 +187,45 @@ def test_a_line_with_absurd_data_is_questioned_with_its_line(questions, old, new
         asked = [str(p).replace("questioned besides: ", "") for p in error.problems]
     number = 1 + next(k for k, line in enumerate(text.splitlines()) if line.startswith("l23"))
     assert any(q.startswith(f"line {number}, network.lines.l23") and said in q for q in asked)
+
+
+TRANSFORMER = """\
+[network.three_winding_transformers]
+t = { buses = ["b1", "b2", "b3"], X_12 = 0.1, X_13 = 0.2, X_23 = 0.12 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("X_12 = 0.1", "X_12 = 0.1", None),
+        ("X_13 = 0.2", "X_13 = 15, X_23 = 15", "t.X_1 + X_3 = 15 pu is outside of 1e-05 to 10 pu"),
+        ("X_12 = 0.1", "X_12 = 0.1, R_12 = 0.6", "t.R_1 + R_2 = 0.6 pu is 6 times t.X_1 + X_2 = 0.1 pu"),
+        ("X_12 = 0.1", "X_12 = 0.1, tap = [220.0, 1.0, 1.0]", "t.tap_1 = 220 is outside of 0.6 to 1.6"),
+        ("X_12 = 0.1", "X_12 = 0.1, shift = [0.0, 30.0, 0.0]", "t.shift_2 = 30 rad is more than half a turn"),
+    ],
+)
+def test_a_transformer_with_absurd_data_is_questioned_with_its_line(questions, old, new, said):
+    table = TRANSFORMER.replace(", X_23 = 0.12", "" if "X_23" in new else ", X_23 = 0.12").replace(old, new)
+    text = CASE.replace("[components.grid]", f"{table}[components.grid]")
+    try:
+        asked = questions(text=text)
+    except CaseError as error:
+        asked = [str(p).replace("questioned besides: ", "") for p in error.problems]
+    if said is None:
+        assert asked == []
+        return
+    number = 1 + next(k for k, line in enumerate(text.splitlines()) if line.startswith("t = "))
+    assert any(q.startswith(f"line {number}, network.three_winding_transformers.t") and said in q for q in asked), asked
+
+
+def test_the_answer_about_a_transformer_is_taken(questions):
+    text = CASE.replace("[components.grid]", f"{TRANSFORMER}[components.grid]").replace(
+        "X_12 = 0.1", "X_12 = 0.1, R_12 = 0.6"
+    )
+    (asked,) = questions(text=text)
+    (answer,) = re.findall(r"meant = \[.*\]", asked)
+    assert questions(text=f"{answer}\n{text}") == []
 
 
 def test_a_value_that_is_meant_is_not_questioned(questions):

@@ -1,0 +1,108 @@
+"""Most unusual data of a network's lines, series capacitors, three-winding transformers and stray capacitance."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+from fmus.grid.network import Line, ThreeWinding
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
+from orchestrator.cases.plausible_values import Doubt, outside, value_of
+from orchestrator.coupling.system import ComponentPlan
+
+
+def network_doubts(draft: Draft) -> Iterator[Doubt]:
+    """Ask about the elements of the network, with the values that are set."""
+    grid = draft.system.components.get(draft.grid or "")
+    if grid is None or draft.network is None or draft.grid is None:
+        return
+    for line in draft.network.lines:
+        yield from _line(draft, draft.grid, grid, line)
+    for transformer in draft.network.transformers:
+        yield from _transformer(draft, draft.grid, grid, transformer)
+    if (stray := value_of(grid, "stray_B")) is not None:
+        yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
+
+
+def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[Doubt]:
+    """Reactance, charging, ratio, shift, R/X and X_C/X."""
+    variables = {q: line.variable(q) for q in ("X", "R", "B", "tap", "shift", "X_C")}
+    found = {q: value_of(grid, variable) for q, variable in variables.items()}
+    place = {q: _place(draft, "lines", line.name, q, variable) for q, variable in variables.items()}
+    for quantity, usual in {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}.items():
+        if (value := found[quantity]) is not None:
+            yield from outside(draft, name, variables[quantity], value, usual, place[quantity])
+    yield from _shift(name, variables["shift"], found["shift"], place["shift"])
+    R, X, X_C = found["R"], found["X"], found["X_C"]
+    if R is not None and X is not None:
+        yield from _swapped(name, variables["R"], variables["X"], R, X, place["R"])
+    if X is not None and X_C is not None and not COMPENSATION.fits(X_C / X):
+        text = (
+            f"{variables['X_C']} = {X_C:g} pu is {X_C / X:.3g} of {variables['X']} = {X:g} pu, outside of "
+            f"{COMPENSATION.low:g} to {COMPENSATION.high:g} ({COMPENSATION.why})"
+        )
+        yield Doubt(f"{name}.{variables['X_C']}", place["X_C"], text)
+
+
+def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: ThreeWinding) -> Iterator[Doubt]:
+    """Impedances between any two windings, ratios and shifts; one winding alone may have a negative reactance."""
+
+    def value(quantity: str, winding: int) -> float:
+        return grid.number(f"{transformer.name}.{quantity}_{winding}")
+
+    def place(quantity: str, *windings: int) -> str:
+        key = f"{quantity}_{windings[0]}{windings[1]}" if len(windings) == 2 else quantity
+        changed = [f"{transformer.name}.{quantity}_{k}" for k in windings]
+        return _place(draft, "three_winding_transformers", transformer.name, key, *changed)
+
+    for a, b in combinations((1, 2, 3), 2):
+        X, R = value("X", a) + value("X", b), value("R", a) + value("R", b)
+        names = [f"{transformer.name}.{q}_{a} + {q}_{b}" for q in "XR"]
+        for doubt in outside(draft, name, names[0], X, LINE_X, place("X", a, b)):
+            yield replace(doubt, name=f"{name}.{transformer.name}.X_{a}")
+        for doubt in _swapped(name, names[1], names[0], R, X, place("R", a, b)):
+            yield replace(doubt, name=f"{name}.{transformer.name}.R_{a}")
+    for k in (1, 2, 3):
+        if transformer.has_ratio(k - 1):
+            tap, shift = f"{transformer.name}.tap_{k}", f"{transformer.name}.shift_{k}"
+            yield from outside(draft, name, tap, value("tap", k), LINE_RATIO, place("tap", k))
+            yield from _shift(name, shift, value("shift", k), place("shift", k))
+
+
+def _shift(component: str, variable: str, shift: float | None, place: str) -> Iterator[Doubt]:
+    if shift is not None and abs(shift) > math.pi:
+        text = f"{variable} = {shift:g} rad is more than half a turn; if it is in degrees, write '{shift:g} deg'"
+        yield Doubt(f"{component}.{variable}", place, text)
+
+
+def _swapped(component: str, resistance: str, reactance: str, R: float, X: float, place: str) -> Iterator[Doubt]:
+    if R > MOST_R_OVER_X * X > 0:
+        text = f"{resistance} = {R:g} pu is {R / X:.3g} times {reactance} = {X:g} pu; are the two swapped?"
+        yield Doubt(f"{component}.{resistance}", place, text)
+
+
+def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:
+    """Place where a value of an element was set, or otherwise the place of the element.
+
+    Parameters
+    ----------
+    draft
+        Knows the places.
+    kind
+        Table of the network that such elements are written in.
+    element, key
+        The element's name, and the key of its table.
+    variables
+        Of the grid, that hold the value.
+    """
+    table = draft.case.network
+    for variable in variables:
+        if set_at := draft.places.get(f"{draft.grid}.{variable}"):
+            return set_at
+    if table is not None and element in getattr(table, kind):
+        return draft.place("network", kind, element, key)
+    in_file = draft.data.places.get(element) if draft.data else None
+    source = next((key for key in ("pandapower", "matpower", "raw") if table is not None and getattr(table, key)), None)
+    what = "line" if kind == "lines" else "transformer"
+    return in_file or f"{draft.place('network', source) if source else draft.place('network')}, {what} {element!r}"

@@ -1,0 +1,79 @@
+"""One value of a component: what it is, where it was set, and the question that it raises outside of its range."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.plausible_ranges import Plausible
+from orchestrator.coupling.system import ComponentPlan
+
+_FAR = 3
+"""A value that is outside of its range by less than this factor may be a mistake, but not one of a factor of 1000."""
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A most unusual value: its ``component.variable``, its place, and the question's text."""
+
+    name: str
+    place: str
+    text: str
+
+
+def place_of(draft: Draft, name: str, *variables: str) -> str:
+    """Place of the first of some variables of a component that was set, or otherwise the place of the component."""
+    found = (draft.places.get(f"{name}.{variable}") for variable in variables)
+    return next((place for place in found if place), f"{draft.place('components', name)}, {variables[0]} (its default)")
+
+
+def value_of(plan: ComponentPlan, variable: str) -> float | None:
+    """The effective number: the set value, or otherwise the FMU's default; None without both."""
+    value = plan.value(variable) if variable in plan.description.variables else None
+    return None if value is None or isinstance(value, bool | str) else float(value)
+
+
+def unit_of(plan: ComponentPlan, variable: str) -> str:
+    """The unit that the FMU declares."""
+    return plan.description.variables[variable].unit
+
+
+def outside(
+    draft: Draft,
+    component: str,
+    variable: str,
+    value: float,
+    wanted: Plausible,
+    where: str | None = None,
+    scale: float = 1.0,
+) -> Iterator[Doubt]:
+    """Ask about a value that is not in its usual range.
+
+    Parameters
+    ----------
+    draft
+        Knows the places.
+    component, variable
+        Whose value it is.
+    value
+        In the range's unit.
+    wanted
+        The range.
+    where
+        Its place, where that is not the component's.
+    scale
+        What carries the value to the base of the range.
+    """
+    given, value = value, value * scale
+    if wanted.fits(value):
+        return
+    unit = f" {wanted.unit}" if wanted.unit != "1" else ""
+    slip = ""
+    for factor, text, far in (
+        (1e-3, f"{value / wanted.high:.3g} times too large", value > _FAR * wanted.high),
+        (1e3, f"{wanted.low / value if value else 0:.3g} times too small", value < wanted.low / _FAR),
+    ):
+        if far and wanted.low <= value * factor <= wanted.high:
+            slip = f"; it is {text}, and usual by a factor of 1000: check its unit and base"
+    shown = f"{given:g}{unit}" if scale == 1 else f"{given:g}{unit} on machine.S_data, {value:.4g}{unit} on S_n,"
+    text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
+    yield Doubt(f"{component}.{variable}", where or place_of(draft, component, variable), text)
