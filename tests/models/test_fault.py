@@ -62,6 +62,10 @@ def test_the_phasor_network_solves_the_same_fault():
     v = np.linalg.solve([[STIFF - 50j + Y_line, -Y_line], [-Y_line, Y_b + Y_line]], [-50j, 0])
     assert complex(y["b.v_re"], y["b.v_im"]) == pytest.approx(v[1], rel=1e-12)
     assert complex(y["b.fault.i_re"], y["b.fault.i_im"]) == pytest.approx(v[1] / (0.02 + 0.03j), rel=1e-12)
+    off = Evaluated(phasor_grid(network), values | {"b.fault.on": 0.0}).outputs(source)
+    healthy = np.linalg.solve([[STIFF - 50j + Y_line, -Y_line], [-Y_line, 0.8 - 0.2j + Y_line]], [-50j, 0])
+    assert complex(off["b.v_re"], off["b.v_im"]) == pytest.approx(healthy[1], rel=1e-12)
+    assert complex(off["b.fault.i_re"], off["b.fault.i_im"]) == 0
     injected = (1 - v[0]) * -50j
     emt = Evaluated(grid(network), values)
     A, B = emt.blocks([0.0, 0.0])[:2]

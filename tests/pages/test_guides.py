@@ -18,6 +18,7 @@ ANYWHERE = (
     "how-to/use-your-own-fmu",
     "how-to/black-box",
     "how-to/grid-forming-among-grid-following",
+    "how-to/faults-and-outages",
 )
 SECONDS = 1800.0
 
