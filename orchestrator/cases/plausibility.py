@@ -13,7 +13,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausible_networks import network_doubts
 from orchestrator.cases.plausible_ranges import RANGES, SMALLEST_SHARE
-from orchestrator.cases.plausible_values import Doubt, outside, place_of, unit_of, value_of
+from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
@@ -49,7 +49,7 @@ def _check_meant(draft: Draft) -> None:
             )
 
 
-def _doubts(draft: Draft) -> Iterator[Doubt]:
+def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
             wanted, value = RANGES.get(variable), value_of(plan, variable)
@@ -59,7 +59,7 @@ def _doubts(draft: Draft) -> Iterator[Doubt]:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > X > 0:
                 text = f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
-                yield Doubt(f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text)
+                yield UnusualValue(f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text)
     yield from _small_units(draft)
     yield from network_doubts(draft)
 
@@ -72,7 +72,7 @@ def question_loading(draft: Draft) -> None:
     draft.questions += _merged([d for d in _overloaded(draft) if not _is_meant(draft, d.name) and d.place not in asked])
 
 
-def _overloaded(draft: Draft) -> Iterator[Doubt]:
+def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
         machine = any(variable.startswith("machine.") for variable in plan.description.variables)
@@ -84,7 +84,7 @@ def _overloaded(draft: Draft) -> Iterator[Doubt]:
                 f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
                 f"S_n = {S_n:g} MVA, more than the rating of the converter"
             )
-            yield Doubt(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
 # -- one value ---------------------------------------------------------------------------------------
@@ -155,7 +155,7 @@ def _coupled(draft: Draft) -> list[set[str]]:
     return groups
 
 
-def _small_units(draft: Draft) -> Iterator[Doubt]:
+def _small_units(draft: Draft) -> Iterator[UnusualValue]:
     """Ask about units in the power flow with a rating too small to affect the network."""
     ports = {p.name: p.bus for p in draft.network.ports} if draft.network else {}
     plans = {name: plan for name, plan in draft.system.components.items() if name in ports}
@@ -168,7 +168,7 @@ def _small_units(draft: Draft) -> Iterator[Doubt]:
         whole = sum(ratings[n] for n in shared) if shared else S_n  # the share of a unit may be arbitrarily small
         if whole < SMALLEST_SHARE * ratings[largest]:
             text = f"S_n = {S_n:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
-            yield Doubt(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
 # -- questions ---------------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ def _is_meant(draft: Draft, name: str) -> bool:
     return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.case.meant)
 
 
-def _merged(doubts: list[Doubt]) -> list[Problem]:
+def _merged(doubts: list[UnusualValue]) -> list[Problem]:
     """Merge equal questions about several components into one, and add how to answer it."""
     groups: dict[tuple[str, str], list[str]] = {}
     for doubt in doubts:

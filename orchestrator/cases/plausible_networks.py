@@ -8,11 +8,11 @@ from itertools import combinations
 from fmus.grid.network import Line, ThreeWinding
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
-from orchestrator.cases.plausible_values import Doubt, outside, value_of
+from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
 from orchestrator.coupling.system import ComponentPlan
 
 
-def network_doubts(draft: Draft) -> Iterator[Doubt]:
+def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
     """Ask about the elements of the network, with the values that are set."""
     grid = draft.system.components.get(draft.grid or "")
     if grid is None or draft.network is None or draft.grid is None:
@@ -25,7 +25,7 @@ def network_doubts(draft: Draft) -> Iterator[Doubt]:
         yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
 
 
-def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[Doubt]:
+def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:
     """Reactance, charging, ratio, shift, R/X and X_C/X."""
     variables = {q: line.variable(q) for q in ("X", "R", "B", "tap", "shift", "X_C")}
     found = {q: value_of(grid, variable) for q, variable in variables.items()}
@@ -42,10 +42,10 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
             f"{variables['X_C']} = {X_C:g} pu is {X_C / X:.3g} of {variables['X']} = {X:g} pu, outside of "
             f"{COMPENSATION.low:g} to {COMPENSATION.high:g} ({COMPENSATION.why})"
         )
-        yield Doubt(f"{name}.{variables['X_C']}", place["X_C"], text)
+        yield UnusualValue(f"{name}.{variables['X_C']}", place["X_C"], text)
 
 
-def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: ThreeWinding) -> Iterator[Doubt]:
+def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: ThreeWinding) -> Iterator[UnusualValue]:
     """Impedances between any two windings, ratios and shifts; one winding alone may have a negative reactance."""
 
     def value(quantity: str, winding: int) -> float:
@@ -70,16 +70,16 @@ def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: Thre
             yield from _shift(name, shift, value("shift", k), place("shift", k))
 
 
-def _shift(component: str, variable: str, shift: float | None, place: str) -> Iterator[Doubt]:
+def _shift(component: str, variable: str, shift: float | None, place: str) -> Iterator[UnusualValue]:
     if shift is not None and abs(shift) > math.pi:
         text = f"{variable} = {shift:g} rad is more than half a turn; if it is in degrees, write '{shift:g} deg'"
-        yield Doubt(f"{component}.{variable}", place, text)
+        yield UnusualValue(f"{component}.{variable}", place, text)
 
 
-def _swapped(component: str, resistance: str, reactance: str, R: float, X: float, place: str) -> Iterator[Doubt]:
+def _swapped(component: str, resistance: str, reactance: str, R: float, X: float, place: str) -> Iterator[UnusualValue]:
     if R > MOST_R_OVER_X * X > 0:
         text = f"{resistance} = {R:g} pu is {R / X:.3g} times {reactance} = {X:g} pu; are the two swapped?"
-        yield Doubt(f"{component}.{resistance}", place, text)
+        yield UnusualValue(f"{component}.{resistance}", place, text)
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:

@@ -12,7 +12,7 @@ _FAR = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class UnusualValue:
     """A most unusual value: its ``component.variable``, its place, and the question's text."""
 
     name: str
@@ -45,7 +45,7 @@ def outside(
     wanted: Plausible,
     where: str | None = None,
     scale: float = 1.0,
-) -> Iterator[Doubt]:
+) -> Iterator[UnusualValue]:
     """Ask about a value that is not in its usual range.
 
     Parameters
@@ -76,4 +76,4 @@ def outside(
             slip = f"; it is {text}, and usual by a factor of 1000: check its unit and base"
     shown = f"{given:g}{unit}" if scale == 1 else f"{given:g}{unit} on machine.S_data, {value:.4g}{unit} on S_n,"
     text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
-    yield Doubt(f"{component}.{variable}", where or place_of(draft, component, variable), text)
+    yield UnusualValue(f"{component}.{variable}", where or place_of(draft, component, variable), text)
