@@ -18,7 +18,18 @@ class Frame:
     w: ca.SX
 
 
-def phase_locked_loop(m: ModelBuilder, angle_0: Scalar, omega_b: ca.SX, measured: Phasor) -> Frame:
+@dataclass(frozen=True)
+class LoopDefaults:
+    """Default natural frequency [Hz] and damping ratio at 1 pu, and where they come from."""
+
+    f_0: float = 10.0
+    xi: float = 0.707
+    source: str = STRUCTURE
+
+
+def phase_locked_loop(
+    m: ModelBuilder, angle_0: Scalar, omega_b: ca.SX, measured: Phasor, defaults: LoopDefaults = LoopDefaults()
+) -> Frame:
     """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
 
     For a voltage of 1 pu the angle follows as (2ξω_0·s + ω_0²)/(s² + 2ξω_0·s + ω_0²).
@@ -33,10 +44,16 @@ def phase_locked_loop(m: ModelBuilder, angle_0: Scalar, omega_b: ca.SX, measured
         Base angular frequency [rad/s].
     measured
         Voltage in the converter's own frame [pu], a function of states.
+    defaults
+        Of its parameters.
     """
     with m.scope("pll"):
-        f_0 = m.parameter("f_0", 10.0, "Hz", "Natural frequency at 1 pu", minimum=0.1, maximum=200, source=STRUCTURE)
-        xi = m.parameter("xi", 0.707, "1", "Damping ratio at 1 pu", minimum=0.05, maximum=5, source=STRUCTURE)
+        f_0 = m.parameter(
+            "f_0", defaults.f_0, "Hz", "Natural frequency at 1 pu", minimum=0.1, maximum=200, source=defaults.source
+        )
+        xi = m.parameter(
+            "xi", defaults.xi, "1", "Damping ratio at 1 pu", minimum=0.05, maximum=5, source=defaults.source
+        )
         omega_0 = 2 * ca.pi * f_0
         x = m.state("x", 0, "pu", "Integrator, deviation of the frequency", base="f_n")
         theta = m.state("theta", angle_0, "rad", "Angle of the converter's frame in the network frame")

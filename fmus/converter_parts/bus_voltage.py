@@ -1,0 +1,76 @@
+"""The bus voltage of a converter without network transients, from states alone.
+
+A current source has no emf. Two lags of the bus voltage extrapolate it: 2·v_1 − v_2 errs by (s·τ)², and is a function
+of states alone.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.phasor_port import MasterStep
+from fmus.toolchain.port import DevicePort
+
+SHORT = 1e-3
+"""Communication step in parts of the lags below which their delays are those of a step so short: 2e-7 from τ."""
+
+
+@dataclass(frozen=True)
+class ExtrapolatedVoltage:
+    """Bus voltage through one lag and through two, in the network frame, in which a master holds it.
+
+    Attributes
+    ----------
+    delay, more
+        Of the first lag at the end of a communication step, and how much later the second is [s].
+    """
+
+    once: Phasor
+    twice: Phasor
+    tau: ca.SX
+    delay: ca.SX
+    more: ca.SX
+
+    @property
+    def value(self) -> Phasor:
+        """The voltage, extrapolated [pu]; right on average over a step in which the input is held."""
+        return 2 * self.once - self.twice
+
+    def after(self, time: ca.SX) -> Phasor:
+        """The voltage [pu] at that time [s] after the end of a communication step."""
+        return self.once + (self.once - self.twice) * ((self.delay + time) / self.more)
+
+    def follow(self, m: ModelBuilder, v: Phasor) -> None:
+        """Give both lags what they follow."""
+        for behind, ahead in ((self.once, v), (self.twice, self.once)):
+            m.derivative(ca.SX(behind.re), (ahead.re - behind.re) / self.tau)
+            m.derivative(ca.SX(behind.im), (ahead.im - behind.im) / self.tau)
+
+
+def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) -> ExtrapolatedVoltage:
+    """Declare both lags.
+
+    A step H holds the voltage of its middle. At its end the first lag is late by D = (H/2)·coth(H/2τ) and the second by
+    (H²/4τ)/sinh²(H/2τ) more; both are τ where H is short.
+    """
+    with m.scope("bus_voltage"):
+        shortest = m.parameter(
+            "tau", 0.002, "s", "Time constant of both lags of the bus voltage; at least communication_step",
+            minimum=1e-3,
+        )  # fmt: skip
+        once, twice = (
+            Phasor(
+                *(
+                    m.state(f"{name}_{part}", initial, "pu", f"Bus voltage through {text}, {part} part", base="bus")
+                    for part, initial in (("re", port.v_0.re), ("im", port.v_0.im))
+                )
+            )
+            for name, text in (("once", "one lag"), ("twice", "two lags"))
+        )
+    tau = ca.fmax(shortest, master.size)
+    ratio = ca.fmax(master.size / tau, SHORT)
+    growth = ca.exp(ratio)
+    more = tau * ratio**2 / (growth - 2 + 1 / growth)
+    return ExtrapolatedVoltage(once, twice, tau, tau * ratio / 2 * (growth + 1) / (growth - 1), more)

@@ -1,0 +1,140 @@
+"""PLL, outer control and current control of the benchmark's converter.
+
+Gains are those of the benchmark itself, so that its data can be entered as they are published.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.gfl_l2ep.electrical import COLIB, Transformer, declare_transformer, transformer_equation
+from fmus.gfl_l2ep.limits import Limits, declare_limits, limited
+from fmus.grid_following.pll import Frame, LoopDefaults, phase_locked_loop
+from fmus.toolchain.blocks import clamp, low_pass
+from fmus.toolchain.frames import Phasor, power, qd_state
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port import BREAKER_TIME, DevicePort
+
+LOOP = LoopDefaults(f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²")
+FILE = "COLIB, file dyn_det_2.dat"
+
+
+@dataclass(frozen=True)
+class Following:
+    """What the variants show: frame, current into the bus in it [pu, S_n], and magnitudes."""
+
+    frame: Frame
+    into_bus: Phasor
+    u_c: ca.SX
+    i: ca.SX
+    demand: ca.SX
+
+
+def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Following:
+    """Declare the whole converter.
+
+    Parameters
+    ----------
+    m
+        The converter's model.
+    port
+        Its port.
+    v
+        Voltage at the bus, network frame [pu].
+    """
+    t = declare_transformer(m, port)
+    theta = m.algebraic("theta")
+    bus = v.rotated(-theta)
+    frame = phase_locked_loop(m, t.start.theta, port.omega_b, bus, LOOP)
+    m.close(theta, frame.theta)
+    u, i = bus / t.ratio, t.i.value
+    inside = u + Phasor(t.R, t.X) * i
+    limits = declare_limits(m, t.start, ca.SX(i.im))
+    with m.scope("measurement"):
+        tau = m.parameter("tau", 0.0033, "s", "Lag of the measurements of P, Q and u_c", minimum=1e-3, source=COLIB)
+    s = power(u, i)
+    active = _active_power(m, port, t, limits, ca.SX(s.re), tau)
+    seen = _Seen(ca.SX(s.im), inside.magnitude(), bus.magnitude())
+    reactive = _reactive_power(m, port, t, limits, seen, tau)
+    i_ref = limited(limits, active, reactive)
+    v_c = _current_control(m, port, t, u, frame.w, i_ref)
+    transformer_equation(m, t, port, v_c, u, frame.w)
+    asked = ca.sqrt(active**2 + reactive**2) / limits.I_max
+    return Following(frame, i / t.ratio, inside.magnitude(), i.magnitude(), asked)
+
+
+def _active_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, P: ca.SX, tau: ca.SX) -> ca.SX:
+    """Active current that the PI controller asks for [pu, S_n]."""
+    with m.scope("active_power"):
+        K_p = m.parameter(
+            "K_p", 0.0333, "pu", "Proportional gain", base="S_n", minimum=0.0, source=f"{COLIB}: K_i·measurement.tau"
+        )
+        K_i = m.parameter("K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=COLIB)
+        change = m.parameter("delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True)
+        P_ref = m.calculated("P_ref", t.start.s.re, "pu", "Reference of the operating point", base="S_n")
+        error = P_ref + change - low_pass(m, "P_f", P, tau, t.start.s.re)
+        x = m.state("x", t.start.i.re, "pu", "Integrator, active current", base="S_n")
+        _integrate(m, port, x, K_i * error, limits.active)
+        return K_p * error + clamp(x, -limits.active, limits.active)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Reactive power at the bus, magnitudes of the converter's and of the bus voltage [pu]."""
+
+    Q: ca.SX
+    u_c: ca.SX
+    v: ca.SX
+
+
+def _reactive_power(
+    m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, seen: _Seen, tau: ca.SX
+) -> ca.SX:
+    """Reactive current that is asked for [pu, S_n]: a PI controller, and what a low voltage adds."""
+    with m.scope("reactive_power"):
+        mode = m.parameter(
+            "mode", 1, "1", "0: reactive power at the bus; 1: voltage of the converter", minimum=0, maximum=1,
+            type="Integer",
+        )  # fmt: skip
+        K_p = m.parameter("K_p", 0.1667, "pu", "Proportional gain", base="S_n", minimum=0.0, source=FILE)
+        K_i = m.parameter("K_i", 50.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=FILE)
+        Q_ref = m.calculated("Q_ref", t.start.s.im, "pu", "Reference of the operating point", base="S_n")
+        U_ref = m.calculated("U_ref", t.start.v_c.magnitude(), "pu", "Reference of the operating point", base="S_n")
+        change = m.parameter("delta_ref", 0, "pu", "Change of the reference", base="S_n", tunable=True)
+        by_q = mode < 0.5
+        controlled = ca.if_else(by_q, seen.Q, seen.u_c)
+        start = ca.if_else(by_q, Q_ref, U_ref)
+        slow = low_pass(m, "measured", controlled, tau, start)
+        high, low = _support(m)
+        error = ca.if_else(seen.v < low, 0, slow - start - change)
+        x = m.state("x", t.start.i.im, "pu", "Integrator, reactive current", base="S_n")
+        _integrate(m, port, x, K_i * error, limits.reactive)
+        asked = clamp(K_p * error + clamp(x, -limits.reactive, limits.reactive), -limits.reactive, limits.reactive)
+        return asked - limits.I_max * clamp((high - seen.v) / (high - low), 0, 1)
+
+
+def _support(m: ModelBuilder) -> tuple[ca.SX, ca.SX]:
+    """Bus voltages [pu] at which the support begins, and at which all current is reactive."""
+    with m.scope("support"):
+        high = m.parameter("V_1", 0.95, "pu", "Voltage below which reactive current is added", base="bus", source=COLIB)
+        low = m.parameter("V_2", 0.5, "pu", "Voltage below which all of it is, and integration stands", base="bus",
+                          source=COLIB)  # fmt: skip
+        m.require(high - low, "support.V_1 must be above support.V_2")
+        return high, low
+
+
+def _integrate(m: ModelBuilder, port: DevicePort, x: ca.SX, rate: ca.SX, most: ca.SX) -> None:
+    """The integrator stands still at its limit; behind an open breaker it returns to 0."""
+    outward = ca.logic_or(ca.logic_and(x > most, rate > 0), ca.logic_and(x < -most, rate < 0))
+    m.derivative(x, ca.if_else(outward, 0, rate) * port.connected - x / BREAKER_TIME * (1 - port.connected))
+
+
+def _current_control(m: ModelBuilder, port: DevicePort, t: Transformer, u: Phasor, w: ca.SX, i_ref: Phasor) -> Phasor:
+    """Voltage of the converter [pu, S_n]: PI controller, decoupling, and the voltage along the frame fed forward."""
+    with m.scope("current_control"):
+        K_p = m.parameter("K_p", 0.4584, "pu", "Proportional gain", base="S_n", minimum=0.01, source=COLIB)
+        K_i = m.parameter("K_i", 6.0, "pu/s", "Integral gain", base="S_n", minimum=0.0, source=COLIB)
+        x = qd_state(m, "x", t.start.i * t.R, "Integrator of the current loop")
+        error = i_ref - t.i.value
+        x.set_derivative(m, port.through_breaker(error * K_i, x.value * (-1 / BREAKER_TIME)))
+        return error * K_p + x.value + Phasor(0, w * t.X) * t.i.value + Phasor(u.re, 0)

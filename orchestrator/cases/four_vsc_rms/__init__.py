@@ -1,0 +1,1 @@
+"""The four-VSC benchmark of COLIB with phasor models."""
