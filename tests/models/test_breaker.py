@@ -28,7 +28,7 @@ def run(path, seconds, values, watched, step=1e-4):
     return dict(zip(watched, np.array(rows).T, strict=True))
 
 
-@pytest.mark.parametrize("name", ["gfor", "gfl", *GENERATORS])
+@pytest.mark.parametrize("name", ["gfor", "gfl", "gfl_l2ep", *GENERATORS])
 def test_the_current_fades_within_the_breakers_time(name, fmu_path):
     found = run(fmu_path(name), 0.03, {"P_0": 0.7, "Q_0": 0.2}, WATCHED)
     current = np.hypot(found["i_re"], found["i_im"])
