@@ -57,6 +57,17 @@ REFERENCES = (
         *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u", "i_s"),
     ),
     Reference(
+        "gfl_l2ep", "fmus/gfl_l2ep/reference.csv", {"P_0": 0.8, "Q_0": 0.05},
+        *_BUS, ("i_re", "i_im", "omega", "u_c", "i", "current_demand"),
+    ),
+    Reference(
+        "gfl_l2ep_phasor", "fmus/gfl_l2ep/reference_phasor.csv", {"P_0": 0.8, "Q_0": 0.05},
+        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u_c", "i"),
+    ),
+    Reference(
+        "external_grid", "fmus/external_grid/reference.csv", {"S_n": 17700.0}, *_BUS, ("i_re", "i_im", "p", "q"),
+    ),
+    Reference(
         "regfm_a1_phasor", "fmus/regfm_a1/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
         *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
     ),
