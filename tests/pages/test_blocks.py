@@ -17,8 +17,16 @@ OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest",
 ADDED = {"least-damped"}
 """Commands of ``gfor`` that a guide adds."""
 
-FMUS = ("gfor", "two_area_grid", "synchronous_generator_st1", "gfl", "gfl_l2ep", "regfm_a1_phasor", "infinite_bus",
-        "external_grid")
+FMUS = (
+    "gfor",
+    "two_area_grid",
+    "synchronous_generator_st1",
+    "gfl",
+    "gfl_l2ep",
+    "regfm_a1_phasor",
+    "infinite_bus",
+    "external_grid",
+)
 """FMUs that the Python blocks of the leaflets open."""
 
 

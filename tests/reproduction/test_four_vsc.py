@@ -1,0 +1,168 @@
+"""The four-VSC benchmark: the independent computation's limits, those of the FMUs, and every table of the page."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.study.modes import compute_modes
+from orchestrator.study.run import run_scenario
+from tests.reference.four_vsc import HVDC1, HVDC2, WP1, WP2, FourVsc, report, with_all
+from tests.support.tables import figures
+
+pytestmark = pytest.mark.reproduction
+
+PAGE = (BUILT_IN / "four_vsc" / "README.md").read_text(encoding="utf-8")
+OURS, CHANGES, FORMING = "Theirs and ours", "What makes the difference", "With forming converters"
+MARGIN, HERTZ = 4e-3, 0.06
+"""A limit stands in the tables to three digits, and is tried on both sides; a frequency to a tenth of a hertz."""
+
+OPEN = FourVsc(circuits_AB=1)
+BY_VOLTAGE = (replace(WP1, by_voltage=True, K_pv=0.1667, K_iv=50.0), WP2, HVDC1, HVDC2)
+ROWS = {
+    "as published": OPEN,
+    "both circuits between A and B": FourVsc(),
+    "the load a resistance in series with an inductor": replace(OPEN, load="series"),
+    "no load, the equivalent takes its power": replace(OPEN, load="none"),
+    "R/X of the equivalent 0.1": replace(OPEN, R_X=0.1),
+    "wind park 1 holds its voltage, as the others": replace(OPEN, converters=BY_VOLTAGE),
+    "no ratio between B2 and B": replace(OPEN, tap_B=1.0),
+    "PLL twice as slow": with_all(OPEN, T_pll=0.2),
+    "PLL twice as fast": with_all(OPEN, T_pll=0.05),
+    "lag of 1 ms in the voltage fed forward": replace(OPEN, fed_forward=1e-3),
+    "lag of 0.5 ms in the converter's voltage": replace(OPEN, actuated=5e-4),
+    "gain of the active power 33.3, as in the files": with_all(OPEN, K_pp=33.3),
+    "the data of 2025": report(circuits_AB=1),
+    "the data of 2025, R/X 0.04": report(circuits_AB=1, R_X=0.04),
+}
+QUICK = {"as published", "gain of the active power 33.3, as in the files", "the data of 2025"}
+
+
+def assert_limit(system, gva, hertz):
+    """It is unstable just below the limit, at that frequency, and stable just above it."""
+    below = replace(system, S_sc=1e3 * gva * (1 - MARGIN)).critical()
+    above = replace(system, S_sc=1e3 * gva * (1 + MARGIN)).critical()
+    assert below.real > 0 > above.real
+    assert below.imag / 2 / np.pi == pytest.approx(hertz, abs=HERTZ)
+
+
+@pytest.mark.parametrize("label", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in ROWS])
+@pytest.mark.parametrize("network", ["EMT", "phasors"])
+def test_each_change_has_the_limit_of_the_page(label, network):
+    cells = [cell[0] if cell else None for cell in figures(PAGE, CHANGES, label)]
+    gva, hertz = cells[:2] if network == "EMT" else cells[2:]
+    system = replace(ROWS[label], dynamic=network == "EMT")
+    if gva is None:
+        assert replace(system, S_sc=40000.0).critical().real > 0
+    else:
+        assert_limit(system, gva, hertz)
+
+
+def test_the_power_flow_is_that_of_the_published_files():
+    """Voltages of lf_2.dat [pu, rad]: A, A2, B, B2, E and F."""
+    v, _ = FourVsc().power_flow()
+    published = {
+        0: (1.0075727, 0.041624702), 1: (1.0318733, 0.15892537), 2: (1.0054174, 0.036073673),
+        3: (0.9824509, 0.16556362), 5: (1.0475620, 0.18895444), 6: (0.9997311, 0.19815885),
+    }  # fmt: skip
+    for k, (magnitude, angle) in published.items():
+        assert abs(v[k]) == pytest.approx(magnitude, abs=1e-5)
+        assert np.angle(v[k]) == pytest.approx(angle, abs=2e-5)
+
+
+def test_with_the_files_gain_the_phasor_system_has_the_limit_of_the_slides():
+    """5.5 GVA and 8 Hz, for a response that they call marginal."""
+    gva, hertz = (cell[0] for cell in figures(PAGE, CHANGES, "gain of the active power 33.3, as in the files")[2:])
+    assert gva == pytest.approx(5.5, rel=0.06)
+    assert hertz == pytest.approx(8.0, rel=0.03)
+
+
+# -- the FMUs -----------------------------------------------------------------------------------
+
+
+def stability(name, scenario, S_sc, step=None, **overrides):
+    (ready,) = load_case(name).prepare([scenario], {"equivalent.S_n": S_sc} | overrides, step_size=step)
+    return compute_modes(ready, (1.0, 60.0)).stability
+
+
+def assert_fmus(name, scenario, gva, hertz, step=None, **overrides):
+    below = stability(name, scenario, 1e3 * gva * (1 - 2 * MARGIN), step, **overrides)
+    above = stability(name, scenario, 1e3 * gva * (1 + 2 * MARGIN), step, **overrides)
+    assert (below.stable, above.stable) == (False, True)
+    assert below.mode.frequency_hz == pytest.approx(hertz, abs=HERTZ)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", ["FMUs, `following`", "FMUs, `report`"])
+def test_the_fmus_have_the_limits_of_the_page(label):
+    scenario = label.split("`")[1]
+    emt, emt_hz, rms, rms_hz = (cell[0] for cell in figures(PAGE, OURS, label))
+    assert_fmus("four_vsc", scenario, emt, emt_hz)
+    assert_fmus("four_vsc_rms", scenario, rms, rms_hz)
+
+
+@pytest.mark.slow
+def test_the_fmus_with_the_files_gain():
+    *_, gva, hertz = figures(PAGE, OURS, "FMUs, `file` with `--step 2e-4`")
+    assert_fmus("four_vsc_rms", "file", gva[0], hertz[0], step=2e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("S_sc", [20000.0, 9000.0])
+def test_the_fmus_critical_mode_is_the_independent_one(S_sc):
+    """At 50 µs. The EMT FMUs' equivalent has R/X = 0.001."""
+    (ready,) = load_case("four_vsc").prepare(["following"], {"equivalent.S_n": S_sc})
+    found = compute_modes(ready, (1.0, 48.0)).modes
+    least = max(found, key=lambda mode: mode.eigenvalue.real).eigenvalue
+    exact = FourVsc(S_sc=S_sc, R_X=0.001).eigenvalues()
+    assert np.abs(exact - least).min() < 0.06
+
+
+SHARES = {"48 MVA": 48, "120 MVA": 120, "240 MVA, `forming_tenth`": 240, "600 MVA": 600}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", SHARES)
+def test_how_much_forming_rating_a_weak_grid_needs(label):
+    forming = SHARES[label]
+    cells = figures(PAGE, FORMING, label)
+    shares = {"wp2.S_n": 2400.0 - forming, "gfor_wp2.S_n": float(forming)}
+    assert_fmus("four_vsc", "forming_tenth", cells[0][0], cells[1][0], **shares)
+    if len(cells[2]) == 1 and cells[3]:
+        assert_fmus("four_vsc_rms", "forming_tenth", cells[2][0], cells[3][0], **shares)
+    else:
+        assert stability("four_vsc_rms", "forming_tenth", 300.0, **shares).stable
+
+
+@pytest.mark.slow
+def test_damping_controllers_hardly_move_the_limit():
+    cells = figures(PAGE, FORMING, "240 MVA with POD, `forming_tenth_pod`")
+    assert_fmus("four_vsc", "forming_tenth_pod", cells[0][0], cells[1][0])
+    assert_fmus("four_vsc_rms", "forming_tenth_pod", cells[2][0], cells[3][0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["four_vsc", "four_vsc_rms"])
+@pytest.mark.parametrize("scenario", ["forming_1", "forming_1_pod", "forming_2", "forming_3", "forming_4"])
+def test_with_a_forming_wind_park_there_is_no_limit_above_300_mva(name, scenario):
+    """The slides show it for wind park 2, with EMT and phasor models."""
+    assert stability(name, scenario, 300.0).stable
+    assert stability(name, scenario, 20000.0).stable
+
+
+@pytest.mark.slow
+def test_the_simulated_oscillation_grows_as_the_independent_eigenvalue_says(tmp_path):
+    """One circuit opens at 0.1 s; at 9 GVA the voltage of wind park 2 grows by 3.5 1/s at 13.8 Hz."""
+    text = (BUILT_IN / "four_vsc" / "case.toml").read_text(encoding="utf-8").replace('time = "1 s"', 'time = "0.1 s"')
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    (ready,) = load_case(tmp_path / "case.toml").prepare(["following"], {"equivalent.S_n": 9500.0}, stop_time=0.8)
+    recorded = run_scenario(ready).dataset
+    time, v = recorded["time"].values, recorded["grid.bus_F.v"].values
+    exact = FourVsc(S_sc=9500.0, circuits_AB=1, R_X=0.001).critical()
+    late = time > 0.35
+    t, v = time[late], v[late] - v[late].mean()
+    peaks = [k for k in range(1, len(v) - 1) if v[k - 1] < v[k] >= v[k + 1]]
+    growth = np.polyfit(t[peaks], np.log(v[peaks]), 1)[0]
+    assert growth == pytest.approx(exact.real, abs=0.5)
+    assert 2 * np.pi / np.diff(t[peaks]).mean() == pytest.approx(exact.imag, rel=0.02)
