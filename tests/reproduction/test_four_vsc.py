@@ -109,14 +109,18 @@ def test_the_fmus_with_the_files_gain():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("S_sc", [20000.0, 9000.0])
-def test_the_fmus_critical_mode_is_the_independent_one(S_sc):
-    """At 50 µs. The EMT FMUs' equivalent has R/X = 0.001."""
-    (ready,) = load_case("four_vsc").prepare(["following"], {"equivalent.S_n": S_sc})
-    found = compute_modes(ready, (1.0, 48.0)).modes
-    least = max(found, key=lambda mode: mode.eigenvalue.real).eigenvalue
-    exact = FourVsc(S_sc=S_sc, R_X=0.001).eigenvalues()
-    assert np.abs(exact - least).min() < 0.06
+@pytest.mark.parametrize("name", ["four_vsc", "four_vsc_rms"])
+@pytest.mark.parametrize("S_sc", [20000.0, 5000.0])
+def test_every_independent_eigenvalue_is_one_of_the_fmus(name, S_sc):
+    """Without a communication step. Only the phasor FMUs have lags of the bus voltage, here of 1 ms: (s·τ)² apart."""
+    emt = name == "four_vsc"
+    lags = {} if emt else {f"{unit}.bus_voltage.tau": 1e-3 for unit in ("wp1", "wp2", "hvdc1", "hvdc2")}
+    (ready,) = load_case(name).prepare(["following"], {"equivalent.S_n": S_sc} | lags)
+    fmus = np.linalg.eigvals(compute_modes(ready).system.A)
+    exact = FourVsc(S_sc=S_sc, R_X=0.001, dynamic=emt).eigenvalues()
+    exact = exact[np.abs(exact + 1000) > 1e-3]  # the lags of what is not in the benchmark
+    for z in exact if emt else exact[np.abs(exact) < 150]:
+        assert np.abs(fmus - z).min() < (2e-4 if emt else 2e-2) * max(abs(z), 10.0)
 
 
 SHARES = {"48 MVA": 48, "120 MVA": 120, "240 MVA, `forming_tenth`": 240, "600 MVA": 600}
@@ -129,7 +133,7 @@ def test_how_much_forming_rating_a_weak_grid_needs(label):
     cells = figures(PAGE, FORMING, label)
     shares = {"wp2.S_n": 2400.0 - forming, "gfor_wp2.S_n": float(forming)}
     assert_fmus("four_vsc", "forming_tenth", cells[0][0], cells[1][0], **shares)
-    if len(cells[2]) == 1 and cells[3]:
+    if len(cells) == 4:  # else it says "below 0.3"
         assert_fmus("four_vsc_rms", "forming_tenth", cells[2][0], cells[3][0], **shares)
     else:
         assert stability("four_vsc_rms", "forming_tenth", 300.0, **shares).stable
