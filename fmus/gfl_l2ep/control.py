@@ -16,7 +16,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
 
 LOOP = LoopDefaults(f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²")
-FILE = "COLIB, file dyn_det_2.dat"
+MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Followi
         tau = m.parameter("tau", 0.0033, "s", "Lag of the measurements of P, Q and u_c", minimum=1e-3, source=COLIB)
     s = power(u, i)
     active = _active_power(m, port, t, limits, ca.SX(s.re), tau)
-    seen = _Seen(ca.SX(s.im), inside.magnitude(), bus.magnitude())
+    seen = _Seen(ca.SX(s.im), inside.magnitude(), v.magnitude())
     reactive = _reactive_power(m, port, t, limits, seen, tau)
     i_ref = limited(limits, active, reactive)
     v_c = _current_control(m, port, t, u, frame.w, i_ref)
@@ -93,11 +93,11 @@ def _reactive_power(
     """Reactive current that is asked for [pu, S_n]: a PI controller, and what a low voltage adds."""
     with m.scope("reactive_power"):
         mode = m.parameter(
-            "mode", 1, "1", "0: reactive power at the bus; 1: voltage of the converter", minimum=0, maximum=1,
+            "mode", 0, "1", "0: reactive power at the bus; 1: voltage of the converter", minimum=0, maximum=1,
             type="Integer",
         )  # fmt: skip
-        K_p = m.parameter("K_p", 0.1667, "pu", "Proportional gain", base="S_n", minimum=0.0, source=FILE)
-        K_i = m.parameter("K_i", 50.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=FILE)
+        K_p = m.parameter("K_p", 0.0333, "pu", "Proportional gain", base="S_n", minimum=0.0, source=MODES)
+        K_i = m.parameter("K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=MODES)
         Q_ref = m.calculated("Q_ref", t.start.s.im, "pu", "Reference of the operating point", base="S_n")
         U_ref = m.calculated("U_ref", t.start.v_c.magnitude(), "pu", "Reference of the operating point", base="S_n")
         change = m.parameter("delta_ref", 0, "pu", "Change of the reference", base="S_n", tunable=True)

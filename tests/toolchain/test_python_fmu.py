@@ -27,6 +27,7 @@ EXCITERS = ("ac4a", "st1", "st4b")
 _CONVERTER_OPEN = {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
 _CONVERTER_OPEN |= {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9}
 _FOLLOWING_OPEN = {"reactive_power.mode": 2, "frequency_droop.enabled": True}
+_L2EP_OPEN = {"reactive_power.mode": 1, "reactive_power.support.V_1": 1.2, "current_limit.I_max": 0.85}
 # Settings under which every declared path of a model carries a signal.
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
@@ -37,7 +38,8 @@ ALL_PATHS_OPEN = {
     "synchronous_generator_phasor": {"communication_step": 5e-3, "transformer.X_t": 0.1},
     "gfl": _FOLLOWING_OPEN,
     "gfl_phasor": _FOLLOWING_OPEN | {"communication_step": 5e-3},
-    "gfl_l2ep_phasor": {"communication_step": 5e-3},
+    "gfl_l2ep": _L2EP_OPEN,
+    "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "regfm_a1_phasor": {"communication_step": 5e-3, "RL": 0.01, "kpv": 0.5, "kpqmax": 0.01, "ImaxF": 1.0},
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.
