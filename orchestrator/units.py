@@ -4,17 +4,33 @@ import re
 from functools import cache
 from typing import Any
 
-import pint
-
 _QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*")
 _POWERS = {"W", "VA", "var"}
 _ANGLES = ("radian", "degree", "arcminute", "arcsecond", "grade", "mil", "turn", "revolution")
 _TURNS = ("turn", "revolution")
+
+USUAL: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6},
+    "MW": {"MW": 1.0, "W": 1e-6, "kW": 1e-3, "GW": 1e3},
+    "MVA": {"MVA": 1.0, "VA": 1e-6, "kVA": 1e-3, "GVA": 1e3},
+    "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3},
+    "kV": {"kV": 1.0, "V": 1e-3},
+    "rad": {"rad": 1.0},
+    "deg": {"deg": 1.0},
+    "pu": {"pu": 1.0},
+}
+"""Declared unit → factor of the units that it is usually given in. They are pint's own factors, to the last bit: a case
+that is written in them is read without pint, which takes half a second to import.
+"""
+
 _PER_SECOND = "1 Hz is 2π rad/s, or 60 rpm"
 
 
 @cache
 def _registry() -> Any:
+    import pint  # noqa: PLC0415 - half a second to import; see `USUAL`
+
     registry: Any = pint.UnitRegistry()
     registry.define("per_unit = [per_unit] = pu")
     registry.define("volt_ampere = volt * ampere = VA")
@@ -59,16 +75,23 @@ def to_unit(value: float | int | str, unit: str) -> float:
     declared = "dimensionless" if unit in ("", "1") else unit
     if {_kind(given), _kind(unit)} & _POWERS and _kind(given) != _kind(unit):
         raise ValueError(f"{value!r} is in {given}, but {needed} is needed")  # one dimension, three quantities
-    try:
-        alike = _counts_alike(given, declared)
-        factor = float(_registry().Quantity(1, given).to(declared).magnitude)
-    except pint.DimensionalityError as error:
-        raise ValueError(f"{value!r} is in {given}, but {needed} is needed") from error
-    except Exception as error:  # pint lets its parser's errors through
-        raise ValueError(f"{value!r}: the unit {given!r} is unknown") from error
-    if not alike:
-        raise ValueError(f"{value!r} is in {given}, but {needed} is needed; {_PER_SECOND}")
+    factor = USUAL.get(declared, {}).get(given)
+    if factor is None:
+        try:
+            alike = _counts_alike(given, declared)
+            factor = pint_factor(given, declared)
+        except Exception as error:  # pint lets its parser's errors through
+            if type(error).__name__ == "DimensionalityError":
+                raise ValueError(f"{value!r} is in {given}, but {needed} is needed") from error
+            raise ValueError(f"{value!r}: the unit {given!r} is unknown") from error
+        if not alike:
+            raise ValueError(f"{value!r} is in {given}, but {needed} is needed; {_PER_SECOND}")
     return float(f"{number * factor:.15g}")  # "100 us" is 1e-4 s and not 9.999999999999999e-05
+
+
+def pint_factor(given: str, declared: str) -> float:
+    """What one of the given units is in the declared one, as pint has it; raises pint's errors."""
+    return float(_registry().Quantity(1, given).to(declared).magnitude)
 
 
 def _kind(unit: str) -> str:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
-    ("orchestrator.arrays", "orchestrator.errors", "orchestrator.units"),
+    ("orchestrator.arrays", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
     ("orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),

@@ -1,10 +1,11 @@
 """Linear models with names: those of a scenario, and those that FMUs carry."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from pathlib import Path
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
@@ -13,6 +14,12 @@ from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.api.show import page
 from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
+from orchestrator.late import Late
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = Late("pandas")
 
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
 """That of a model which was read from an FMU."""

@@ -1,21 +1,27 @@
 """Modes and runs of a scenario: as tables, as pictures, in a notebook."""
 
-from collections.abc import Iterator
-from typing import Any
+from __future__ import annotations
 
-import pandas as pd
-import xarray as xr
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Stability
 from orchestrator.api.show import Axes, axes_or_new, curves_on, page
 from orchestrator.errors import CosimError, InputError
+from orchestrator.late import Late
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
 from orchestrator.study.modes import ModesResult, modes_json
 from orchestrator.study.run import RunResult
 from orchestrator.watch.finding import Finding
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+else:
+    pd = Late("pandas")
 
 _STATES = 3
 """States with the largest participation that stand in a table."""

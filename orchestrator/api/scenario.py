@@ -1,12 +1,12 @@
 """One scenario of a case: its modes, its response in time, its linear model."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
@@ -32,11 +32,17 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
+from orchestrator.late import Late
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = Late("pandas")
 
 
 class RunEndedWarning(UserWarning):

@@ -1,12 +1,18 @@
 """How results show themselves: HTML for a notebook, and Matplotlib Axes to draw on."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from html import escape
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import InputError
+from orchestrator.late import Late
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = Late("pandas")
 
 Axes = Any
 """``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth."""

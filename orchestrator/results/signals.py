@@ -1,9 +1,18 @@
 """Signals named in a case file: a recorded variable, or the difference of two."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from orchestrator.cases.names import variables_of
+from orchestrator.late import Late
+
+if TYPE_CHECKING:
+    import xarray as xr
+else:
+    xr = Late("xarray")
 
 MOST_DRAWN = 200_000
 """Rows up to which a signal is drawn as it is."""

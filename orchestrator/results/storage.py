@@ -1,5 +1,7 @@
 """Results on disk: NetCDF with units, long names and provenance, and CSV beside it."""
 
+from __future__ import annotations
+
 import csv
 import io
 import json
@@ -7,18 +9,22 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import scipy.io
-import xarray as xr
 from numpy.typing import NDArray
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
+from orchestrator.late import Late
 from orchestrator.results.netcdf import netcdf_image, stored_name
 from orchestrator.safe_files import replacing, write_bytes, write_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+else:
+    xr = Late("xarray")
 
 _CSV_ROWS = 10_000
 """Rows of a table that are written at a time."""
@@ -186,8 +192,10 @@ def save_matrices(content: Mapping[str, Any], path: Path) -> None:
     ResultsError
         If they cannot be written.
     """
+    from scipy.io import savemat  # noqa: PLC0415 - a tenth of a second that only this format needs
+
     file = io.BytesIO()
-    scipy.io.savemat(file, dict(content))
+    savemat(file, dict(content))
     write_bytes(path, file.getvalue())
 
 

@@ -1,11 +1,13 @@
 """Recorded runs side by side: how far two differ in a signal, and the modes that each rings with."""
 
+from __future__ import annotations
+
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
 from orchestrator.cases.names import close_names
@@ -19,6 +21,9 @@ from orchestrator.results.staging import unfinished
 from orchestrator.safe_files import PARTIAL
 from orchestrator.study.common_times import common_times
 from orchestrator.study.measured import is_measured, measured_modes
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _WEAKEST = 1e-3
 

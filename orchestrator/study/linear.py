@@ -1,10 +1,12 @@
 """The linear model of a scenario: exported for other tools, and laid over the simulated response."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
@@ -18,7 +20,13 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import faults_among
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
+from orchestrator.late import Late
 from orchestrator.study.modes import running
+
+if TYPE_CHECKING:
+    import xarray as xr
+else:
+    xr = Late("xarray")
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:

@@ -1,12 +1,18 @@
 """Measured recordings, made ready for the identification of modes: what they cannot show is refused."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
 from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 from orchestrator.results.comtrade.reading import LINE_FREQUENCY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _UNEVEN = 0.01
 """Part of the interval by which samples may be off."""

@@ -1,8 +1,9 @@
 """The electromechanical mode as the simulated response shows it, beside its eigenvalue."""
 
-from collections.abc import Sequence
+from __future__ import annotations
 
-import xarray as xr
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used, nearest
 from orchestrator.arrays import Numbers
@@ -10,6 +11,9 @@ from orchestrator.errors import AnalysisError
 from orchestrator.results.signals import signal
 from orchestrator.study.modes import ModesResult
 from orchestrator.watch.finding import Finding, Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _COARSEST = 0.25
 """Record interval [periods of the mode] up to which a ring-down is shown."""

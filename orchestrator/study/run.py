@@ -1,9 +1,10 @@
 """A run: the modes of a scenario, its response to the events, what links the two, and what went wrong in it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
@@ -41,6 +42,9 @@ from orchestrator.study.modes import ModesResult, modes_of, running, unknown_mod
 from orchestrator.study.ring_down import ring_down_of
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE, Finding
 from orchestrator.watch.watch import Watch
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 STEPS = (0.5, 1.0, 2.0, 5.0)
 """Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""

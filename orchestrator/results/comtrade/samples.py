@@ -1,13 +1,21 @@
 """The samples of a COMTRADE recording (``.dat``): text, integers of 16 or 32 bits, or single precision."""
 
+from __future__ import annotations
+
 import io
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from orchestrator.arrays import Matrix, Numbers
 from orchestrator.errors import InputError
+from orchestrator.late import Late
 from orchestrator.results.comtrade.configuration import Configuration
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = Late("pandas")
 
 _STAMP_MISSING = 0xFFFFFFFF
 _TYPES = {"BINARY": ("<i2", -0x8000), "BINARY32": ("<i4", -0x80000000), "FLOAT32": ("<f4", None)}
