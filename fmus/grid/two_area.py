@@ -7,9 +7,7 @@ are inside them.
 
 from dataclasses import replace
 
-from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
-from fmus.grid.phasor_grid import phasor_grid
 from fmus.toolchain.model import Model
 
 TWO_AREA = Network(
@@ -25,9 +23,13 @@ TWO_AREA_PHASOR = replace(TWO_AREA, name="two_area_phasor_grid")
 
 def two_area_grid(network: Network = TWO_AREA) -> Model:
     """EMT line and constant-impedance loads of the two-area system."""
+    from fmus.grid.grid import grid  # noqa: PLC0415 - imports CasADi, without which the network can be read
+
     return grid(network)
 
 
 def two_area_phasor_grid(network: Network = TWO_AREA_PHASOR) -> Model:
     """The same without network transients."""
+    from fmus.grid.phasor_grid import phasor_grid  # noqa: PLC0415 - as above
+
     return phasor_grid(network)

@@ -7,6 +7,7 @@ from typing import Any
 
 from fmus.toolchain.extras import require
 from fmus.toolchain.model import Model
+from fmus.toolchain.notes import noted
 
 GROUP = "gfor_cosim.models"
 
@@ -18,16 +19,31 @@ def model_names() -> tuple[str, ...]:
 
 def needs_arguments(name: str) -> bool:
     """Whether a model can only be built for given data, such as a network."""
-    parameters = inspect.signature(_factory(name)).parameters.values()
-    return any(p.default is inspect.Parameter.empty for p in parameters)
+    return bool(_signature(name)["needs_arguments"])
 
 
 def parts_of(name: str) -> dict[str, str]:
     """What a model can be made of, such as ``machine`` and ``exciter``, each with the part that it is made of if
     nothing is chosen; empty for a model without parts.
     """
-    parameters = inspect.signature(_factory(name)).parameters.values()
-    return {p.name: p.default for p in parameters if isinstance(p.default, str)}
+    return dict(_signature(name)["parts"])
+
+
+def entry_of(name: str) -> EntryPoint:
+    """The catalogue's entry of a model, whose code need not be loaded.
+
+    Raises
+    ------
+    KeyError
+        If no model has that name; the message lists all models.
+    MissingLibraryError
+        If the library that models are written in is not installed.
+    """
+    found = _entries().get(name)
+    if found is None:
+        raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
+    require(f"the model {name!r} of the catalogue", "casadi")
+    return found
 
 
 def build_model(name: str, **arguments: Any) -> Model:
@@ -46,8 +62,9 @@ def build_model(name: str, **arguments: Any) -> Model:
 
 def network_of(name: str) -> Any | None:
     """The network that a grid model is built for by default, or None for other models."""
-    parameter = inspect.signature(_factory(name)).parameters.get("network")
-    return None if parameter is None or parameter.default is inspect.Parameter.empty else parameter.default
+    if not _signature(name)["has_network"]:
+        return None
+    return inspect.signature(_factory(name)).parameters["network"].default
 
 
 @cache
@@ -57,9 +74,22 @@ def _entries() -> dict[str, EntryPoint]:
 
 
 @cache
+def _signature(name: str) -> dict[str, Any]:
+    """What a model's arguments are, without its code where that was looked at before."""
+
+    def find() -> dict[str, Any]:
+        parameters = inspect.signature(_factory(name)).parameters.values()
+        empty = inspect.Parameter.empty
+        return {
+            "needs_arguments": any(p.default is empty for p in parameters),
+            "parts": {p.name: p.default for p in parameters if isinstance(p.default, str)},
+            "has_network": any(p.name == "network" and p.default is not empty for p in parameters),
+        }
+
+    found: dict[str, Any] = noted(entry_of(name), "signature", find)
+    return found
+
+
+@cache
 def _factory(name: str) -> Any:
-    found = _entries().get(name)
-    if found is None:
-        raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
-    require(f"the model {name!r} of the catalogue", "casadi")
-    return found.load()
+    return entry_of(name).load()

@@ -7,8 +7,9 @@ from functools import cache
 from typing import Any
 
 from fmus.grid.network import Network
-from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.catalogue import build_model, entry_of
 from fmus.toolchain.extras import require
+from fmus.toolchain.notes import noted
 from orchestrator.fmi.description import FmuDescription, parse_description, read_description
 
 
@@ -53,17 +54,40 @@ def plan_fmu(
         If the extra that builds FMUs is not installed.
     """
     require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
-    from fmus.toolchain.cache import intact  # noqa: PLC0415 - needs the extra `build`
-    from fmus.toolchain.exporter import kept_at  # noqa: PLC0415 - as above
-    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
+    from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
+
+    recipes: list[Any] = []
+
+    def find() -> list[str]:
+        recipes.append(_recipe(model, network, native, parts))
+        return _place(recipes[0])
+
+    asked = f"fmu {model} {native} {parts!r} {network!r}"
+    folder = cache_directory("fmus")
+    path = folder.joinpath(*noted(entry_of(model), asked, find))
+    if intact(path):
+        return PlannedFmu(None, read_description(path))
+    recipe = recipes[0] if recipes else _recipe(model, network, native, parts)
+    return PlannedFmu(
+        recipe, parse_description(cache_directory("fmus").joinpath(*_place(recipe)), recipe.description())
+    )
+
+
+def _recipe(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> Any:
+    """What an FMU is built by; for its hash the model is built, which takes up to seconds."""
+    from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     arguments = dict(parts) | ({"network": network} if network is not None else {})
-    recipe = (NativeFmu if native else PythonFmu)(build_model(model, **arguments))
+    return (NativeFmu if native else PythonFmu)(build_model(model, **arguments))
+
+
+def _place(recipe: Any) -> list[str]:
+    """Folder and file at which an FMU is kept, below the folder of all kept FMUs."""
+    from fmus.toolchain.exporter import kept_at  # noqa: PLC0415 - needs the extra `build`
+
     path = kept_at(recipe)
-    if intact(path):
-        return PlannedFmu(None, read_description(path))
-    return PlannedFmu(recipe, parse_description(path, recipe.description()))
+    return [path.parent.name, path.name]
 
 
 @cache

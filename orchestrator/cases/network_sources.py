@@ -7,7 +7,6 @@ everything out of service are dealt with there.
 import logging
 import re
 import warnings
-from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,40 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.extras import require
-from orchestrator.arrays import Matrix
+from orchestrator.cases.kept_tables import kept_tables
 from orchestrator.cases.names import close_names
+from orchestrator.cases.source_tables import SourceTables
 from orchestrator.errors import InputError
 
+__all__ = ["SourceTables", "read_matpower", "read_pandapower"]
+
 _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
-
-
-@dataclass(frozen=True)
-class SourceTables:
-    """MATPOWER's tables of a network, its columns in MATPOWER's order.
-
-    Attributes
-    ----------
-    branch_to_earth
-        Conductance and susceptance to earth at both ends of every branch [pu]: g + jb behind the ratio at the from
-        side, and at the to side.
-    labels
-        Number of a bus → what people call it.
-    frequency
-        Rated frequency [Hz], where the source knows it.
-    load_parts
-        Number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
-        tells them apart; the rest of the bus' load is as the case says.
-    """
-
-    name: str
-    base_mva: float
-    bus: Matrix
-    branch: Matrix
-    gen: Matrix
-    branch_to_earth: NDArray[np.complex128]
-    labels: dict[int, str]
-    frequency: float | None = None
-    load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)
 
 
 def read_matpower(path: Path) -> SourceTables:
@@ -104,6 +77,11 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
 @cache
 def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
     """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
+    content = path.read_bytes() if changed else b""
+    return kept_tables(name, content, lambda: _made_by_pandapower(name, path))
+
+
+def _made_by_pandapower(name: str, path: Path) -> SourceTables:
     require(f"the pandapower network {name!r}", "pandapower")
     import pandapower as pp  # noqa: PLC0415 - seconds to import, and needed only here
 

@@ -1,0 +1,85 @@
+"""Tables of pandapower's networks, kept between runs: pandapower takes seconds to import and to solve a network.
+
+The name of a kept file is a hash of the network, of the versions of what made the tables, and of the code that did.
+"""
+
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from orchestrator.cases.source_tables import SourceTables
+
+LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
+"""What the tables depend on beside our code; pandapower takes the last where it is installed."""
+
+_FILES = [Path(__file__).with_name(name) for name in ("kept_tables.py", "network_sources.py", "source_tables.py")]
+_CODE = "".join(file.read_text(encoding="utf-8") for file in _FILES)
+"""What is loaded, if it is the same when tables are kept."""
+
+
+def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> SourceTables:
+    """The tables of a network as they are kept, or else as they are made, and kept for the next time.
+
+    Parameters
+    ----------
+    name
+        Of the network, or of its file.
+    content
+        Of the file; empty for a network of pandapower's own.
+    make
+        Makes the tables; what it raises is not kept.
+    """
+    versions = _versions()
+    if not versions["pandapower"]:
+        return make()
+    parts = [name, hashlib.sha256(content).hexdigest(), versions, sys.platform, sys.version, _CODE]
+    path = cache_directory("networks") / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
+    if intact(path):
+        return _from_json(json.loads(path.read_bytes()))
+    tables = make()
+    with suppress(CacheError):  # as slow as before, but right
+        if not tables.load_parts and "".join(file.read_text(encoding="utf-8") for file in _FILES) == _CODE:
+            keep(path, json.dumps(_as_json(tables)).encode())
+    return tables
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            found[library] = ""
+    return found
+
+
+def _as_json(tables: SourceTables) -> dict[str, Any]:
+    """Every number as the shortest text that gives it back to the last bit."""
+    arrays = {name: getattr(tables, name) for name in ("bus", "branch", "gen")}
+    arrays |= {"real": tables.branch_to_earth.real, "imag": tables.branch_to_earth.imag}
+    return {
+        "name": tables.name,
+        "base_mva": tables.base_mva,
+        "labels": list(tables.labels.items()),
+        "frequency": tables.frequency,
+        "arrays": {name: [list(a.shape), a.ravel().tolist()] for name, a in arrays.items()},
+    }
+
+
+def _from_json(kept: Mapping[str, Any]) -> SourceTables:
+    arrays = {name: np.array(values, dtype=float).reshape(shape) for name, (shape, values) in kept["arrays"].items()}
+    to_earth = np.empty(arrays["real"].shape, dtype=np.complex128)
+    to_earth.real, to_earth.imag = arrays["real"], arrays["imag"]
+    labels = {int(number): str(label) for number, label in kept["labels"]}
+    return SourceTables(
+        kept["name"], kept["base_mva"], arrays["bus"], arrays["branch"], arrays["gen"], to_earth, labels,
+        kept["frequency"],
+    )  # fmt: skip
