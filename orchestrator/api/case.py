@@ -20,6 +20,7 @@ from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
+from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 
 
@@ -302,7 +303,7 @@ def _folder(given: str | Path) -> Path:
     """The folder that keeps a sweep's points, made where missing."""
     place = path_of(given, "folder", "folder")
     try:
-        (place / "points").mkdir(parents=True, exist_ok=True)
+        (place / POINTS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(
             f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"

@@ -27,7 +27,7 @@ from orchestrator.cases.case import Case as CaseFile
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport
-from orchestrator.points.store import PointStore
+from orchestrator.points.store import POINTS, PointStore
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.sweep.axes import Vary, parse_vary
@@ -226,7 +226,7 @@ def compute(
         Called with the number of points done and their total.
     """
     with TemporaryDirectory() as passing, closing(executor):
-        return ParameterSweep(run_sweep(planned, executor, PointStore(Path(folder or passing) / "points"), report))
+        return ParameterSweep(run_sweep(planned, executor, PointStore(Path(folder or passing) / POINTS), report))
 
 
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:

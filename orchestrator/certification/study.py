@@ -22,7 +22,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import PointStore
+from orchestrator.points.store import POINTS, PointStore
 
 
 @dataclass
@@ -163,7 +163,7 @@ def certify(
     tasks = tasks_of(prepared, request, controllers)
     points: dict[tuple[str, float], PointResult] = {}
     stored = 0
-    store = PointStore(folder / "points")
+    store = PointStore(folder / POINTS)
     for index, point, was_stored in kept_or_computed(PointResult, compute_point, tasks, executor, store, report):
         points[tasks[index].scenario, tasks[index].X_L] = point
         stored += was_stored

@@ -9,6 +9,7 @@ from io import TextIOWrapper
 from typing import Any
 
 from fmus.toolchain.extras import SetupError
+from orchestrator.cli.interrupted import ending
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
 
@@ -84,7 +85,7 @@ def _run(words: Sequence[str]) -> int:
         if not _interrupted(error):
             raise
         calls.over = True
-        print(calls.how, file=sys.stderr)
+        print(ending(error), file=sys.stderr)
         exec("")  # clears CPython's note of an interrupt inside exec(), as of dataclasses; it would end us by SIGINT
         code = INTERRUPTED
     return code

@@ -16,7 +16,8 @@ from orchestrator.certification.study import Certification, certify
 from orchestrator.certification.verdict import exit_code
 from orchestrator.cli.arguments import reactances, setting
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.points import compute_points
+from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import made_folder, make_console
 from orchestrator.errors import INTERRUPTED, InputError
 from orchestrator.report.tables import PlainTable
@@ -88,8 +89,9 @@ def run(options: argparse.Namespace) -> int:
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
-    with held(folder):
-        return _certified(request, details, acceptance, folder, options)
+    progress = Progressing(folder)
+    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
+        return _certified(request, details, acceptance, folder, progress, options)
 
 
 def _certified(
@@ -97,6 +99,7 @@ def _certified(
     details: Details,
     acceptance: Acceptance | None,
     folder: Path,
+    progress: Progressing,
     options: argparse.Namespace,
 ) -> int:
     """See `run`.
@@ -111,14 +114,14 @@ def _certified(
         Acceptance tests of the FMU, where they are there already.
     folder
         For the results, which no other command works in.
+    progress
+        How far the points are.
     options
         Of the command.
     """
     console = make_console(stderr=options.json)
     executor = choose_executor(options, ["orchestrator.certification.point"])
-    result = compute_points(lambda report: certify(request, executor, folder, report), executor, folder, console)
-    if result is None:
-        return INTERRUPTED
+    result = progress.compute(lambda report: certify(request, executor, folder, report), executor, console)
     if acceptance is not None:
         acceptance.keep(folder)
     elif not options.no_check:

@@ -4,6 +4,7 @@ import argparse
 import json
 import math
 import shlex
+from contextlib import suppress
 from pathlib import Path
 from shutil import rmtree
 
@@ -13,13 +14,14 @@ from orchestrator.api.design import Wanted, design_controller, parameter_file_pa
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import percent, positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
-from orchestrator.cli.terminal import make_console, make_errors, print_questions, warn
+from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.terminal import make_console, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
-from orchestrator.errors import INTERRUPTED, CosimError, InputError
+from orchestrator.errors import CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import sheet
 from orchestrator.pod_design.target import CONTROLLERS
-from orchestrator.points.store import PointStore
+from orchestrator.points.store import PointStore, any_kept
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -93,32 +95,28 @@ def run(options: argparse.Namespace) -> int:
     )
     scenario = next(iter(options.scenario), None)
     folder = path.with_suffix(".points")
-    try:
-        with console.status("starting") as status:
-            controller = design_controller(
-                case,
-                options.controller,
-                scenario,
-                values_set(options),
-                options.step,
-                files,
-                _wanted(options),
-                report=status.update,
-                store=PointStore(folder),
-            )
-    except KeyboardInterrupt:
-        make_errors().print(
-            f"interrupted: what was computed is in {escape(str(folder))}; the same command continues from there"
-        )
-        return INTERRUPTED
-    except CosimError:
-        rmtree(folder, ignore_errors=True)  # the same would come out again
-        raise
-    rmtree(folder, ignore_errors=True)
-    design = controller.result
-    print_questions([design.prepared])
-    warn(design.prepared.name, design.warnings)
-    controller.save(path, _command_line(options))
+    with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
+        try:
+            with console.status("starting") as status:
+                controller = design_controller(
+                    case,
+                    options.controller,
+                    scenario,
+                    values_set(options),
+                    options.step,
+                    files,
+                    _wanted(options),
+                    report=status.update,
+                    store=PointStore(folder),
+                )
+        except CosimError:
+            rmtree(folder, ignore_errors=True)  # the same would come out again
+            raise
+        design = controller.result
+        print_questions([design.prepared])
+        warn(design.prepared.name, design.warnings)
+        controller.save(path, _command_line(options))
+        rmtree(folder, ignore_errors=True)
     if options.json:
         print(json.dumps(controller.as_json(path), indent=1, ensure_ascii=False))
         return exit_code(options, [design.stability])
@@ -131,6 +129,15 @@ def run(options: argparse.Namespace) -> int:
     console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}"), soft_wrap=True, highlight=False)  # fmt: skip
     return exit_code(options, [design.stability])
+
+
+def _how_it_goes_on(folder: Path) -> str:
+    """What an interrupt leaves; "" where that is nothing, and no empty folder either."""
+    if any_kept(folder):
+        return f"what was computed is in {folder}; the same command continues from there"
+    with suppress(OSError):
+        folder.rmdir()
+    return ""
 
 
 def _wanted(options: argparse.Namespace) -> Wanted:

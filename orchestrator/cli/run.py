@@ -12,9 +12,10 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
-from orchestrator.cli import checkpoints, federates, like
+from orchestrator.cli import checkpoints, federates, like, run_request
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.terminal import (
     made_folder,
     make_console,
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     add_verdict_argument(parser)
-    checkpoints.add_arguments(parser)
+    run_request.add_arguments(parser)
     like.add_arguments(parser)
     federates.add_arguments(parser)
 
@@ -60,14 +61,16 @@ def run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:
         if options.resume is not None and options.resume.is_dir():
             stack.enter_context(held(options.resume))  # before the request in it is read
-        options = checkpoints.with_request(options)
+        options = run_request.with_request(options)
+        stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
         rules = like.rules_of(options)
         scenarios = chosen(options)
         print_recording_questions([scenario.prepared for scenario in scenarios])
         engine = federates.choice(options, len(scenarios))
-        options.checkpoint = checkpoints.interval(options)
+        options.checkpoint = run_request.interval(options)
         name = scenarios[0].prepared.case.name
-        folder = made_folder(options.out or Path("results") / (f"{name}_like_{rules.name}" if rules else name))
+        options.out = options.out or Path("results") / (f"{name}_like_{rules.name}" if rules else name)
+        folder = made_folder(options.out)
         if options.resume is None:
             stack.enter_context(held(folder))
         if rules is not None:
@@ -116,7 +119,8 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
             except (CosimError, KeyboardInterrupt) as error:
                 place.discard()
                 if not results:
-                    kept.end(whole=False)
+                    if isinstance(error, CosimError):
+                        kept.end(whole=False)
                     raise
                 stopped = (scenario.name, error)
                 break
@@ -138,7 +142,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         console.print(escape(words), soft_wrap=True)
     if stopped:
         code = _end(*stopped, folder)
-        kept.end(whole=False)
+        kept.end(whole=False, interrupted=code == INTERRUPTED)
         return code
     calls.over = True
     kept.end(whole=True)

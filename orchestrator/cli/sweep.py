@@ -9,14 +9,15 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
-from orchestrator.cases.case import load_case
+from orchestrator.cases.case import Case, load_case
 from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.points import compute_points
+from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
-from orchestrator.errors import INTERRUPTED
+from orchestrator.points.executor import Executor
 from orchestrator.results.lock import held
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
@@ -52,6 +53,28 @@ def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if no point has modes."""
     executor = choose_executor(options, WORKERS_IMPORT)
     case = load_case(options.case, trust_fmus=options.trust_fmus)
+    folder = options.out or Path("results") / f"{case.name}_sweep"
+    progress = Progressing(folder)
+    with saying_how_it_goes_on(progress.how_it_goes_on):
+        return _sweep(case, folder, progress, executor, options)
+
+
+def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, options: argparse.Namespace) -> int:
+    """See `run`.
+
+    Parameters
+    ----------
+    case
+        The case.
+    folder
+        For the results; it need not be there yet.
+    progress
+        How far the points are.
+    executor
+        Where they are computed.
+    options
+        Of the command.
+    """
     planned = plan(
         case,
         options.vary,
@@ -62,12 +85,10 @@ def run(options: argparse.Namespace) -> int:
         frequencies=options.range,
     )
     print_questions(planned.scenarios)
-    folder = made_folder(options.out or Path("results") / f"{case.name}_sweep")
+    made_folder(folder)
     console = make_console(stderr=options.json)
     with held(folder):
-        sweep = compute_points(lambda report: compute(planned, executor, folder, report), executor, folder, console)
-        if sweep is None:
-            return INTERRUPTED
+        sweep = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
         failed = _present(sweep, folder, console, as_json=options.json)
     return failed or int(options.fail_unstable and not all(s.stable for s in sweep.result.scenarios))
 

@@ -16,6 +16,11 @@ from orchestrator.safe_files import flush
 
 Arrays = dict[str, NDArray[Any]]
 
+POINTS = "points"
+"""Folder of the points in that of a study's results."""
+
+_KEPT = ".npz"
+
 
 class PointStore:
     """A folder with one small file for each point. An incomplete file counts as missing."""
@@ -56,4 +61,9 @@ class PointStore:
             ) from error
 
     def _path(self, key: str) -> Path:
-        return self.folder / f"{key}.npz"
+        return self.folder / f"{key}{_KEPT}"
+
+
+def any_kept(folder: Path) -> bool:
+    """Whether a `PointStore` kept a point in a folder."""
+    return any(folder.glob(f"*{_KEPT}"))

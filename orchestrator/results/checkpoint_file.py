@@ -20,6 +20,9 @@ Arrays = Mapping[str, NDArray[Any]]
 CHECKPOINTS = ".checkpoints"
 """Folder for them among the results of a run."""
 
+CHECKPOINT, PREVIOUS = ".checkpoint", ".previous"
+"""Ends of their names: of the newest one, and of the one before it."""
+
 _MARK = b"gfor-cosim checkpoint 1\n"
 _DIGEST = hashlib.sha256().digest_size
 _HEADER = "header"
@@ -60,7 +63,7 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays) -> N
 
 def previous(path: Path) -> Path:
     """Where the checkpoint before the newest lies."""
-    return path.with_suffix(".previous")
+    return path.with_suffix(PREVIOUS)
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:

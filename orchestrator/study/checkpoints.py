@@ -11,6 +11,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.run_state import RunState, why_not_kept
 from orchestrator.errors import ComponentError, InputError, ResultsError
 from orchestrator.results.checkpoint_file import (
+    CHECKPOINT,
     DamagedCheckpointError,
     previous,
     read_checkpoint,
@@ -73,7 +74,7 @@ class Checkpoints:
     ) -> None:
         self._name, self._say, self._every = prepared.name, say, every
         self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
-        self._path = folder / f"{quote(prepared.name, safe='')}.checkpoint"
+        self._path = folder / f"{quote(prepared.name, safe='')}{CHECKPOINT}"
         self._case, self._text = folder / CASE, prepared.case.text
         self._written = False
         self._kept: RunState | None = None

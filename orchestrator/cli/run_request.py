@@ -1,0 +1,145 @@
+"""What a run was asked for, kept beside its checkpoints: ``gfor run --resume`` asks it again."""
+
+import argparse
+import json
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.case import built_in_cases
+from orchestrator.cli.arguments import seconds_or_none
+from orchestrator.errors import InputError
+from orchestrator.results.checkpoint_file import CHECKPOINT, CHECKPOINTS
+from orchestrator.results.staging import new_run_id
+from orchestrator.safe_files import write_text
+from orchestrator.study.checkpoints import EVERY
+
+_REQUEST = "request.json"
+_OF_THE_RUN: Mapping[str, Any] = {
+    "case": None, "scenario": [], "set": [], "parameters": [], "step": None, "stop": None, "linear": False, "csv": True,
+    "require_checkpoint": False, "checkpoint": None,
+}  # fmt: skip
+"""Options as they are where nothing is said; a resumed run keeps those that it had."""
+
+_GIVEN_ANEW = "checkpoint"
+"""The one of them that may go with ``--resume``: no value depends on it."""
+
+_NOT_WITH_RESUME: Mapping[str, Any] = {
+    **{name: unsaid for name, unsaid in _OF_THE_RUN.items() if name != _GIVEN_ANEW},
+    "out": None, "like": None, "order": None,
+}  # fmt: skip
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Both options, and what goes with them."""
+    parser.add_argument(
+        "--checkpoint",
+        type=seconds_or_none,
+        metavar="SECONDS",
+        help=f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes none",
+    )
+    parser.add_argument(
+        "--require-checkpoint",
+        action="store_true",
+        help="refuse a run that could not be resumed, because an FMU cannot serialise its state",
+    )
+    parser.add_argument(
+        "--resume",
+        type=Path,
+        metavar="DIR",
+        help="go on with the interrupted run whose results are in DIR; case and options are those that it had",
+    )
+
+
+def with_request(options: argparse.Namespace) -> argparse.Namespace:
+    """The options of a new run, or those of the run that is to be resumed, and its id as ``run``.
+
+    Raises
+    ------
+    InputError
+        If there is no case, nothing to resume, or something is asked of a resumed run that it did not have.
+    """
+    if options.resume is None:
+        if options.case is None:
+            raise InputError("the case is missing: gfor run CASE, such as gfor run two_area")
+        return argparse.Namespace(**{**vars(options), "run": new_run_id()})
+    _refuse_other_options(options)
+    file = options.resume / CHECKPOINTS / _REQUEST
+    try:
+        asked = json.loads(file.read_text(encoding="utf-8"))
+        kept = {name: asked[name] for name in (*_OF_THE_RUN, "run")}
+    except FileNotFoundError as error:
+        raise InputError(
+            f"--resume {options.resume}: there is no interrupted run in it; one that came to its end, or was started "
+            "with --checkpoint 0, leaves nothing to resume"
+        ) from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"--resume {options.resume}: {file} cannot be read ({error}); start the run anew, without --resume"
+        ) from error
+    if given_anew := options.checkpoint is not None:
+        kept[_GIVEN_ANEW] = options.checkpoint
+    kept["set"] = [(name, value) for name, value in kept["set"]]
+    kept["parameters"] = [Path(path) for path in kept["parameters"]]
+    return argparse.Namespace(**{**vars(options), **kept, "out": options.resume, "given_anew": given_anew})
+
+
+def interval(options: argparse.Namespace) -> float:
+    """Wall-clock time between two checkpoints [s]; 0 where none are written, as in a run with federates."""
+    if options.engine != "local":
+        return 0.0  # the state of a federate stays with it
+    return EVERY if options.checkpoint is None else float(options.checkpoint)
+
+
+def _refuse_other_options(options: argparse.Namespace) -> None:
+    asked = [name for name, unsaid in _NOT_WITH_RESUME.items() if getattr(options, name) != unsaid]
+    asked += ["checkpoint 0"] if options.checkpoint == 0 else []
+    if asked:
+        special = {"case": "CASE", "csv": "--no-csv"}
+        words = ", ".join(special.get(name, f"--{name.replace('_', '-')}") for name in asked)
+        raise InputError(
+            f"--resume {options.resume} goes on with the run as it was asked for, so {words} cannot go with it; leave "
+            "that away, or start a run anew, without --resume"
+        )
+
+
+def how_it_goes_on(options: argparse.Namespace) -> str:
+    """The command that resumes a run that was ended; "" where it would be refused.
+
+    Parameters
+    ----------
+    options
+        As `with_request` gave them; ``out`` is None until the folder of the results is known.
+    """
+    folder = options.out
+    if folder is None or asked_by(folder) != options.run:  # another run's request is not this one's
+        return ""
+    command = f"gfor run --resume {shlex.quote(str(folder))}{' --trust-fmus' if options.trust_fmus else ''}"
+    if any((folder / CHECKPOINTS).glob(f"*{CHECKPOINT}")):
+        return f"{command} goes on from there"
+    return f"{command} begins it again; there was no checkpoint yet"
+
+
+def asked_by(folder: Path) -> str | None:
+    """Id of the run whose request is kept in a folder; None where none is, or it cannot be read."""
+    try:
+        return str(json.loads((folder / CHECKPOINTS / _REQUEST).read_text(encoding="utf-8"))["run"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def keep_request(folder: Path, options: argparse.Namespace) -> None:
+    """Keep what a run was asked for beside its checkpoints.
+
+    Parameters
+    ----------
+    folder
+        Of the results.
+    options
+        As `with_request` gave them.
+    """
+    content = {name: getattr(options, name) for name in _OF_THE_RUN} | {"run": options.run}
+    content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
+    content["parameters"] = [str(path.resolve()) for path in options.parameters]
+    write_text(folder / CHECKPOINTS / _REQUEST, json.dumps(content, indent=1))
