@@ -67,7 +67,8 @@ def identify_modes(
     AnalysisError
         If the signal is shorter than 20 samples or constant.
     """
-    thin, interval = _thinned(times, highest_hz)
+    used = sampling(times, highest_hz)
+    thin, interval = used.thin, used.interval
     y = signal[::thin]
     if len(y) < _MIN_SAMPLES or np.ptp(y) == 0:
         what = "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
@@ -90,18 +91,64 @@ def identify_modes(
     return sorted(modes, key=lambda m: -m.amplitude)
 
 
-def _thinned(times: NDArray[np.float64], highest_hz: float) -> tuple[int, float]:
-    """The number of samples from one used sample to the next, and the time between these two [s]."""
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """The samples that `identify_modes` uses of a record.
+
+    Attributes
+    ----------
+    recorded
+        Time between two samples of the record [s].
+    thin
+        Every so many of them are used.
+    number
+        Samples of the record.
+    finest
+        Time between two samples from which on they are thinned, however short the record [s].
+    """
+
+    recorded: float
+    thin: int
+    number: int
+    finest: float
+
+    @property
+    def interval(self) -> float:
+        """Time between the samples used [s]; oscillations faster than half of its inverse are aliased."""
+        return self.recorded * self.thin
+
+    @property
+    def remedy(self) -> str:
+        """What shows faster oscillations."""
+        shorter = f"identify a shorter part of the record (start, stop), as at most {_MAX_SAMPLES} samples are used"
+        if self.thin == 1 and self.recorded > 1.5 * self.finest:
+            more = "record more often (solver.record_interval)"
+            return f"{more}, and {shorter}" if 2 * self.number > _MAX_SAMPLES else more
+        if self.thin > round(self.finest / self.recorded):
+            return f"{shorter}, and the record has one every {self.recorded:g} s"
+        return (
+            f"look at the record itself, which has a sample every {self.recorded:g} s: its modes are looked for in "
+            f"samples every {self.finest:g} s, or longer ones, however often it is recorded"
+        )
+
+
+def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
+    """Which samples `identify_modes` uses.
+
+    Parameters
+    ----------
+    times, highest_hz
+        As there.
+    """
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    finest = 1 / (10 * highest_hz)
     thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
-    return thin, step * thin
+    return Sampling(step, thin, len(times), finest)
 
 
 def interval_used(times: NDArray[np.float64], highest_hz: float = 10.0) -> float:
-    """Time between the samples that `identify_modes` uses [s]; oscillations faster than half of its inverse are
-    aliased.
-    """
-    return _thinned(times, highest_hz)[1]
+    """Time between the samples that `identify_modes` uses [s], as `Sampling.interval`."""
+    return sampling(times, highest_hz).interval
 
 
 def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from orchestrator.analysis.identification import IdentifiedMode, interval_used
+from orchestrator.analysis.identification import IdentifiedMode, Sampling, sampling
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment, text_or_none
@@ -34,9 +34,7 @@ class SignalModes:
         Time between the samples used [s].
     """
 
-    def __init__(
-        self, signal: str, start: float, stop: float, modes: Sequence[IdentifiedMode], interval: float
-    ) -> None:
+    def __init__(self, signal: str, start: float, stop: float, modes: Sequence[IdentifiedMode], used: Sampling) -> None:
         """Keep the result of an identification.
 
         Parameters
@@ -47,16 +45,21 @@ class SignalModes:
             Beginning and end of the part of the record that was used [s].
         modes
             The modes, the strongest first.
-        interval
-            Time between the samples used [s].
+        used
+            Which samples of the record were used.
         """
-        self.signal, self.start, self.stop, self.modes, self.interval = signal, start, stop, list(modes), interval
+        self.signal, self.start, self.stop, self.modes, self._used = signal, start, stop, list(modes), used
 
     def __iter__(self) -> Iterator[IdentifiedMode]:
         return iter(self.modes)
 
     def __len__(self) -> int:
         return len(self.modes)
+
+    @property
+    def interval(self) -> float:
+        """Time between the samples used [s]."""
+        return self._used.interval
 
     @property
     def remarks(self) -> list[str]:
@@ -70,7 +73,7 @@ class SignalModes:
         if near:
             texts.append(
                 f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
-                f"of the system: {', '.join(near)}. Record more often (solver.record_interval) to be sure."
+                f"of the system: {', '.join(near)}. To be sure, {self._used.remedy}."
             )
         return texts
 
@@ -139,7 +142,7 @@ def identify(
     require_numbers(curve.sel(time=slice(begin, end)), signal, label)
     modes = strongest_modes(curve, begin, end)
     times = curve["time"].sel(time=slice(begin, end)).values
-    return SignalModes(signal, float(times[0]), float(times[-1]), modes, interval_used(times))
+    return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times))
 
 
 def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Dataset, str]:

@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
@@ -16,17 +15,16 @@ from orchestrator.cli import checkpoints, federates, like, run_request
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.terminal import (
     made_folder,
     make_console,
     make_errors,
     print_findings,
-    print_named_modes,
     print_recording_questions,
-    print_sources,
     print_warnings,
 )
-from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
+from orchestrator.cli.verdict import add_verdict_argument, exit_code
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
@@ -37,7 +35,7 @@ from orchestrator.results.recording import FOLDER, RecordingFolder
 from orchestrator.results.room import require_room
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
 from orchestrator.safe_files import PARTIAL
-from orchestrator.study import tables
+from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult
 
@@ -129,11 +127,12 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
             if result.failure:
                 stopped = (scenario.name, result.failure)
                 break
-    plots = _save_together(results, folder, run_id, stopped)
+    early_end = None if stopped is None else _early_end(*stopped, scenarios, results)
+    plots = _save_together(results, folder, run_id, stopped, early_end)
     if options.json:
         print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
     else:
-        _print(console, results)
+        print_run(console, results, early_end)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
         words = (
             f"Results in {folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "
@@ -197,8 +196,39 @@ def _run_into(
         ).result
 
 
+def _early_end(
+    name: str, error: BaseException, scenarios: Sequence[Scenario], results: Sequence[RunResult]
+) -> EarlyEnd:
+    """Where a study ended, and what never began.
+
+    Parameters
+    ----------
+    name
+        Of the scenario in which it ended.
+    error
+        That ended it.
+    scenarios
+        All of them.
+    results
+        Of those that ran.
+    """
+    titles = {scenario.name: scenario.title for scenario in scenarios}
+    names = list(titles)
+    never = {later: titles[later] for later in names[names.index(name) + 1 :]}
+    kept = any(r.modes.prepared.name == name and not isinstance(r.failure, ResultsError) for r in results)
+    return EarlyEnd(titles[name], _is_interrupt(error), kept, never)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    return isinstance(error, KeyboardInterrupt | RunInterruptedError)
+
+
 def _save_together(
-    results: Sequence[RunResult], folder: Path, run_id: str, stopped: tuple[str, BaseException] | None
+    results: Sequence[RunResult],
+    folder: Path,
+    run_id: str,
+    stopped: tuple[str, BaseException] | None,
+    early_end: EarlyEnd | None,
 ) -> list[Path]:
     """Write what concerns all scenarios; return the plots.
 
@@ -213,12 +243,14 @@ def _save_together(
     stopped
         The scenario and the error that ended the run before its time; if nothing could be written any more, nobody
         needs to be told a second time.
+    early_end
+        The same for the summary.
     """
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]
     try:
         with staged(folder, run_id, [name for name in names if (folder / name).is_dir()]) as staging:
-            return save_study(results, staging)
+            return save_study(results, staging, early_end)
     except ResultsError:
         if stopped is None or not isinstance(stopped[1], ResultsError):
             raise
@@ -227,34 +259,10 @@ def _save_together(
 
 def _end(scenario: str, error: BaseException, folder: Path) -> int:
     """Say where a study ended before its time, and what is left of it."""
-    interrupted = isinstance(error, KeyboardInterrupt | RunInterruptedError)
+    interrupted = _is_interrupt(error)
     head = "" if interrupted else "[bold red]error:[/bold red] "
     begun = [path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)]
     where = f" ({', '.join(begun)})" if begun and isinstance(error, ResultsError) else ""
     text = f"scenario {scenario!r}: {str(error) or calls.how}\nWhat was computed until then is in {folder}{where}"
     make_errors().print(f"{head}{escape(text)}")
     return INTERRUPTED if interrupted else 1
-
-
-def _print(console: Console, results: Sequence[RunResult]) -> None:
-    modes = [r.modes for r in results]
-    for r in results:
-        for finding in r.went_unstable:
-            words = escape(f"{r.modes.prepared.title}: {finding.message}")
-            console.print(f"[bold red]UNSTABLE in the simulation[/]: {words}", soft_wrap=True, highlight=False)
-        if r.stable_in_simulation is None:
-            words = f"{escape(r.modes.prepared.title)}: not judged throughout; the warnings above say where and why"
-            console.print(f"[bold yellow]stability in the simulation[/]: {words}", soft_wrap=True, highlight=False)
-    if not all(r.stable_in_simulation for r in results):
-        console.print("[bold]By the modes at the operating point:[/]")
-    print_verdicts(console, modes)
-    console.print(tables.steady_states(modes), "")
-    print_named_modes(console, modes)
-    print_sources(console, modes)
-    if any(r.ring_down for r in results):
-        console.print("", tables.ring_downs(results))
-    if any(r.shifts for r in results):
-        console.print("", tables.mode_shifts(results))
-    if any(r.linear is not None for r in results):
-        console.print("", tables.linear_differences(results))
-    console.print("", tables.run_statistics(results), "")

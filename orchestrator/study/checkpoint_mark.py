@@ -12,10 +12,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.locate import place_in
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.points.key import code_hash, component_content, library_versions
 
-_CASE = "the case"
+Keys = tuple[str, ...]
+
+_CASE, _EVENTS = "the case", "the events"
 _KERNEL = "GFOR_COSIM_KERNEL"
 _SHOWN = 4
 """So many differences are named."""
@@ -34,7 +37,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         "the communication step": f"{prepared.step_size!r} s",
         "the stop time": f"{prepared.stop_time!r} s",
         "the schedule": f"{prepared.schedule.name}: {groups}",
-        "the events": "; ".join(map(str, prepared.events)),
+        _EVENTS: "; ".join(map(str, prepared.events)),
         "what is recorded": f"every {prepared.record_every} steps, "
         f"{'filtered' if prepared.record_filtered else 'as it is'}: {', '.join(prepared.record)}",
     }
@@ -67,19 +70,21 @@ def _read(text: str) -> Any:
         return text
 
 
-def _entries(content: Any, name: str) -> Iterator[tuple[str, str]]:
-    """Every value of a case by its keys, such as ``events.0.time``."""
+def _entries(content: Any, keys: Keys = ()) -> Iterator[tuple[Keys, str]]:
+    """Every value of a case by its keys, such as events, 0, time."""
     if isinstance(content, dict):
         for key, inner in content.items():
-            yield from _entries(inner, f"{name}.{key}")
+            yield from _entries(inner, (*keys, key))
     elif isinstance(content, list) and any(isinstance(inner, dict | list) for inner in content):
         for index, inner in enumerate(content):
-            yield from _entries(inner, f"{name}.{index}")
+            yield from _entries(inner, (*keys, str(index)))
     else:
-        yield name.removeprefix("."), json.dumps(content, default=str, ensure_ascii=False)
+        yield keys, json.dumps(content, default=str, ensure_ascii=False)
 
 
-def differences(then: Mapping[str, str], now: Mapping[str, str], texts: tuple[str, str] | None = None) -> str:
+def differences(
+    then: Mapping[str, str], now: Mapping[str, str], texts: tuple[str, str] | None = None, file: Path | None = None
+) -> str:
     """What is not as it was, in words; empty where all is.
 
     Parameters
@@ -89,13 +94,22 @@ def differences(then: Mapping[str, str], now: Mapping[str, str], texts: tuple[st
     texts
         Of the case, then and now; what differs there is named first, as the rest may come of it. A text that is not
         the mark's is left out.
+    file
+        Of the case, as it is now.
     """
     found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
     if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
-        was, is_now = (dict(_entries(_read(text), "")) for text in texts)
-        said = [f"in the case, {words}" for words in _differences(was, is_now)]
-        found = [*(said or [f"{_CASE} has its tables in another order"]), *found[1:]]
+        found = [*(_in_the_case(*texts, file) or [f"{_CASE} has its tables in another order"]), *found[1:]]
     return "; ".join(found[:_SHOWN]) + (f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else "")
+
+
+def _in_the_case(was: str, is_now: str, file: Path | None) -> list[str]:
+    """What differs between two texts of a case; a key that is there now with its line."""
+    then, now = (dict(_entries(_read(text))) for text in (was, is_now))
+    places = {keys: place_in(is_now if keys in now else "", keys) or "its text" for keys in (*then, *now)}
+    name = _CASE if file is None else f"{_CASE} {file}"
+    by_place = ({places[keys]: value for keys, value in entries.items()} for entries in (then, now))
+    return [f"in {name}, {words}" for words in _differences(*by_place)]
 
 
 def _differences(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
@@ -106,6 +120,7 @@ def _differences(then: Mapping[str, str], now: Mapping[str, str]) -> Iterator[st
         if was is None or is_now is None:
             yield f"{name} {'is new' if was is None else 'is gone'}"
         elif max(len(was), len(is_now)) > 60:
-            yield f"{name} has changed"
+            yield f"{name} {'have' if name == _EVENTS else 'has'} changed"
         else:
-            yield f"{name} was {was or 'not there'} and is {is_now or 'not there'}"
+            then_verb, now_verb = ("were", "are") if name == _EVENTS else ("was", "is")
+            yield f"{name} {then_verb} {was or 'not there'} and {now_verb} {is_now or 'not there'}"

@@ -75,7 +75,7 @@ class Checkpoints:
         self._name, self._say, self._every = prepared.name, say, every
         self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
         self._path = folder / f"{quote(prepared.name, safe='')}{CHECKPOINT}"
-        self._case, self._text = folder / CASE, prepared.case.text
+        self._case, self._text, self._file = folder / CASE, prepared.case.text, prepared.case.path
         self._written = False
         self._kept: RunState | None = None
         self._unable = bool(not_kept(prepared))
@@ -220,7 +220,7 @@ class Checkpoints:
             was: str | None = self._case.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
             was = None
-        said = differences(then, self._mark, None if was is None else (was, self._text))
+        said = differences(then, self._mark, None if was is None else (was, self._text), self._file)
         if said:
             raise InputError(
                 f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "

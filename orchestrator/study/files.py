@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import RunInterruptedError
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import in_memory, open_whole
 from orchestrator.results.recording import TRAJECTORY
@@ -15,6 +16,7 @@ from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
+from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -59,12 +61,24 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     return plots
 
 
-def save_study(results: Sequence[RunResult], folder: Path) -> list[Path]:
-    """Write what concerns all scenarios together; return the plots."""
+def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd | None = None) -> list[Path]:
+    """Write what concerns all scenarios together; return the plots.
+
+    Parameters
+    ----------
+    results
+        Of the scenarios that ran.
+    folder
+        For the files.
+    early_end
+        Where the study ended before its last scenario.
+    """
     case = results[0].modes.prepared.case
     write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")
-    save_json({"case": case.name, "scenarios": [summary_of(r) for r in results]}, folder / "summary.json")
+    ended = None if early_end is None else early_end.as_json()
+    summary = {"case": case.name, "ended_early": ended, "scenarios": [summary_of(r) for r in results]}
+    save_json(summary, folder / "summary.json")
     plots = []
     for table in case.table.plots:
         path = folder / f"{table.name}.png"
@@ -179,6 +193,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "stable_in_simulation": result.stable_in_simulation,
         "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
+        "interrupted": isinstance(result.failure, RunInterruptedError),
         "isolated": {name: [asdict(p) for p in found] for name, found in result.protections.items()},
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used, nearest
+from orchestrator.analysis.identification import IdentifiedMode, identify_modes, nearest, sampling
 from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 from orchestrator.results.signals import signal
@@ -37,14 +37,14 @@ def ring_down_of(
     if table is None or mode is None or recorded is None:
         return None, ""
     window = recorded.sel(time=slice(table.start, None))
-    interval, times = 0.0, window["time"].values
-    if len(times) > 1:
-        interval = interval_used(times)
+    times = window["time"].values
+    used = sampling(times)
+    interval = used.interval
     if interval * mode.frequency_hz > _COARSEST:
         return None, (
             f"no ring-down is shown: {table.signal} is known every {interval:g} s, more than a quarter of the period "
             f"of {1 / mode.frequency_hz:.3g} s of the mode at {mode.frequency_hz:.4g} Hz, which it would show at "
-            "another frequency; make solver.record_interval shorter"
+            f"another frequency; {used.remedy}"
         )
     if why := _obstacle(modes, times, findings):
         return None, f"no ring-down of {table.signal} is shown: {why}"

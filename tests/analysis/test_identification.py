@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.analysis.identification import identify_modes, nearest
+from orchestrator.analysis.identification import identify_modes, nearest, sampling
 from orchestrator.errors import AnalysisError
 
 TIMES = np.arange(0, 18, 0.005)
@@ -57,3 +57,35 @@ def test_noise_is_not_a_mode():
 def test_what_holds_no_mode_is_said(times, signal, word):
     with pytest.raises(AnalysisError, match=word):
         identify_modes(times, signal)
+
+
+@pytest.mark.parametrize(
+    ("step", "stop", "advised"),
+    [
+        (0.05, 20.0, "record more often"),
+        (0.05, 50.0, "record more often (solver.record_interval), and identify a shorter part"),
+        (0.002, 120.0, "identify a shorter part of the record (start, stop), as at most 1200 samples are used"),
+        (0.05, 120.0, "identify a shorter part"),
+        (0.001, 10.0, "look at the record itself, which has a sample every 0.001 s"),
+        (0.008, 8.0, "look at the record itself"),
+    ],
+)
+def test_the_advice_is_what_makes_the_samples_denser(step, stop, advised):
+    """What is advised is done, and so is what is not advised: only the first gives a shorter interval."""
+
+    def used(step, stop):
+        return sampling(np.arange(0, stop, step))
+
+    one = used(step, stop)
+    assert one.remedy.startswith(advised)
+    more = min(used(step / k, stop).interval for k in (2, 4, 10))
+    shorter = min(used(step, stop / k).interval for k in (2, 4, 10))
+    both = min(used(step / k, stop / k).interval for k in (2, 4, 10))
+    denser = {way for way, interval in (("more", more), ("shorter", shorter)) if interval < 0.9 * one.interval}
+    if "look at" in advised:
+        assert not denser
+        assert both >= 0.9 * one.interval
+    else:
+        assert both < 0.9 * one.interval
+        assert ("record more" in one.remedy) == ("more" in denser) or "and identify" in one.remedy
+        assert ("identify a shorter" in one.remedy) == ("shorter" in denser) or "and identify" in one.remedy

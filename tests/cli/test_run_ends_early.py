@@ -14,7 +14,8 @@ from orchestrator.errors import AnalysisError
 from orchestrator.study import run as study
 from orchestrator.study.run import run_scenario
 
-WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--stop", "2")
+WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--scenario", "pod_p", "--stop", "2")
+NEVER = "SG + GFOR; never begun: SG + GFOR POD-P"
 
 
 class Stops(Progress):
@@ -36,9 +37,17 @@ def test_in_the_middle_of_a_scenario(gfor, monkeypatch, tmp_path, output):
     whole, part = (xr.load_dataset(tmp_path / name / "trajectory.nc") for name in ("base", "gfor"))
     assert float(whole["time"].max()) == pytest.approx(2.0)
     assert float(part["time"].max()) == pytest.approx(1.6)
-    base, other = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]
-    assert base["failure"] is None
-    assert "interrupted at t = 1.6 s" in other["failure"]
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["ended_early"] == {"word": "interrupted", "place": f"in {NEVER}", "not_begun": ["pod_p"]}
+    base, other = summary["scenarios"]
+    assert (base["failure"], base["interrupted"]) == (None, False)
+    assert (other["failure"], other["interrupted"]) == ("interrupted at t = 1.6 s", True)
+    assert output or text.startswith(f"interrupted in {NEVER}\n")
+    assert gfor("report", tmp_path)[0] == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f'<b class="soft">interrupted</b> in {NEVER}<' in page
+    assert "the run was interrupted at t = 1.6 s" in page
+    assert "the run failed" not in page
     assert not output or len(json.loads(text)) == 2
 
 
@@ -56,8 +65,10 @@ def test_between_two_scenarios(gfor, monkeypatch, tmp_path, error, code, said):
         return run_scenario(prepared, **options)
 
     monkeypatch.setattr(study, "run_scenario", only_one)
-    ended, _, text = gfor(*WORDS, "--out", tmp_path)
+    ended, printed, text = gfor(*WORDS, "--out", tmp_path)
     assert ended == code
+    word = "interrupted" if code == 130 else "failed"
+    assert printed.startswith(f"{word} in {NEVER.replace(';', ', of which nothing is kept;')}\n")
     assert text.startswith(f"{said}\nWhat was computed until then is in ")
     assert len(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]) == 1
 

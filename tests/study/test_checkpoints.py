@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -231,12 +232,29 @@ def test_what_has_changed_in_the_case_is_named_with_both_values(tmp_path, said):
     other = with_text(prepared, "P_0 = 0.6", "P_0 = 0.7")
     with pytest.raises(InputError) as caught:
         resumed(other, tmp_path, said)
-    assert "'dip' cannot be resumed: in the case, components.gfor.parameters.P_0 was 0.6 and is 0.7" in str(
-        caught.value
-    )
+    line = 1 + other.case.text[: other.case.text.index("P_0 = 0.7")].count("\n")
+    said_of = f"in the case {other.case.path}, line {line}, components.gfor.parameters.P_0 was 0.6 and is 0.7"
+    assert f"'dip' cannot be resumed: {said_of}" in str(caught.value)
     (tmp_path / "case.toml").unlink()
     with pytest.raises(InputError, match="the case has changed; bring that back"):
         resumed(other, tmp_path, said)
+
+
+def test_events_that_have_changed_are_named_with_their_line():
+    now = '[[events]]\ntime = "1 s"\n\n[[events]]\n# a remark\ntime = "2 s"\nscale = 0.99\nnew = 1\n'
+    was = now.replace("0.99", "0.98").replace("new", "old")
+    marks = [
+        {"the case": checkpoint_mark._digest(text), "the events": f"t = {time} s: grid.load_2.scale = {scale}"}
+        for text, time, scale in ((was, 2, 0.98), (now, 2, 0.99))
+    ]
+    text = checkpoint_mark.differences(*marks, (was, now), Path("my.toml"))
+    assert text == (
+        "in the case my.toml, line 7, events.1.scale was 0.98 and is 0.99; in the case my.toml, events.1.old is gone; "
+        "in the case my.toml, line 8, events.1.new is new; "
+        "the events were t = 2 s: grid.load_2.scale = 0.98 and are t = 2 s: grid.load_2.scale = 0.99"
+    )
+    many = [{"the events": text * 3} for text in ("t = 1 s: grid.load_2.scale = 0.9; ", "t = 1 s: grid.load_2.scale; ")]
+    assert checkpoint_mark.differences(*many) == "the events have changed"
 
 
 # -- FMUs that cannot be kept --------------------------------------------------------------------------

@@ -32,6 +32,8 @@ class Results:
         By scenario.
     sweeps, designs
         Datasets and calculation sheets that were found beside the run.
+    ended_early
+        How and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end.
     """
 
     folder: Path
@@ -44,6 +46,7 @@ class Results:
     linear: dict[str, xr.Dataset]
     sweeps: list[xr.Dataset] = field(default_factory=list)
     designs: list[dict[str, Any]] = field(default_factory=list)
+    ended_early: dict[str, Any] | None = None
 
 
 def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
@@ -85,6 +88,7 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
             _rows(folder / "step_size.csv"),
             dict(_datasets(folder, names, "trajectory.nc")),
             dict(_datasets(folder, names, "linear.nc")),
+            ended_early=content.get("ended_early"),
         )
         for place in (folder, *others):
             results.sweeps += [_load(path) for path in _files(place, "sweep.nc")]

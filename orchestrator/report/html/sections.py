@@ -50,8 +50,13 @@ def scenario_legend(results: Results) -> str:
 def findings(results: Results) -> str:
     """What a reader in a hurry should take away, from the figures themselves."""
     items = []
+    if early := results.ended_early:
+        shade = "soft" if early["word"] == "interrupted" else "bad"
+        items.append(f'<b class="{shade}">{escape(early["word"])}</b> {escape(early["place"])}')
     for s in results.scenarios:
-        if s["failure"]:
+        if s.get("interrupted"):
+            items.append(f'{escape(s["title"])}: <span class="soft">the run was {escape(s["failure"])}</span>')
+        elif s["failure"]:
             items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
         if verdict := s.get("stability"):
             shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")

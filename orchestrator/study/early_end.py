@@ -1,0 +1,42 @@
+"""A study of several scenarios that ended before its last one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class EarlyEnd:
+    """Where a study ended before its time, and what is not there because of that.
+
+    Attributes
+    ----------
+    scenario
+        Title of the one in which it ended.
+    interrupted
+        Whether Ctrl-C or SIGTERM ended it; else something failed.
+    kept
+        Whether results of that scenario are there.
+    not_begun
+        Those that never began: titles by name.
+    """
+
+    scenario: str
+    interrupted: bool
+    kept: bool = True
+    not_begun: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def word(self) -> str:
+        """How it ended."""
+        return "interrupted" if self.interrupted else "failed"
+
+    @property
+    def place(self) -> str:
+        """Where it ended, and what never began."""
+        rest = f"; never begun: {', '.join(self.not_begun.values())}" if self.not_begun else ""
+        return f"in {self.scenario}{'' if self.kept else ', of which nothing is kept'}{rest}"
+
+    def as_json(self) -> dict[str, Any]:
+        """For a summary."""
+        return {"word": self.word, "place": self.place, "not_begun": list(self.not_begun)}
