@@ -112,10 +112,14 @@ def limit_signals(system: System) -> list[str]:
 
 
 def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
-    """Limits that act for longer than `LEAST_DURATION` in all, or still act at the end."""
+    """Limits that act for longer than `LEAST_DURATION` in all, or still act at the end, while their component is on the
+    grid: what a tripped one limits concerns nobody.
+    """
     for name, plan in system.components.items():
-        for limit in limits_of(plan):
-            acting = _acting(seen, name, limit, settings)
+        limits = list(limits_of(plan))
+        on = settings.connected(name) > 0 if limits else np.empty(0)
+        for limit in limits:
+            acting = _acting(seen, name, limit, settings) & on
             duration = float(acting[1:].sum()) * seen.interval
             if duration > LEAST_DURATION or (len(acting) > 1 and acting[-1]):
                 yield _finding(seen.times, name, limit, acting, duration)

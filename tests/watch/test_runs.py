@@ -178,6 +178,18 @@ def test_a_pod_at_its_limit_is_told_with_its_duration():
     assert limit.figures["duration_s"] > 0.1
 
 
+@pytest.mark.parametrize(("limit", "trip"), [(0.1, 1.0), (1e-4, 3.0)])
+def test_no_limit_of_a_tripped_converter_is_told(limit, trip):
+    """Its frequency goes its own way, so its POD is at its limit; what acted before the trip is told until then."""
+    (ready,) = load_case("two_area_rms").prepare(["pod_p"], {"gfor.pod_p.limit": limit}, stop_time=6.0)
+    result = run_scenario(replace(ready, events=[*ready.events, UnitSwitching(trip, "grid", "gfor", False)]))
+    last = np.abs(result.dataset["gfor.delta_p_pod"].sel(time=slice(5, None)).values)
+    assert last.min() > 0.999 * limit
+    found = [f for f in result.findings if f.kind == "active_limit"]
+    assert [f.component for f in found] == (["gfor"] if trip > 1 else [])
+    assert all(f.time < f.until <= trip for f in found)
+
+
 def test_watching_changes_no_number(tmp_path):
     """What is recorded with the watch is what a master gives that only records."""
     case = load_case("two_area_rms")
