@@ -6,10 +6,35 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from orchestrator.errors import ResultsError
+from orchestrator.errors import InputError, ResultsError
 
 PARTIAL = ".part-"
 """Begins the names of files that are not finished, and stands in those of folders that are not."""
+
+
+def made_folder(path: Path, label: str = "", what: str = "results cannot be written there") -> Path:
+    """A folder, made where it is missing, before anything is computed for it.
+
+    Parameters
+    ----------
+    path
+        Of the folder.
+    label
+        The option that names it.
+    what
+        Cannot be done without it.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        place = f"{label} {path}" if label else str(path)
+        raise InputError(f"{place}: {what}: {error.strerror}; choose another folder") from error
+    return path
 
 
 @contextmanager

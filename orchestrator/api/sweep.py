@@ -30,6 +30,7 @@ from orchestrator.points.points import CountReport
 from orchestrator.points.store import POINTS, PointStore
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
 from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
@@ -121,13 +122,7 @@ class ParameterSweep:
         """
         from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
 
-        place = Path(folder)
-        try:
-            place.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(
-                f"{place}: results cannot be written there: {error.strerror}; choose another folder"
-            ) from error
+        place = made_folder(Path(folder))
         with staged(place, new_run_id()) as staging:
             save_sweep(self.samples, staging)
             plots = save_sweep_plots(self.samples, staging)

@@ -22,11 +22,12 @@ from orchestrator.black_box.passivity import passivity
 from orchestrator.cases.values import check_system_base, convert
 from orchestrator.cli.arguments import seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import made_folder, make_console, said_stages
+from orchestrator.cli.terminal import make_console, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     with said_stages() as report:
         response = measure(bench, excitation_of(options), report)
         model, passive = fit(response), passivity(response)
-    folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}")
+    folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}", "--out")
     with staged(folder, new_run_id()) as staging:
         files = save_identification(response, model, passive, staging)
     content = identification_json(response, model, passive)

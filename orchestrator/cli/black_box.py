@@ -20,12 +20,13 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import made_folder, make_console, make_errors, said_stages
+from orchestrator.cli.terminal import make_console, make_errors, said_stages
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder
 from orchestrator.study.modes import modes_of, running
 
 
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     """Modes of a case's scenarios with one component identified, beside those from its states where it shows them."""
     scenarios = prepare(options)
     console = make_console(stderr=options.json)
-    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_black_box")
+    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_black_box", "--out")
     output, run_id = [], new_run_id()
     verdicts: dict[str, Stability] = {}
     for prepared in scenarios:

@@ -18,10 +18,11 @@ from orchestrator.cli.arguments import reactances, setting
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.terminal import make_console
 from orchestrator.errors import INTERRUPTED, InputError
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,7 +89,7 @@ def run(options: argparse.Namespace) -> int:
     request = _request(options)
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
-    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}")
+    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}", "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
         return _certified(request, details, acceptance, folder, progress, options)

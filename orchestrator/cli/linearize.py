@@ -5,10 +5,11 @@ from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import made_folder, make_console, warn
+from orchestrator.cli.terminal import make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder
 from orchestrator.study.linear_model_files import save_linear_model
 
 
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Linearise every scenario and write its model."""
     scenarios = chosen(options)
-    folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear")
+    folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear", "--out")
     verdicts: dict[str, Stability] = {}
     lines, run_id = [], new_run_id()
     for scenario in scenarios:

@@ -13,7 +13,6 @@ from orchestrator.api.scenario import Scenario
 from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
-    made_folder,
     make_console,
     print_named_modes,
     print_sources,
@@ -23,6 +22,7 @@ from orchestrator.cli.terminal import (
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
 from orchestrator.study import tables
 from orchestrator.study.modes import modes_json
 
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
     if options.black_box and options.directional:
         raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
-    folder = made_folder(options.out) if options.out else None
+    folder = made_folder(options.out, "--out") if options.out else None
     with held(folder) if folder else nullcontext():
         return _compute(scenarios, options, folder)
 

@@ -17,7 +17,6 @@ from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.terminal import (
-    made_folder,
     make_console,
     make_errors,
     print_findings,
@@ -34,7 +33,7 @@ from orchestrator.results.lock import held
 from orchestrator.results.recording import FOLDER, RecordingFolder
 from orchestrator.results.room import require_room
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
-from orchestrator.safe_files import PARTIAL
+from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult
@@ -68,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         options.checkpoint = run_request.interval(options)
         name = scenarios[0].prepared.case.name
         options.out = options.out or Path("results") / (f"{name}_like_{rules.name}" if rules else name)
-        folder = made_folder(options.out)
+        folder = made_folder(options.out, "--out")
         if options.resume is None:
             stack.enter_context(held(folder))
         if rules is not None:

@@ -15,10 +15,11 @@ from orchestrator.cli.case_arguments import add_case_arguments, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import made_folder, make_console, make_errors, print_questions
+from orchestrator.cli.terminal import make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.points.executor import Executor
 from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
 
@@ -85,7 +86,7 @@ def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, 
         frequencies=options.range,
     )
     print_questions(planned.scenarios)
-    made_folder(folder)
+    made_folder(folder, "--out")
     console = make_console(stderr=options.json)
     with held(folder):
         sweep = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)

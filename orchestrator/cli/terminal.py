@@ -3,13 +3,12 @@
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import Problem
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.study import tables
@@ -111,14 +110,3 @@ def saying_warnings() -> Iterator[None]:
     for other in found:
         if not issubclass(other.category, ResultsWarning):
             warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)
-
-
-def made_folder(path: Path, option: str = "--out") -> Path:
-    """The folder for results, made before anything is computed."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{option} {path}: results cannot be written there: {error.strerror}; choose another folder"
-        ) from error
-    return path

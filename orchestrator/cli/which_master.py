@@ -11,14 +11,14 @@ from rich.console import Console
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.extras import require
-from orchestrator.cli.terminal import made_folder, make_console
+from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
 from orchestrator.interop.probe_result import read_probe_result
 from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Identified, identify
 from orchestrator.report.tables import PlainTable
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import made_folder, write_text
 
 _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
     # property: what it is called, what its values mean

@@ -1,7 +1,6 @@
 """Finished points on disk: no point is computed twice, and an interrupted study continues where it ended."""
 
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -11,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import InputError
-from orchestrator.safe_files import flush
+from orchestrator.errors import InputError, ResultsError
+from orchestrator.safe_files import PARTIAL, made_folder, replacing
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -27,7 +26,7 @@ class PointStore:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
+        made_folder(folder, what="points cannot be kept there")
 
     def load(self, key: str) -> tuple[dict[str, Any], Arrays] | None:
         """Header and arrays of a point; None if there is no file of it that can be read."""
@@ -48,16 +47,13 @@ class PointStore:
             If the file cannot be written, for example because the disk is full.
         """
         text = json.dumps({**header, "key": key}).encode()
-        partial = self._path(key).with_suffix(f".{os.getpid()}.part")
         try:
-            with partial.open("wb") as file:
+            with replacing(self._path(key)) as partial, partial.open("wb") as file:
                 np.savez(file, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **arrays)
-            flush(partial)
-            partial.replace(self._path(key))
-        except OSError as error:
+        except ResultsError as error:
             raise InputError(
-                f"--out: a finished point cannot be written to {self.folder}: {error.strerror}; make room there, or "
-                "choose another folder, and start the same command again: what is written stays"
+                f"--out: a finished point cannot be kept: {error}, and start the same command again: what is written "
+                "stays"
             ) from error
 
     def _path(self, key: str) -> Path:
@@ -66,4 +62,4 @@ class PointStore:
 
 def any_kept(folder: Path) -> bool:
     """Whether a `PointStore` kept a point in a folder."""
-    return any(folder.glob(f"*{_KEPT}"))
+    return any(not path.name.startswith(PARTIAL) for path in folder.glob(f"*{_KEPT}"))

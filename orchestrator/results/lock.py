@@ -7,6 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.safe_files import made_folder
 
 try:
     import fcntl
@@ -28,12 +29,7 @@ def held(folder: Path) -> Iterator[None]:
     InputError
         If another command holds it, or the folder or the file cannot be made.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: results cannot be written there: {error.strerror}; choose another folder"
-        ) from error
+    made_folder(folder)
     if fcntl is None:
         yield
         return

@@ -45,7 +45,7 @@ class ScenarioFolder:
 
     def discard(self) -> None:
         """Remove what is there, unless something was recorded: that stays for whoever wants to read it."""
-        if not any(self.path.glob("*/*.nc")) and not any(self.path.glob("*.nc")):
+        if not _has_rows(self.path):
             rmtree(self.path, ignore_errors=True)
 
     def publish(self, ended_early: str | None = None) -> Path:
@@ -92,10 +92,18 @@ def _exchange(new: Path, place: Path, run: str) -> None:
         old.unlink(missing_ok=True)
 
 
+def _has_rows(folder: Path) -> bool:
+    """Whether something was recorded in the folder of an unfinished run."""
+    return any(not path.name.startswith(PARTIAL) for path in folder.rglob("*.nc"))
+
+
 def mend(folder: Path) -> None:
     """Bring back what a process that was killed had just put aside for its own results, and remove what it had done
-    with.
+    with, or begun without recording anything.
     """
+    for begun in unfinished(folder):
+        if not _has_rows(begun):
+            rmtree(begun, ignore_errors=True)
     for left in folder.glob(f"{PARTIAL}*{_DONE_WITH}"):
         rmtree(left, ignore_errors=True)
     for old in folder.glob(f"*{_OLD}*"):

@@ -218,6 +218,18 @@ def test_a_signal_while_the_checkpoints_go_finds_the_run_done(gfor, tmp_path, mo
     assert not [path.name for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
+def test_what_a_kill_left_before_the_first_rows_goes_with_the_next_start(gfor, tmp_path):
+    """Three killed runs: before any row, while the first rows were written, and with rows, which stay."""
+    for number, left in enumerate(("", ".part-7-000000000000.nc", "000000000000.nc")):
+        folder = tmp_path / f"dip.part-20260101T00000{number}-0" / "recording"
+        folder.mkdir(parents=True)
+        if left:
+            (folder / left).touch()
+    _, _, error = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    assert "that did not end, or still go on: dip.part-20260101T000002-0;" in error
+    assert [path.name for path in tmp_path.glob("*.part-*")] == ["dip.part-20260101T000002-0"]
+
+
 def test_results_that_a_kill_left_half_written_give_way(tmp_path):
     (tmp_path / ".part-r1").mkdir()
     (tmp_path / ".part-r1" / "half.csv").write_text("a")
