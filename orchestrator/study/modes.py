@@ -29,7 +29,8 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
-from orchestrator.coupling.master import Master, open_plan
+from orchestrator.coupling.coupled import open_plan
+from orchestrator.coupling.master import Master
 from orchestrator.errors import ComponentError
 from orchestrator.federation.federation import Federation
 from orchestrator.results.mode_json import eigenvalue_json

@@ -117,7 +117,9 @@ def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Fi
     """
     for name, plan in system.components.items():
         limits = list(limits_of(plan))
-        on = settings.connected(name) > 0 if limits else np.empty(0)
+        if not limits:
+            continue
+        on = settings.connected(name) > 0
         for limit in limits:
             acting = _acting(seen, name, limit, settings) & on
             duration = float(acting[1:].sum()) * seen.interval

@@ -10,7 +10,8 @@ import pytest
 from orchestrator.api.case import load
 from orchestrator.api.scenario import CheckpointWarning
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.coupling import master as master_module
+from orchestrator.coupling import kept_run
+from orchestrator.coupling.run import Run
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import previous
 from orchestrator.study import checkpoint_mark
@@ -148,7 +149,7 @@ def test_it_goes_on_from_the_event_and_has_it_once(tmp_path, said):
 def test_a_finished_run_is_not_run_again(tmp_path, said, monkeypatch):
     prepared = prepared_scenario(stop=0.3)
     first = run_scenario(prepared, checkpoints=Checkpoints(prepared, tmp_path, 1e-3, resume=False, say=said.append))
-    monkeypatch.setattr(master_module.Master, "_run_to", lambda *_: iter(()))
+    monkeypatch.setattr(Run, "_run_to", lambda *_: iter(()))
     assert told(resumed(prepared_scenario(stop=0.3), tmp_path, said)) == told(first)
 
 
@@ -279,7 +280,7 @@ def test_an_fmu_that_does_not_come_back_is_not_believed(tmp_path, said, monkeypa
     """Planted: what was serialised is not restored."""
     prepared = prepared_scenario()
     interrupted(prepared, tmp_path, said, 1.15)
-    monkeypatch.setattr(master_module, "set_state", lambda component, content: None)
+    monkeypatch.setattr(kept_run, "set_state", lambda component, content: None)
     result = resumed(prepared_scenario(), tmp_path, said)
     assert len(said) == 1
     assert "'dip' is computed from its start again: component 'gfor' does not go on from its state" in said[0]

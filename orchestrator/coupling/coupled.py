@@ -1,0 +1,216 @@
+"""FMUs brought to life, connected, and initialised together."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.toolchain.removal import remove_tree
+from orchestrator.arrays import Numbers
+from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.loop import Exchange
+from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.system import ComponentPlan, Endpoint, System
+from orchestrator.coupling.wires import Wires
+from orchestrator.errors import InputError
+from orchestrator.fmi.archive import extract
+from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.instance import open_component
+
+_INITIAL_PASSES = 20
+_JUMP = 1e-6
+"""Of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were."""
+
+
+def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
+    """A component as its plan has it, on this machine."""
+    return open_component(name, plan.description, directory, isolated=plan.isolated)
+
+
+class CoupledComponents:
+    """Components at their common start; a context manager that releases every FMU.
+
+    Parameters
+    ----------
+    system, schedule, step_size, stop_time, opener
+        As `orchestrator.coupling.master.Master`.
+
+    Attributes
+    ----------
+    y
+        All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+    late_starts
+        As `orchestrator.coupling.master.Master`.
+    exchanges
+        What each component sends and takes.
+    wires
+        The connections that do more than carry a value.
+
+    Raises
+    ------
+    InputError, ComponentError
+        As `orchestrator.coupling.master.Master`.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        schedule: Schedule,
+        step_size: float,
+        stop_time: float | None,
+        opener: Callable[[str, ComponentPlan, Path], Component],
+    ) -> None:
+        open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
+        if open_inputs:
+            raise InputError(
+                f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value"
+            )
+        schedule.check(set(system.components))
+        self.system, self.schedule, self.clock = system, schedule, Clock(step_size)
+        self.components: dict[str, Component] = {}
+        self.late_starts: dict[str, str] = {}
+        self._release = ExitStack()
+        try:
+            self._instantiate(stop_time, opener)
+            self.exchanges = self._connect()
+            self._initialise()
+        except BaseException:
+            self.close()
+            raise
+
+    def _instantiate(self, stop_time: float | None, opener: Callable[[str, ComponentPlan, Path], Component]) -> None:
+        folders: dict[Path, Path] = {}
+        for name, plan in self.system.components.items():
+            path = plan.description.path
+            if path not in folders:
+                folders[path] = extract(path)
+                self._release.callback(remove_tree, folders[path])
+            component = opener(name, plan, folders[path])
+            self._release.enter_context(component)
+            self.components[name] = component
+            component.set(plan.parameters)
+            component.setup(0.0, stop_time)
+
+    def _connect(self) -> dict[str, Exchange]:
+        sources = list(dict.fromkeys(c.source for c in self.system.connections))
+        sources.sort(key=lambda s: list(self.components).index(s.component))
+        self.output_names = tuple(str(s) for s in sources)
+        self._values = np.zeros(len(sources) + len(self.system.wires))
+        self.y = self._values[: len(sources)]
+        place = {source: i for i, source in enumerate(sources)}
+        self.wires = Wires(self.system, self.schedule, self.clock.step_size, place, self._values)
+        exchanges = {}
+        for name, component in self.components.items():
+            own = [i for i, s in enumerate(sources) if s.component == name]
+            feeding = [c for c in self.system.connections if c.target.component == name]
+            window = slice(own[0], own[-1] + 1) if own else slice(0)
+            exchanges[name] = Exchange(
+                component,
+                RealBatch(component, [c.target.variable for c in feeding]),
+                RealBatch(component, [sources[i].variable for i in own], self.y[window]),
+                window,
+                np.array([place[c.source] for c in feeding], dtype=np.int64),
+            )
+            if arriving := self.wires.delivered:
+                exchanges[name].delivered = np.array(
+                    [arriving.get(c.target, place[c.source]) for c in feeding], dtype=np.int64
+                )
+        return exchanges
+
+    def _initialise(self) -> None:
+        """Bring all FMUs through initialisation, with the first inputs that the schedule gives them."""
+        for name, component in self.components.items():
+            component.enter_initialization_mode()
+            component.set(self.system.components[name].inputs)
+        if self.schedule.first_inputs == "consistent":
+            self._propagate()
+            self.wires.settle(first=True)
+            return
+        for component in self.components.values():
+            component.exit_initialization_mode()
+        if self.schedule.first_inputs == "once":
+            for exchange in self.exchanges.values():
+                exchange.outputs.read()
+        elif self.schedule.first_inputs == "start":
+            self._take_start_values()
+
+    def _propagate(self) -> None:
+        """Propagate outputs until nothing changes any more, and end initialisation."""
+        for _ in range(_INITIAL_PASSES):
+            before = self.y.copy()
+            for group in self.schedule.groups:
+                for name in group:
+                    self.wires.settle(first=True)
+                    self.exchange_inputs(name)
+                    self.exchanges[name].outputs.read()
+            if np.allclose(before, self.y, rtol=0, atol=1e-14):
+                break
+        for name, component in self.components.items():
+            self.wires.settle(first=True)
+            self.exchange_inputs(name)
+            component.exit_initialization_mode()
+        before = self.y.copy()
+        for name, exchange in self.exchanges.items():
+            exchange.outputs.read()
+            if text := _jump(self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]):
+                self.late_starts[name] = text
+
+    def _take_start_values(self) -> None:
+        """Let every output be what the inputs that it feeds start from."""
+        starts: dict[Endpoint, tuple[float, Endpoint]] = {}
+        for wire in self.system.connections:
+            info = self.system.components[wire.target.component].description.variables[wire.target.variable]
+            value = info.start_number
+            known, other = starts.setdefault(wire.source, (value, wire.target))
+            if known != value:
+                raise InputError(
+                    f"{wire.source} feeds {other}, which starts from {known:g}, and {wire.target}, which starts from "
+                    f"{value:g}; with first_inputs = 'start' all inputs of an output must start from the same value"
+                )
+            self.y[self.output_names.index(str(wire.source))] = value
+
+    def close(self) -> None:
+        """Terminate and free every FMU; calling it again does nothing."""
+        self._release.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def exchange_inputs(self, name: str) -> None:
+        """Send a component the newest outputs of its partners; over a connection of `wires`, what arrived last."""
+        exchange = self.exchanges[name]
+        if len(exchange.sources):
+            np.take(self._values, exchange.delivered, out=exchange.inputs.values, mode="clip")
+            exchange.inputs.write()
+
+    def arriving(self, name: str) -> NDArray[np.float64]:
+        """What a component's connected inputs are given, shape (number of inputs,)."""
+        arriving: NDArray[np.float64] = self._values[self.exchanges[name].delivered]
+        return arriving
+
+    def renew(self, name: str) -> None:
+        """Send a component the newest outputs of its partners as if they had long been so, and read its own."""
+        self.wires.settle()
+        self.exchange_inputs(name)
+        self.exchanges[name].outputs.read()
+
+
+def _jump(names: Sequence[str], before: Numbers, after: Numbers) -> str:
+    """Which of a component's outputs changed most as its initialisation ended; "" where all stayed."""
+    apart = np.abs(after - before) / np.maximum(1.0, np.maximum(np.abs(before), np.abs(after)))
+    if not apart.size or not apart.max() > _JUMP:
+        return ""
+    k = int(apart.argmax())
+    return (
+        f"{names[k]} is {before[k]:.4g} before the end of initialisation and {after[k]:.4g} just after it, at the same "
+        "inputs"
+    )

@@ -1,0 +1,170 @@
+"""One run of a master: from event to event, with its observers, kept on the way and taken up again."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
+from orchestrator.coupling.kept_run import state_of, take_up
+from orchestrator.coupling.observers import Observer
+from orchestrator.coupling.run_state import Keeper, RunState, resume_observers
+from orchestrator.coupling.statistics import StepStatistics
+from orchestrator.coupling.stepping import Stepper
+from orchestrator.errors import ComponentError, NotFiniteError
+from orchestrator.fmi.interrupts import calls
+from orchestrator.fmi.silence import silence
+
+_LONGEST_STRETCH = 1000
+"""Communication steps done at a stretch, so that an interrupt from the keyboard is heard."""
+
+
+class Run:
+    """One run, as `orchestrator.coupling.master.Master.run` makes it.
+
+    Parameters
+    ----------
+    stepper
+        What runs.
+    observers
+        Who looks on.
+    keeper
+        As there.
+    """
+
+    def __init__(self, stepper: Stepper, observers: Sequence[Observer], keeper: Keeper) -> None:
+        self._stepper, self._observers, self._keeper = stepper, observers, keeper
+        self._whole = False  # whether every observer has looked at this communication point
+        self._applied = -1  # the last communication point whose events have happened
+
+    def until(self, stop: int, due: Mapping[int, Sequence[Event]]) -> StepStatistics:
+        """Run to a communication point.
+
+        Parameters
+        ----------
+        stop
+            The communication point.
+        due
+            Events by their communication point.
+        """
+        stepper, keeper = self._stepper, self._keeper
+        kept = keeper.latest()
+        first, start, before = stepper.index, perf_counter(), np.array(stepper.seconds())
+        if kept is not None:
+            start, before = start - kept.seconds, before - kept.spent
+
+        def state(components: Mapping[str, bytes] | None = None) -> RunState:
+            spent = np.array(stepper.seconds()) - before
+            applied = self._applied == stepper.index
+            return state_of(stepper, self._observers, components, applied, perf_counter() - start, spent)
+
+        begun: list[Observer] = []
+        try:
+            self._begin(begun, stop, kept)
+            for _ in self._steps(stop, due, first):
+                if keeper.is_due():
+                    keeper.keep(state)
+            keeper.finish(lambda: state({}))
+        except KeyboardInterrupt:
+            if self._whole:
+                keeper.keep(state)
+            raise
+        except ComponentError as error:
+            if error.time is None:
+                raise ComponentError(error.component, error.call, error.status, error.log, stepper.time) from error
+            raise
+        finally:
+            for observer in begun:
+                observer.end(stepper)
+        return stepper.statistics(stepper.index - first, perf_counter() - start, before.tolist())
+
+    def _begin(self, begun: list[Observer], stop: int, kept: RunState | None) -> None:
+        """Have observers look at the beginning, or go on from where a run was kept.
+
+        Parameters
+        ----------
+        begun
+            Each observer that has begun is noted.
+        stop
+            Communication point at which the run ends.
+        kept
+            State to go on from.
+        """
+        if kept is not None:
+            resume_observers(self._observers, kept)
+        for observer in self._observers:
+            observer.begin(self._stepper, stop)
+            begun.append(observer)
+            if kept is None:
+                observer.observe(self._stepper)
+        if kept is not None:
+            take_up(self._stepper, kept)
+            self._applied = kept.index if kept.applied else -1
+        self._require_finite(self._stepper.components)
+
+    def _steps(self, stop: int, due: Mapping[int, Sequence[Event]], first: int) -> Iterator[None]:
+        """Step from event to event; each time that it yields, the run is whole.
+
+        Parameters
+        ----------
+        stop, due
+            As `until`.
+        first
+            Communication point at which the run began.
+        """
+        for target in sorted({stop, *(i for i in due if self._stepper.index <= i < stop)}):
+            yield from self._run_to(target, first)
+            if target < stop and target != self._applied:
+                self._whole = False
+                with calls:
+                    self._apply(due[target])
+                    self._whole, self._applied = True, target
+
+    def _run_to(self, target: int, first: int) -> Iterator[None]:
+        """Step to a communication point, stopping only where an observer looks; an interrupt waits until all have."""
+        stepper, observers = self._stepper, self._observers
+        while stepper.index < target:
+            self._whole = False
+            with calls:
+                done = stepper.index - first
+                stepper.advance(
+                    min([target - stepper.index, _LONGEST_STRETCH, *(o.every - done % o.every for o in observers)])
+                )
+                done = stepper.index - first
+                for observer in observers:
+                    if done % observer.every == 0:
+                        observer.observe(stepper)
+                self._whole = True
+            yield
+
+    def _apply(self, events: Sequence[Event]) -> None:
+        for event in events:
+            match event:
+                case WireFault():
+                    self._stepper.wires.begin(event.connection.target, event.imperfection)
+                case WireRecovery():
+                    self._stepper.wires.end(event.connection.target, type(event.imperfection))
+                case NotANumber():
+                    self._stepper.exchanges[event.component].outputs.values[:] = np.nan
+                    self._require_finite([event.component])
+                case Silence():
+                    silence(self._stepper.components[event.component])
+                case _:
+                    self._set(event)
+
+    def _set(self, event: Event) -> None:
+        changes = event.changes()
+        for name, settings in changes.items():
+            self._stepper.components[name].set(settings)
+        for name in changes:
+            self._stepper.components[name].read(self._stepper.exchanges[name].outputs)
+        self._require_finite(changes)
+
+    def _require_finite(self, names: Iterable[str]) -> None:
+        """What components gave without a step, at the start and at events; the inner loop looks after the steps."""
+        for name in names:
+            outputs = self._stepper.exchanges[name].outputs
+            for variable, value in zip(outputs.names, outputs.values.tolist(), strict=True):
+                if not isfinite(value):
+                    raise NotFiniteError(name, variable, value, self._stepper.time)
