@@ -9,7 +9,7 @@ from io import TextIOWrapper
 from typing import Any
 
 from fmus.toolchain.extras import SetupError
-from orchestrator.cli.interrupted import ending
+from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
 
@@ -82,20 +82,13 @@ def _run(words: Sequence[str]) -> int:
         code = _done(words)
         calls.over = True
     except BaseException as error:
-        if not _interrupted(error):
+        if not is_interrupt(error):
             raise
         calls.over = True
         print(ending(error), file=sys.stderr)
         exec("")  # clears CPython's note of an interrupt inside exec(), as of dataclasses; it would end us by SIGINT
         code = INTERRUPTED
     return code
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    """Whether it is Ctrl-C or SIGTERM, or what a library in C made of one that came while it called Python."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None
 
 
 def _done(words: Sequence[str]) -> int:

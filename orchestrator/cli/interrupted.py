@@ -17,10 +17,17 @@ def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
     """
     try:
         yield
-    except KeyboardInterrupt as error:
-        if text := words():
+    except BaseException as error:
+        if is_interrupt(error) and (text := words()):
             error.add_note(text)
         raise
+
+
+def is_interrupt(error: BaseException | None) -> bool:
+    """Whether it is Ctrl-C or SIGTERM, or what a library in C made of one that came while it called Python."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def ending(error: BaseException) -> str:

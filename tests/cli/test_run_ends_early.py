@@ -78,8 +78,9 @@ def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(study, "run_scenario", none)
-<<<<<<< HEAD
-    assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")
+    said = f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    assert gfor(*WORDS, "--out", tmp_path) == (130, "", said)
+    assert gfor(*WORDS, "--out", tmp_path, "--checkpoint", "0") == (130, "", "interrupted\n")
 
 
 def test_a_library_in_c_made_another_error_of_the_interrupt(gfor, monkeypatch, tmp_path):
@@ -106,8 +107,3 @@ sys.exit(cli.main())
         call, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(tmp_path)}
     )
     assert (done.returncode, done.stderr) == (130, "interrupted\n")
-=======
-    said = f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
-    assert gfor(*WORDS, "--out", tmp_path) == (130, "", said)
-    assert gfor(*WORDS, "--out", tmp_path, "--checkpoint", "0") == (130, "", "interrupted\n")
->>>>>>> 1350ebb (Say after an interrupt how a study goes on, or nothing)
