@@ -91,7 +91,8 @@ def test_a_library_in_c_made_another_error_of_the_interrupt(gfor, monkeypatch, t
             raise SystemError("returned a result with an exception set") from interrupt
 
     monkeypatch.setattr(study, "run_scenario", as_h5py_does)
-    assert gfor(*WORDS, "--out", tmp_path) == (130, "", "interrupted\n")
+    said = f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    assert gfor(*WORDS, "--out", tmp_path) == (130, "", said)
 
 
 def test_an_interrupt_inside_exec_leaves_the_exit_code_alone(tmp_path):
