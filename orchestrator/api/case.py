@@ -22,7 +22,6 @@ from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -303,5 +302,10 @@ class Case:
 def _folder(given: str | Path) -> Path:
     """The folder that keeps a sweep's points, made where missing."""
     place = path_of(given, "folder", "folder")
-    made_folder(place / POINTS, "folder =", "points cannot be kept there")
+    try:
+        (place / POINTS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"
+        ) from error
     return place
