@@ -34,6 +34,8 @@ def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list
 
 def _joined(line: Line, other: Line, bus: str) -> Line | None:
     """Two lines that meet at a bus as one, with the other's name; None where that is not exact or no line results."""
+    if line.has_ratio and bus not in (line.from_bus, other.from_bus):
+        return _joined_legs(line, other)
     if line.B or other.B or line.has_ratio or other.X + line.X < SMALLEST_REACTANCE:
         return None
     far = line.to_bus if line.from_bus == bus else line.from_bus
@@ -41,6 +43,15 @@ def _joined(line: Line, other: Line, bus: str) -> Line | None:
     if ends[0] == ends[1] or (other.has_ratio and other.from_bus == bus):
         return None
     return Line(other.name, *ends, other.X + line.X, other.R + line.R, 0.0, other.tap, other.shift)
+
+
+def _joined_legs(line: Line, other: Line) -> Line | None:
+    """Two legs of a transformer, each with its ratio at its outer end: what is behind both ratios, behind one."""
+    if line.B or other.B or other.X + line.X < SMALLEST_REACTANCE or line.from_bus == other.from_bus:
+        return None
+    square = line.tap**2
+    X, R = (other.X + line.X) * square, (other.R + line.R) * square
+    return Line(other.name, other.from_bus, line.from_bus, X, R, 0.0, other.tap / line.tap, other.shift - line.shift)
 
 
 def without_star_points(lines: list[Line], kept: set[str]) -> tuple[list[Line], list[ThreeWinding], set[str]]:

@@ -13,7 +13,15 @@ from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.errors import InputError, Problem
 
-_Source = tuple[ImportedNetwork, tuple[Problem, ...], tuple[Machine, ...]]
+
+@dataclass(frozen=True)
+class _Source:
+    """The network of another program, what was taken over in another form, and its machines."""
+
+    network: ImportedNetwork
+    changes: tuple[Problem, ...] = ()
+    machines: tuple[Machine, ...] = ()
+    idle: frozenset[tuple[int, str]] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -32,8 +40,8 @@ class NetworkData:
         File and line of the lines that a file holds, by name.
     changes
         What the source holds and was taken over in another form, each with its place.
-    machines
-        Machines in service, one by one, where the source is of PSS/E.
+    machines, idle_machines
+        Machines in service, one by one, where the source is of PSS/E; bus and identifier of those out of service.
     """
 
     buses: tuple[str, ...]
@@ -48,6 +56,7 @@ class NetworkData:
     transformers: tuple[ThreeWinding, ...] = ()
     changes: tuple[Problem, ...] = ()
     machines: tuple[Machine, ...] = ()
+    idle_machines: frozenset[tuple[int, str]] = frozenset()
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -59,7 +68,8 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         If a file is missing, lacks a column, holds something that is not a number, or a source holds something
         that the grid model does not have.
     """
-    source, changes, machines = _source(table, directory)
+    found = _source(table, directory)
+    source = found.network
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
@@ -89,8 +99,9 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         table.stray_B,
         {line.name: place for line, place in in_file},
         (*source.transformers, *transformers),
-        changes,
-        machines,
+        found.changes,
+        found.machines,
+        found.idle,
     )
 
 
@@ -106,7 +117,6 @@ def bus_name(label: str) -> str:
 
 
 def _source(table: NetworkTable, directory: Path) -> _Source:
-    """The network of another program, what was taken over in another form, and its machines."""
     imported = ImportedNetwork()
     if table.raw is not None:
         return _from_raw(directory / table.raw, table)
@@ -120,7 +130,7 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
         imported = import_network(read_matpower(directory / table.matpower))
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
-    return imported, (), ()
+    return _Source(imported)
 
 
 def _from_raw(path: Path, table: NetworkTable) -> _Source:
@@ -132,7 +142,7 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return replace(imported, generation=generation), raw.changes, raw.machines
+    return _Source(replace(imported, generation=generation), raw.changes, raw.machines, raw.idle)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
@@ -141,7 +151,7 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     imported = import_network(model.tables)
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
     generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
-    return replace(imported, generation=generation), model.changes, ()
+    return _Source(replace(imported, generation=generation), model.changes)
 
 
 def seen_from_here(path: Path) -> Path:

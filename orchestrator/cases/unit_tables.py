@@ -179,7 +179,8 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     rows = rows_of_machines(machines, str(path))
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
-    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced)
+    idle = draft.data.idle_machines if draft.data else ()
+    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced, idle)
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith("_phasor"):
         raise InputError(

@@ -45,6 +45,20 @@ def test_two_in_series_become_one_exactly(turned):
     assert two_port(found, ["a", "b"], ["a", "b"]) == pytest.approx(wanted, abs=1e-12)
 
 
+@pytest.mark.parametrize("negative", [0, 1])
+def test_two_legs_of_a_transformer_with_their_ratios_become_one_exactly(negative):
+    X = (-0.35, 0.6) if negative == 0 else (0.6, -0.35)
+    lines = [
+        Line("am", "a", "m", X[0], R=0.01, tap=1.05, shift=0.2),
+        Line("bm", "b", "m", X[1], R=0.02, tap=0.97, shift=-0.5),
+    ]
+    found, merged = without_negative_reactances(list(lines), {"a", "b"})
+    assert (len(found), merged) == (1, {"m"})
+    assert found[0].X > 0
+    wanted = two_port(lines, ["a", "m", "b"], ["a", "b"])
+    assert two_port(found, ["a", "b"], ["a", "b"]) == pytest.approx(wanted, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("lines", "kept"),
     [

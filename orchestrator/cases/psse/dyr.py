@@ -87,6 +87,7 @@ def machine_models(
     machines: Sequence[Machine],
     leaving_out: Sequence[str] = (),
     replaced: Collection[tuple[int, str]] = (),
+    idle: Collection[tuple[int, str]] = (),
 ) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines in service, by bus and identifier.
 
@@ -100,12 +101,14 @@ def machine_models(
         Models whose records may be left out; their generators keep what the case says of that part.
     replaced
         Machines in whose place a converter of the case stands: they need no record.
+    idle
+        Machines of the RAW file that are out of service.
 
     Raises
     ------
     InputError
-        With every machine that has no machine record, every model that is unknown, and every value that our part
-        cannot have.
+        With every machine that has no machine record, every record of a machine that is not there, every model that is
+        unknown, and every value that our part cannot have.
     """
     at = {(machine.bus, machine.name.strip()): machine for machine in machines}
     problems: list[str] = []
@@ -114,6 +117,13 @@ def machine_models(
     left = {name.upper() for name in leaving_out}
     for record in records:
         key = (record.bus, record.machine)
+        if key not in at and key not in idle and record.name in _KNOWN:
+            ids = sorted(name for bus, name in {*at, *idle} if bus == record.bus)
+            there = f"which has {', '.join(map(repr, ids))}" if ids else "which has no generator in the RAW file"
+            problems.append(
+                f"{record.place}: {record.name} is of machine {record.machine!r} at bus {record.bus}, {there}; correct "
+                "its bus or identifier, or remove the record"
+            )
         if key not in at or record.name in left:
             continue
         known = _KNOWN.get(record.name)
@@ -139,9 +149,7 @@ def machine_models(
                 f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
             )
         elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
-            ids = sorted({r.machine for r in records if r.bus == bus and (bus, r.machine) not in at})
-            hint = f"; the file has records of {', '.join(map(repr, ids))} there" if ids else ""
-            problems.append(f"machine {name!r} at bus {bus} has no record of a machine{hint}")
+            problems.append(f"machine {name!r} at bus {bus} has no record of a machine")
     if problems:
         more = f"\n  and {len(problems) - _MOST_SHOWN} more" if len(problems) > _MOST_SHOWN else ""
         raise InputError(
@@ -162,7 +170,7 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
         coupling = {"RL": machine.source.real, "XL": machine.source.imag}
         return MachineModel({}, {**coupling, **values}, parts["converter"])
     absent = {} if partial else {kind: part for kind, part in _WITHOUT.items() if kind not in parts}
-    source = {"machine.R_s": machine.source.real} if machine.source.real else {}
+    source = {"machine.R_s": machine.source.real}
     if parts["machine"] == "classical":
         source["machine.X_d1"] = machine.source.imag
     step_up = {"transformer.X_t": 0.0, "transformer.R_t": 0.0}  # the network has them
@@ -171,7 +179,12 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     """Parameters that a record sets."""
-    if len(record.values) < len(known.fields):
+    following = next((text for text in record.values[2:] if text.upper() in _KNOWN), None)
+    if following is not None:
+        raise InputError(
+            f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
+        )
+    if len(record.values) != len(known.fields):
         raise InputError(
             f"{record.place}: {record.name} has {len(record.values)} values, and needs {len(known.fields)}: "
             f"{', '.join(field.name for field in known.fields)}"

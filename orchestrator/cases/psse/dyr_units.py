@@ -48,6 +48,7 @@ def with_records(
     path: Path,
     leaving_out: Sequence[str],
     without: Collection[str],
+    idle: Collection[tuple[int, str]] = (),
 ) -> list[UnitRow]:
     """The units with what the records say of them.
 
@@ -61,6 +62,8 @@ def with_records(
         Models whose records may be left out.
     without
         Labels of units that are converters of the case alone, and need no record.
+    idle
+        Bus and identifier of the machines that are out of service.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def with_records(
     """
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
-    models = machine_models(read_dyr(path), machines, leaving_out, replaced)
+    models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle)
     found = []
     for key, row in zip(keys, rows, strict=True):
         model = models.get(key)

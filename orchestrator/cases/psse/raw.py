@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,11 +54,15 @@ class Machine:
 
 @dataclass(frozen=True)
 class RawNetwork:
-    """A file's tables, its machines in service, and what was taken over in another form."""
+    """A file's tables, its machines in service, and what was taken over in another form.
+
+    ``idle`` has bus and identifier of the machines that are out of service.
+    """
 
     tables: SourceTables
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
+    idle: frozenset[tuple[int, str]] = frozenset()
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
@@ -93,6 +98,8 @@ class _Reading:
         self._branches: list[list[float]] = []
         self._to_earth: list[tuple[complex, complex]] = []
         self._labels: dict[int, str] = {}
+        self._idle: set[tuple[int, str]] = set()
+        self._lines_of: dict[tuple[Any, ...], int] = {}
         self._load_parts: dict[int, tuple[complex, complex]] = {}
 
     def network(self, leaving_out: Sequence[str]) -> RawNetwork:
@@ -118,13 +125,20 @@ class _Reading:
             self._raw.frequency,
             self._load_parts,
         )
-        return RawNetwork(tables, machines, tuple(self._changes.listed()))
+        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle))
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))
         if bus not in self._rows:
             raise record.error(f"there is no bus {bus}")
         return bus
+
+    def _once(self, record: Record, what: str, *key: Any) -> None:
+        """Refuse a second element of the same name, which PSS/E would put in the first one's place."""
+        first = self._lines_of.setdefault((what, *key), record.line)
+        if first != record.line:
+            shown = " ".join(str(sorted(part)) if isinstance(part, frozenset) else str(part) for part in key)
+            raise record.error(f"the {what} {shown} stands in line {first} as well; remove one of them, or rename it")
 
     def _add(self, bus: int, column: int, value: complex) -> None:
         """Add to the active and the reactive part [MW, Mvar], which stand side by side."""
@@ -138,6 +152,8 @@ class _Reading:
                 raise record.error(f"the bus' number is {number}; numbers exceed 0, and each stands once")
             if kind not in (1, 2, 3, 4):
                 raise record.error(f"IDE is {kind}; known are 1 to 4")
+            if kind == _REFERENCE and any(row[1] == _REFERENCE for row in self._rows.values()):
+                self._changes.note(record.line, "second reference bus (IDE = 3): it holds its voltage and feeds PG")
             self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
             self._kilovolts[number] = record.number(2, "BASKV", 0.0)
             self._magnitudes[number] = record.number(7, "VM", 1.0)
@@ -150,6 +166,7 @@ class _Reading:
     def _loads(self) -> None:
         for record in self._raw.of("load"):
             bus = self._bus(record)
+            self._once(record, "load", bus, record.text(1, "1").strip())
             if record.whole(2, "STATUS", 1) == 0:
                 continue
             names = ("PL", "QL", "IP", "IQ", "YP", "YQ")
@@ -191,6 +208,7 @@ class _Reading:
         ends = 9 if self._raw.revision == 33 else 19
         for record in self._raw.of("branch"):
             start, end = self._bus(record), self._bus(record, 1)
+            self._once(record, "branch", frozenset((start, end)), record.text(2, "1").strip())
             z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
             charging = 0.5j * record.number(5, "B", 0.0)
             gi, bi, gj, bj = (record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ")))
@@ -242,7 +260,9 @@ class _Reading:
         machines = []
         for record in self._raw.of("generator"):
             bus = self._bus(record)
+            self._once(record, "machine", bus, record.text(1, "1").strip())
             if record.whole(status, "STAT", 1) == 0 or self._rows[bus][1] == 4:
+                self._idle.add((bus, record.text(1, "1").strip()))
                 continue
             rating = record.number(mbase, "MBASE [MVA]", self._raw.base_mva)
             if not rating > 0:

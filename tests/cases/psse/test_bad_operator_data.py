@@ -34,13 +34,22 @@ RAWS = {
     "a voltage of zero": (changed("BUS", 3, ",1.0,0.0", ",0.0,0.0"), r"line 7: VM is 0 pu; it must exceed 0: export"),
     "more power than the rating": (
         changed("GENERATOR", 1, "163.0", "1630"), r"bus 2 feeds 1630 MW, more than its rating of 192 MVA; raise"),
+    "a load twice": (
+        raw(33, records(33) | {"LOAD": ["5,'1 ',1,1,1,10,5"] * 2}),
+        r"grid.raw, line 15: the load 5 1 stands in line 14 as well; remove one of them, or rename it"),
+    "a branch twice, from both ends": (
+        raw(33, records(33) | {"BRANCH": [*records(33)["BRANCH"], "5,4,'1 ',0.01,0.085,0.176"]}),
+        r"the branch \[4, 5\] 1 stands in line 23 as well"),
+    "a machine twice": (
+        raw(33, records(33) | {"GENERATOR": [*records(33)["GENERATOR"], records(33)["GENERATOR"][0]]}),
+        r"the machine 1 1 stands in line 19 as well"),
     "a line that ends at nothing": (changed("BRANCH", 0, "4,5,", "4,,"), r"the bus' number is ''; it must be a number"),
 }  # fmt: skip
 DYRS = {
     "an empty file": ("", CASE, r"machine '1' at bus 3 has no record of a machine"),
     "another identifier": (
         DYR.replace("2,'GENROU','1'", "2,'GENROU','7'"), CASE,
-        r"machine '1' at bus 2 has no record of a machine; the file has records of '7' there"),
+        r"(?s)GENROU is of machine '7' at bus 2, which has '1'; .*machine '1' at bus 2 has no record of a machine"),
     "no number": (DYR.replace("9.55", "nan"), CASE, r"grid.dyr, line 2: GENROU has H = 'nan'; it must be a number"),
     "no inertia": (DYR.replace("9.55", "0.0"), CASE, r"grid.dyr, sg1.machine.H: machine.H = 0 s; it must be at least"),
     "a phasor model among others": (MACHINES, CASE, r"bus 3 is the phasor model regfm_a1_phasor, and the generator"),

@@ -7,7 +7,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.psse.dyr import read_dyr
 from orchestrator.errors import CaseError, InputError
-from tests.cases.psse import raw
+from tests.cases.psse import raw, records
 
 DYR = """\
 // WSCC, figures of Sauer and Pai on the machines' own ratings
@@ -39,8 +39,8 @@ converter = "gfor"
 def tables(tmp_path):
     """Text of a DYR file → the units' tables of the case, or its problems."""
 
-    def build(dyr=DYR, case=CASE):
-        (tmp_path / "grid.raw").write_text(raw(33))
+    def build(dyr=DYR, case=CASE, network=None):
+        (tmp_path / "grid.raw").write_text(network or raw(33))
         (tmp_path / "grid.dyr").write_text(dyr)
         (tmp_path / "case.toml").write_text(case)
         preparer = load_case(tmp_path / "case.toml")._preparer("plain", None, ())
@@ -63,6 +63,14 @@ def test_records_become_parts_and_parameters(tables):
     assert first.parameters["S_n"] == 247.5
     assert third.parameters["machine.X_d1"] == 0.2  # ZX of the RAW file
     assert first.parameters["transformer.X_t"] == 0
+    assert first.parameters["machine.R_s"] == 0  # ZR of the RAW file, and not what the part has by itself
+
+
+def test_a_machine_out_of_service_may_have_records(tables, tmp_path):
+    found = records(33)
+    found["GENERATOR"].append(found["GENERATOR"][0].replace("1,'1 '", "1,'2 '").replace(",1,1,100,", ",1,0,100,"))
+    dyr = DYR + "1 'GENCLS' 2  1.0 0.0 /\n"
+    assert set(tables(dyr, network=raw(33, found))) == set(tables())
 
 
 def test_records_over_lines_with_commas_or_blanks(tmp_path):
@@ -83,6 +91,10 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
         ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),
         ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
         ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
+        ("2.35 0.0 /", "2.35 0.0 1.0 /", r"line 5: GENCLS has 3 values, and needs 2: H, D"),
+        ("2.35 0.0 /", "2.35 0.0", r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS"),
+        ("1 'SEXS' 1", "1 'SEXS' 2", r"line 6: SEXS is of machine '2' at bus 1, which has '1'; correct"),
+        ("1 'SEXS'", "4 'SEXS'", r"SEXS is of machine '1' at bus 4, which has no generator in the RAW file"),
         ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
     ],
 )
