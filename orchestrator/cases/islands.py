@@ -33,10 +33,14 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
     units = {port.name: port.bus for port in draft.network.ports if port.name in draft.system.components}
     asked = {frozenset(part) for part in _without_unit(draft.network, units, values)}
     for time, group in groupby(sorted(events, key=lambda pair: pair[0].time), key=lambda pair: pair[0].time):
-        where = ""
+        where, switched = "", False
         for event, place in group:
             where = where or place
-            values |= event.changes().get(draft.grid, {})
+            for name, value in event.changes().get(draft.grid, {}).items():
+                switched = switched or bool(value) != bool(values.get(name, True))
+                values[name] = value
+        if not switched:
+            continue
         for part in _without_unit(draft.network, units, values):
             if frozenset(part) not in asked:
                 asked.add(frozenset(part))
