@@ -12,7 +12,7 @@ from orchestrator import cli
 from tests.pages.markdown import ROOT, blocks, commands, name_of, pages
 
 PAGES = [page for page in pages() if blocks(page)]
-OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest", "ruff"}
+OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest", "ruff", "tail"}
 """Commands that pages use beside ``gfor`` and ``python``."""
 ADDED = {"least-damped"}
 """Commands of ``gfor`` that a guide adds."""
