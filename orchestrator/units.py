@@ -2,6 +2,7 @@
 
 import re
 from functools import cache
+from threading import Lock
 from typing import Any
 
 _QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*")
@@ -27,8 +28,17 @@ that is written in them is read without pint, which takes half a second to impor
 _PER_SECOND = "1 Hz is 2π rad/s, or 60 rpm"
 
 
-@cache
+_building = Lock()
+
+
 def _registry() -> Any:
+    """One registry for all threads: pint does not convert from one registry to another."""
+    with _building:
+        return _built_registry()
+
+
+@cache
+def _built_registry() -> Any:
     import pint  # noqa: PLC0415 - half a second to import; see `USUAL`
 
     registry: Any = pint.UnitRegistry()

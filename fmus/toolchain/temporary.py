@@ -36,8 +36,8 @@ def own_folder(kind: str) -> Path:
     if parent not in _swept:
         _swept.add(parent)
         sweep(parent)
-    for other in [path for path in _locks if not path.exists()]:  # removed by other means
-        os.close(_locks.pop(other))
+    for other in [path for path in [*_locks] if not path.exists()]:  # removed by other means
+        _give_back(other)
     if fcntl is None:
         return Path(tempfile.mkdtemp(prefix=f"{_LOCKED}{kind}_"))
     new = Path(tempfile.mkdtemp(prefix=f"{_NEW}{kind}_"))
@@ -56,6 +56,11 @@ def own_folder(kind: str) -> Path:
 def remove(folder: Path) -> None:
     """Remove a folder, and give its lock back."""
     remove_tree(folder)
+    _give_back(folder)
+
+
+def _give_back(folder: Path) -> None:
+    """Close a folder's lock, unless another thread has."""
     if (lock := _locks.pop(folder, None)) is not None:
         os.close(lock)
 

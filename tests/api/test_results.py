@@ -197,7 +197,7 @@ def test_values_may_be_numpys_and_have_units():
 @pytest.mark.parametrize(
     ("mistake", "says"),
     [
-        (lambda: face.load("two_aera"), "built-in: ieee118"),
+        (lambda: face.load("two_aera"), "built-in: four_vsc, "),
         (lambda: face.load("infinite_bus").scenario(), "2 scenarios; choose one of: dip, load_step"),
         (lambda: face.load("infinite_bus").scenario("dip", step=-1), "step = -1; it must be a time above 0"),
         (lambda: face.load("infinite_bus").scenario("dip", step="1 m"), "step: '1 m' is in m"),

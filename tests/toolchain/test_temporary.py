@@ -1,10 +1,12 @@
 """Temporary folders: those of the living stay, those of the dead go."""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -194,3 +196,16 @@ def test_a_killed_study_leaves_nothing_for_long():
         time.sleep(0.1)
     assert not list(tmp_path.iterdir())
     tmp_path.rmdir()
+
+
+def test_threads_may_make_folders_while_others_disappear(tmp_path, monkeypatch):
+    """Many at a time, as the checks of several FMUs do; each finds the folders that were removed by other means."""
+    monkeypatch.setattr(temporary.tempfile, "tempdir", str(tmp_path))
+
+    def one(_):
+        for _ in range(40):
+            shutil.rmtree(own_folder("threads"))
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(one, range(8)))
+    assert not list(tmp_path.iterdir())
