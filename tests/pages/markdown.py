@@ -54,7 +54,8 @@ def _fenced(source: str) -> str:
         language = Path(written[1]).suffix.removeprefix(".")
         return f"<!-- file: {written[1]} -->\n```{language}\n{source[written.end() :]}\n```\n"
     blocks = []
-    for shell, lines in groupby(source.splitlines(), key=lambda line: line.startswith("!")):
+    whole = source.replace("\\\n", " ")  # a command over several lines
+    for shell, lines in groupby(whole.splitlines(), key=lambda line: line.startswith("!")):
         inside = "\n".join(line.removeprefix("!") for line in lines)
         blocks.append(f"```{'sh' if shell else 'python'}\n{inside}\n```\n")
     return "".join(blocks)
