@@ -43,7 +43,9 @@ def _check_meant(draft: Draft) -> None:
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
             draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
-        if plans and not any(fnmatch.fnmatchcase(v, variable) for p in plans for v in p.description.variables):
+        elsewhere = any(fnmatch.fnmatchcase(known, variable) for known in RANGES)  # of a part that another scenario has
+        here = (v for p in plans for v in p.description.variables)
+        if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
                 draft.place("meant"), f"{pattern!r}: {component} has no variable {variable!r}; `gfor info` lists them"
             )
