@@ -25,6 +25,9 @@ from orchestrator.study.measured import is_measured, measured_modes
 if TYPE_CHECKING:
     import xarray as xr
 
+_SHOWN = 40
+"""Largest number of signals that an error names; the others are counted."""
+
 _WEAKEST = 1e-3
 
 
@@ -131,9 +134,10 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     if found is None:
         known = list(map(str, dataset.data_vars))
         hint = close_names(expression, known)
+        some = ", ".join(known[:_SHOWN]) + (f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else "")
         raise InputError(
-            f"{label}: signal {expression!r} was not recorded; there are: {', '.join(known[:12])} …; "
-            f"{hint + ' ' if hint else ''}A signal is 'a.b', or the difference 'a.b - c.d' of two"
+            f"{label}: signal {expression!r} was not recorded; there are: {some}; {hint + ' ' if hint else ''}"
+            "a signal is 'a.b', or the difference 'a.b - c.d' of two"
         )
     return found
 

@@ -177,7 +177,7 @@ class _Reading:
                 text = "load of constant current: a constant impedance that draws the same at the file's voltage"
                 self._changes.note(record.line, text)
             own = 0j
-            if self._raw.revision >= 35 and record.whole(16, "DGENM", 0) == 1:
+            if self._raw.revision >= 34 and record.whole(16, "DGENM", 0) == 1:  # 34 calls it DGENF
                 own = complex(record.number(14, "DGENP", 0.0), record.number(15, "DGENQ", 0.0))
                 if own:
                     self._changes.note(record.line, "distributed generation: taken away from its load")

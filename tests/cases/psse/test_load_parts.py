@@ -59,10 +59,10 @@ def test_the_rest_follows_the_case(written):
     assert other.active.z == 1
 
 
-def test_several_loads_at_a_bus_and_distributed_generation(written):
-    data = written(
-        "4,'2 ',1,1,1,10,4,20,8,0,0,1,1,0,6,1,1", "4,'3 ',1,1,1,0,0,0,0,7,2", revision=35, keep_load_parts=True, **POWER
-    )
+@pytest.mark.parametrize("revision", [34, 35])
+def test_several_loads_at_a_bus_and_distributed_generation(revision, written):
+    records = ("4,'2 ',1,1,1,10,4,20,8,0,0,1,1,0,6,1,1", "4,'3 ',1,1,1,0,0,0,0,7,2")
+    data = written(*records, revision=revision, keep_load_parts=True, **POWER)
     (load,) = [x for x in data.loads if x.bus == "bus_4"]
     for v in (0.9, 1.1):
         assert drawn(load, v) == pytest.approx((10 - 6 + 20 * v + 7 * v**2, 4 - 1 + 8 * v - 2 * v**2))
