@@ -1,5 +1,7 @@
 """Libraries that only some users need: the extra that installs each, and one error where one is missing."""
 
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 EXTRAS = {
@@ -47,3 +49,12 @@ def require(purpose: str, *libraries: str) -> None:
             f"{purpose} needs {', '.join(missing)}, which {are} not installed; "
             f"install what is missing with `pip install 'gfor-cosim[{extras}]'`"
         )
+
+
+@cache
+def installed_version(library: str) -> str:
+    """Version of an installed distribution; empty text where it is not installed."""
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""

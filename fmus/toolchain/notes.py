@@ -12,12 +12,13 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from importlib.metadata import EntryPoint, PackageNotFoundError, version
+from importlib.metadata import EntryPoint
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from fmus.toolchain.extras import installed_version
 
 _OWN = ("fmus", "gfor_fmu")
 _ENDINGS = {".py", ".c", ".h"}
@@ -53,7 +54,13 @@ def note_of(entry: EntryPoint, asked: str) -> Path | None:
     """Path of a note, whether it is there or not; None for a model of another distribution."""
     if entry.module.partition(".")[0] not in _OWN:
         return None
-    parts = [entry.value, asked, _code_loaded(), *machine(), *(f"{name} {_version(name)}" for name in _LIBRARIES)]
+    parts = [
+        entry.value,
+        asked,
+        _code_loaded(),
+        *machine(),
+        *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
+    ]
     return cache_directory("notes") / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
 
 
@@ -81,14 +88,6 @@ def _code_now() -> str:
 def _code_loaded() -> str:
     """The code when this module was imported, and with it what is loaded."""
     return _code_now()
-
-
-@cache
-def _version(library: str) -> str:
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return ""
 
 
 _code_loaded()

@@ -8,13 +8,13 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from fmus.toolchain.extras import installed_version
 from orchestrator.cases.source_tables import SourceTables
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
@@ -52,13 +52,7 @@ def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> 
 
 
 def _versions() -> dict[str, str]:
-    found = {}
-    for library in LIBRARIES:
-        try:
-            found[library] = version(library)
-        except PackageNotFoundError:
-            found[library] = ""
-    return found
+    return {library: installed_version(library) for library in LIBRARIES}
 
 
 def _as_json(tables: SourceTables) -> dict[str, Any]:

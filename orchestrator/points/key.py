@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections.abc import Mapping
 from functools import cache, lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.extras import installed_version
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
@@ -106,13 +107,7 @@ def _file_hash(path: Path, mtime_ns: int, size: int) -> str:
 @cache
 def library_versions() -> dict[str, str]:
     """Versions of `LIBRARIES`; empty text for one that is not installed."""
-    found = {}
-    for library in LIBRARIES:
-        try:
-            found[library] = version(library)
-        except PackageNotFoundError:
-            found[library] = ""
-    return found
+    return {library: installed_version(library) for library in LIBRARIES}
 
 
 @cache

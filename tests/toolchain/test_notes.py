@@ -33,8 +33,8 @@ def test_what_is_asked_and_of_which_code_names_the_note():
 @pytest.mark.parametrize("library", notes._LIBRARIES)
 def test_another_version_of_a_library_names_another_note(monkeypatch, library):
     before = note_of(OURS, "a")
-    installed = notes._version
-    monkeypatch.setattr(notes, "_version", lambda name: "0.0.1" if name == library else installed(name))
+    installed = notes.installed_version
+    monkeypatch.setattr(notes, "installed_version", lambda name: "0.0.1" if name == library else installed(name))
     assert note_of(OURS, "a") != before
 
 
