@@ -31,13 +31,14 @@ class OuterControl:
 @dataclass(frozen=True)
 class Converter:
     """Outputs of every variant: current into the grid (network frame), control signals, internal magnitudes [pu,
-    S_n].
+    S_n]; the demanded current in parts of its limit where the model has the limit.
     """
 
     current: Phasor
     control: OuterControl
     u: ca.SX
     i_s: ca.SX
+    current_demand: ca.SX | None = None
 
 
 def grid_forming_converter() -> Model:
@@ -53,12 +54,17 @@ def grid_forming_converter() -> Model:
 def declare_converter(m: ModelBuilder, port: DevicePort, measured: ca.SX | None = None) -> Converter:
     """Everything behind a port, whatever its inputs are; ``measured`` as `outer_control`."""
     electrical = declare_filter(m, port)
-    droop = declare_droop(m, electrical.initial, power(electrical.u, electrical.i_g.value))
+    P, Q = m.algebraic("P"), m.algebraic("Q")
+    droop = declare_droop(m, electrical.initial, Phasor(P, Q))
     control = outer_control(m, droop, port.omega_b, measured)
-    v_c = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref)
+    v_c, limited = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref)
+    # Exactly the power at the capacitor while nothing is limited.
+    s = power(electrical.u + limited.informed, electrical.i_g.value)
+    m.close(P, s.re)
+    m.close(Q, s.im)
     filter_equations(m, electrical, port, v_c, droop.theta, control.omega)
     current = electrical.i_g.value.rotated(droop.theta)
-    return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude())
+    return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude(), limited.share)
 
 
 def outer_control(m: ModelBuilder, droop: Droop, omega_b: ca.SX, measured: ca.SX | None = None) -> OuterControl:
@@ -94,3 +100,7 @@ def declare_converter_outputs(m: ModelBuilder, converter: Converter) -> None:
     m.output("delta_q_pod", control.delta_q, "pu", "Supplementary reactive-power reference of POD-Q", base="S_n")
     m.output("u", converter.u, "pu", "Voltage magnitude at the filter capacitor", base="S_n")
     m.output("i_s", converter.i_s, "pu", "Current magnitude in the converter", base="S_n")
+    if converter.current_demand is not None:
+        m.output(
+            "current_demand", converter.current_demand, "1", "Demanded current in parts of its limit; above 1 it acts"
+        )

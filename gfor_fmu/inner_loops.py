@@ -3,15 +3,16 @@
 import casadi as ca
 
 from fmus.converter_parts.current_control import current_control
-from fmus.converter_parts.filter import APPENDIX, Filter, SteadyState
+from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
+from gfor_fmu.current_limit import BOX, CurrentLimit, LimitedCurrent, declare_current_limit, limited_current
 
-LIMIT_SOURCE = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
-
-def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Phasor) -> Phasor:
-    """Declare both loops and return the voltage that the converter applies [pu, S_n].
+def inner_loops(
+    m: ModelBuilder, f: MeasuredFilter, omega_b: ca.SX, w: ca.SX, u_ref: Phasor
+) -> tuple[Phasor, LimitedCurrent]:
+    """Declare both loops; return the voltage that the converter applies [pu, S_n], and the limit at work.
 
     Parameters
     ----------
@@ -31,7 +32,6 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
     with m.scope("voltage_control"):
         tau = m.parameter("tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX)
         xi = m.parameter("xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX)
-        i_q_max, i_d_max = declare_current_limits(m, start)
         C_c = f.B_c / omega_b
         omega_n = 4 / (tau * xi)
         k_p = 2 * xi * omega_n * C_c * 100  # the factor 100 is the paper's
@@ -39,27 +39,13 @@ def inner_loops(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, u_ref: Pha
         x = qd_state(m, "x", start.i_s - Phasor(0, f.B_c) * start.u - start.i_g, "Integrator of the voltage loop")
         error = u_ref - f.u
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
-        i_ref = demanded.clamped(i_q_max, i_d_max)
-        _integrate_unless_clamped(m, x, k_i * error, demanded, i_q_max, i_d_max)
-    return current_control(m, f, omega_b, w, i_ref, u_lagged)
+    limit = declare_current_limit(m, start)
+    found = limited_current(limit, demanded, k_p)
+    _integrate_what_is_left(m, x, limit, found, k_i, error)
+    return current_control(m, f, omega_b, w, found.allowed, u_lagged), found
 
 
-def declare_current_limits(m: ModelBuilder, start: SteadyState) -> tuple[ca.SX, ca.SX]:
-    """Declare the limits of i_q,ref and i_d,ref; a dispatch beyond them is refused."""
-    i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
-    i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=LIMIT_SOURCE)
-    m.require(
-        i_q_max - ca.fabs(start.i_s.re),
-        "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
-    )
-    m.require(
-        i_d_max - ca.fabs(start.i_s.im),
-        "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
-    )
-    return i_q_max, i_d_max
-
-
-def _feed_forwards(m: ModelBuilder, f: Filter) -> tuple[Phasor, Phasor]:
+def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
     """Lagged capacitor voltage, and lagged grid current."""
     with m.scope("feed_forward"):
         tau = m.parameter("tau", 1e-4, "s", "Lag of both feed-forwards", minimum=1e-5, source=APPENDIX)
@@ -71,14 +57,13 @@ def _feed_forwards(m: ModelBuilder, f: Filter) -> tuple[Phasor, Phasor]:
     return u.value, i_g.value
 
 
-def _integrate_unless_clamped(
-    m: ModelBuilder, x: QdState, rate: Phasor, demanded: Phasor, i_q_max: ca.SX, i_d_max: ca.SX
+def _integrate_what_is_left(
+    m: ModelBuilder, x: QdState, limit: CurrentLimit, found: LimitedCurrent, k_i: ca.SX, error: Phasor
 ) -> None:
-    """Freeze each component of the integrator while that component of the reference is at its limit."""
-    x.set_derivative(
-        m,
-        Phasor(
-            ca.if_else(ca.fabs(demanded.re) < i_q_max, rate.re, 0),
-            ca.if_else(ca.fabs(demanded.im) < i_d_max, rate.im, 0),
-        ),
-    )
+    """Anti-windup. In the paper's box each component stands still while it is clamped; behind the other limits the
+    voltage that they take away is no error.
+    """
+    box, left = limit.is_kind(BOX), error - found.missing
+    q_stops = ca.logic_and(box, ca.fabs(found.demanded.re) >= limit.box.i_q_max)
+    d_stops = ca.logic_and(box, ca.fabs(found.demanded.im) >= limit.box.i_d_max)
+    x.set_derivative(m, Phasor(ca.if_else(q_stops, 0, k_i * left.re), ca.if_else(d_stops, 0, k_i * left.im)))

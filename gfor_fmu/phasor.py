@@ -14,8 +14,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import device_port
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
+from gfor_fmu.current_limit import declare_box_limits
 from gfor_fmu.droop import declare_droop
-from gfor_fmu.inner_loops import declare_current_limits
 
 
 def grid_forming_converter_phasor() -> Model:
@@ -54,5 +54,5 @@ def _capacitor_current(f: FilterData, u: Phasor) -> Phasor:
 
 def _of_limit(m: ModelBuilder, f: FilterData, i_s: Phasor) -> ca.SX:
     with m.scope("voltage_control"):
-        i_q_max, i_d_max = declare_current_limits(m, f.initial)
-    return ca.fmax(ca.fabs(i_s.re) / i_q_max, ca.fabs(i_s.im) / i_d_max)
+        box = declare_box_limits(m, f.initial)
+    return ca.fmax(ca.fabs(i_s.re) / box.i_q_max, ca.fabs(i_s.im) / box.i_d_max)

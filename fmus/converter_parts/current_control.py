@@ -2,12 +2,14 @@
 
 import casadi as ca
 
-from fmus.converter_parts.filter import APPENDIX, Filter
+from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 
 
-def current_control(m: ModelBuilder, f: Filter, omega_b: ca.SX, w: ca.SX, i_ref: Phasor, u_lagged: Phasor) -> Phasor:
+def current_control(
+    m: ModelBuilder, f: MeasuredFilter, omega_b: ca.SX, w: ca.SX, i_ref: Phasor, u_lagged: Phasor
+) -> Phasor:
     """Declare the controller and return the voltage that the converter applies [pu, S_n].
 
     Its gains L_c/τ and R_c/τ cancel the inductor's pole, so that the current follows its reference as 1/(1 + s·τ).

@@ -9,7 +9,7 @@ import casadi as ca
 
 from fmus.toolchain.frames import Phasor, QdState, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import BREAKER_TIME, DevicePort
+from fmus.toolchain.port import BREAKER_TIME, DevicePort, OperatingPoint
 
 APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"
 STAMP = "STAMP toolbox of the paper's group"
@@ -41,19 +41,25 @@ class FilterData:
 
 
 @dataclass(frozen=True)
-class Filter(FilterData):
-    """The filter with its states and algebraic quantities.
+class MeasuredFilter(FilterData):
+    """The filter as its control sees it: all that the control needs to know of the circuit.
 
     ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
     """
 
     i_s: QdState
-    u_c: QdState
     i_g: QdState
     u: Phasor
 
 
-def declare_filter_data(m: ModelBuilder, port: DevicePort) -> FilterData:
+@dataclass(frozen=True)
+class Filter(MeasuredFilter):
+    """The filter with all its states."""
+
+    u_c: QdState
+
+
+def declare_filter_data(m: ModelBuilder, port: OperatingPoint) -> FilterData:
     """Declare parameters alone; the power flow gives the operating point."""
     with m.scope("filter"):
         R_c = m.parameter("R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX)
@@ -111,7 +117,7 @@ def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, 
 
 
 def _steady_state(
-    port: DevicePort, R_c: ca.SX, X_c: ca.SX, B_c: ca.SX, R_t: ca.SX, X_t: ca.SX, R_cap: ca.SX
+    port: OperatingPoint, R_c: ca.SX, X_c: ca.SX, B_c: ca.SX, R_t: ca.SX, X_t: ca.SX, R_cap: ca.SX
 ) -> SteadyState:
     u_network = port.v_0 + Phasor(R_t, X_t) * port.i_0
     theta = u_network.angle()

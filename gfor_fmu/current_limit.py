@@ -1,0 +1,198 @@
+"""Limits of the current reference: the paper's, and three that keep the converter a voltage source.
+
+Each of the three acts like an impedance Z between the voltage reference and the capacitor, which grows with the demand.
+The voltage control turns a voltage into a demand by its gain k_p: a demand i* gives the reference i = i*/(1 + k_p·Z).
+What the limit takes from the voltage is Z·i = (i* − i)/k_p. It is exactly 0 while the limit does not act.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from fmus.converter_parts.filter import SteadyState
+from fmus.toolchain.frames import ZERO, Phasor
+from fmus.toolchain.model_builder import ModelBuilder
+
+PAPER = "Mateu-Barriendos et al. 2024, appendix, current saturation"
+
+BOX, CIRCULAR, THRESHOLD_IMPEDANCE, SATURATION_INFORMED = range(4)
+"""Values of ``current_limit.kind``."""
+
+_NEWTON = 8
+"""Steps of Newton's method for the current behind a threshold impedance: down to rounding for demands up to 100 pu."""
+
+_SMALLEST = 1e-12
+"""Least value under a root. It keeps derivatives finite where the limit does not act."""
+
+
+@dataclass(frozen=True)
+class BoxLimits:
+    """Limits of i_q,ref and i_d,ref in the paper's saturation [pu, S_n]."""
+
+    i_q_max: ca.SX
+    i_d_max: ca.SX
+
+
+@dataclass(frozen=True)
+class CurrentLimit:
+    """Parameters of the limit.
+
+    Attributes
+    ----------
+    kind
+        Which limit acts: a number of 0 to 3.
+    box
+        Limits of the paper's saturation [pu, S_n].
+    I_max, threshold
+        Largest current, and the current from which a threshold impedance acts [pu, S_n].
+    angle
+        Angle of the impedance that the circular limit acts like [rad].
+    X_R, slope
+        X/R of a threshold impedance [1], and its resistance for 1 pu beyond the threshold [pu, S_n].
+    """
+
+    kind: ca.SX
+    box: BoxLimits
+    I_max: ca.SX
+    threshold: ca.SX
+    angle: ca.SX
+    X_R: ca.SX
+    slope: ca.SX
+
+    def is_kind(self, *kinds: int) -> ca.SX:
+        """Whether the limit is one of these kinds."""
+        return ca.logic_and(self.kind > min(kinds) - 0.5, self.kind < max(kinds) + 0.5)
+
+
+@dataclass(frozen=True)
+class LimitedCurrent:
+    """A current reference within its limit.
+
+    Attributes
+    ----------
+    demanded, allowed
+        The reference before and behind the limit [pu, S_n].
+    missing
+        Voltage Z·i that the limit takes away [pu, S_n]; 0 of the paper's saturation, which stops integrators instead.
+    informed
+        The part of it that the power measurement is told [pu, S_n]: all of it, or 0.
+    share
+        The demand in parts of the largest that passes unchanged; the limit acts above 1.
+    """
+
+    demanded: Phasor
+    allowed: Phasor
+    missing: Phasor
+    informed: Phasor
+    share: ca.SX
+
+
+def declare_box_limits(m: ModelBuilder, start: SteadyState, kind: ca.SX | float = float(BOX)) -> BoxLimits:
+    """Declare the limits of i_q,ref and i_d,ref; a dispatch beyond them is refused if that kind of limit acts."""
+    i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=PAPER)
+    i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=PAPER)
+    acts = ca.SX(kind) < BOX + 0.5
+    m.require(
+        ca.if_else(acts, i_q_max - ca.fabs(start.i_s.re), 1),
+        "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
+    )
+    m.require(
+        ca.if_else(acts, i_d_max - ca.fabs(start.i_s.im), 1),
+        "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
+    )
+    return BoxLimits(i_q_max, i_d_max)
+
+
+def declare_current_limit(m: ModelBuilder, start: SteadyState) -> CurrentLimit:
+    """Declare the limit; a dispatch that it would change is refused."""
+    with m.scope("current_limit"):
+        kind = m.parameter(
+            "kind", BOX, "1", "0: box in q and d; 1: circular; 2: threshold virtual impedance; 3: saturation-informed",
+            minimum=0, maximum=3, type="Integer", source=PAPER,
+        )  # fmt: skip
+        I_max = m.parameter(
+            "I_max", 1.1, "pu", "Largest current of kinds 1 to 3", base="S_n", minimum=0.1, source=PAPER
+        )
+        threshold = m.parameter("threshold", 1.0, "pu", "Current from which kind 2 acts", base="S_n", minimum=0.05)
+        angle = m.parameter(
+            "angle", 0.7854, "rad", "Angle of the impedance that kinds 1 and 3 act like; 0: the demand's angle is kept",
+            minimum=0, maximum=1.5708,
+        )  # fmt: skip
+        X_R = m.parameter("X_R", 5.0, "1", "X/R of the impedance of kind 2", minimum=0, maximum=100)
+        slope = m.calculated(
+            "slope", start.u.re / (I_max * ca.fmax(I_max - threshold, 1e-6) * ca.sqrt(1 + X_R**2)), "pu",
+            "Resistance of kind 2 for 1 pu beyond the threshold: a short circuit at the capacitor gives I_max", "S_n",
+        )  # fmt: skip
+    with m.scope("voltage_control"):
+        limit = CurrentLimit(kind, declare_box_limits(m, start, kind), I_max, threshold, angle, X_R, slope)
+    m.require(
+        ca.if_else(limit.is_kind(THRESHOLD_IMPEDANCE), I_max - threshold, 1),
+        "current_limit.threshold must be below current_limit.I_max",
+    )
+    m.require(
+        ca.if_else(limit.is_kind(CIRCULAR, SATURATION_INFORMED), I_max - start.i_s.magnitude(), 1),
+        "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",
+    )
+    m.require(
+        ca.if_else(limit.is_kind(THRESHOLD_IMPEDANCE), threshold - start.i_s.magnitude(), 1),
+        "the power flow asks for more current than current_limit.threshold: lower P_0 or Q_0, or raise S_n",
+    )
+    return limit
+
+
+def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: ca.SX) -> LimitedCurrent:
+    """Apply the limit.
+
+    Parameters
+    ----------
+    limit
+        Its parameters.
+    demanded
+        Current reference without a limit, converter's frame [pu, S_n].
+    k_p
+        Proportional gain of the voltage control [pu, S_n].
+    """
+    size = ca.sqrt(ca.fmax(demanded.re**2 + demanded.im**2, _SMALLEST))
+    box, threshold = limit.is_kind(BOX), limit.is_kind(THRESHOLD_IMPEDANCE)
+    free = ca.if_else(threshold, limit.threshold, limit.I_max)
+    acts = ca.logic_and(size > free, ca.logic_not(box))
+    drop = _where(threshold, _threshold_drop(limit, size, k_p), _circular_drop(limit, size))
+    passed = demanded / (Phasor(1.0, 0.0) + _where(acts, drop, ZERO))
+    missing = (demanded - passed) / k_p
+    clamped = demanded.clamped(limit.box.i_q_max, limit.box.i_d_max)
+    of_box = ca.fmax(ca.fabs(demanded.re) / limit.box.i_q_max, ca.fabs(demanded.im) / limit.box.i_d_max)
+    return LimitedCurrent(
+        demanded,
+        _where(box, clamped, passed),
+        missing,
+        _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
+        ca.if_else(box, of_box, size / free),
+    )
+
+
+def _where(condition: ca.SX, then: Phasor, otherwise: Phasor) -> Phasor:
+    return Phasor(ca.if_else(condition, then.re, otherwise.re), ca.if_else(condition, then.im, otherwise.im))
+
+
+def _circular_drop(limit: CurrentLimit, size: ca.SX) -> Phasor:
+    """k_p·Z of the impedance with the chosen angle φ that leaves exactly I_max: |1 + k_p·Z| = m = |i*|/I_max."""
+    cos, sin = ca.cos(limit.angle), ca.sin(limit.angle)
+    m = ca.fmax(size / limit.I_max, 1)
+    drop = ca.sqrt(ca.fmax(m**2 - sin**2, _SMALLEST)) - cos
+    return Phasor(drop * cos, drop * sin)
+
+
+def _threshold_drop(limit: CurrentLimit, size: ca.SX, k_p: ca.SX) -> Phasor:
+    """k_p·Z of Z = slope·(|i| − threshold)·(1 + j·X_R), at the current that solves |i|·|1 + k_p·Z| = |i*|.
+
+    The square of the left-hand side is convex in |i|: Newton's method converges from any value above the solution.
+    """
+    a, I_th = k_p * limit.slope, limit.threshold
+    demand = ca.fmax(size, I_th)
+    over = (demand - I_th) / (1 + a * I_th)
+    for _ in range(_NEWTON):
+        i, r, x = I_th + over, 1 + a * over, a * limit.X_R * over
+        square = r**2 + x**2
+        slope = 2 * i * square + 2 * i**2 * a * (r + limit.X_R * x)
+        over = over - (i**2 * square - demand**2) / slope
+    return Phasor(a * over, a * over * limit.X_R)
