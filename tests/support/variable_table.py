@@ -29,6 +29,7 @@ LEAFLETS = {
     "external_grid_phasor": ROOT / "fmus" / "external_grid" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
+    "test_bench": ROOT / "fmus" / "test_bench" / "README.md",
     "probe_a": ROOT / "fmus" / "probe" / "README.md",
     "probe_b": ROOT / "fmus" / "probe" / "README.md",
 }

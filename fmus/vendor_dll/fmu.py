@@ -1,0 +1,226 @@
+"""An IEEE/CIGRE DLL as an FMU for co-simulation by FMI 2.0."""
+
+import hashlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from pathlib import Path
+from typing import Any
+
+from fmus.toolchain.archive import digest_of, guid_of, write_archive
+from fmus.toolchain.c_text import identity_source
+from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, recipe
+from fmus.toolchain.temporary import own_folder, remove
+from fmus.vendor_dll.description import dll_description
+from fmus.vendor_dll.device import Device
+from fmus.vendor_dll.interface import DATA_TYPES, DllInterface
+from fmus.vendor_dll.source import device_variables, host_source, host_variables
+from fmus.vendor_dll.state_trial import Trial
+
+_LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
+_LONGEST = 60
+"""A DLL that takes longer to tell what it is, or for the trial [s]."""
+
+_FORMATS = (
+    (b"\x7fELF\x02", "linux64", "a library for 64-bit Linux"),
+    (b"\x7fELF\x01", None, "a library for 32-bit Linux"),
+    (b"MZ", "win64", "a Windows DLL"),
+    (b"\xcf\xfa\xed\xfe", "darwin64", "a library for macOS"),
+)
+
+
+class DllError(ValueError):
+    """A DLL cannot be made into an FMU."""
+
+
+@dataclass(frozen=True)
+class VendorDll:
+    """A vendor's DLL, as it describes itself.
+
+    Attributes
+    ----------
+    interface
+        What it declares.
+    trial
+        How it keeps its state.
+    platform
+        FMI 2.0 name of the platform it is for.
+    """
+
+    path: Path
+    interface: DllInterface
+    trial: Trial
+    platform: str
+
+    @property
+    def identifier(self) -> str:
+        """Name of the FMU: the model's own, as a name in C."""
+        name = re.sub(r"\W+", "_", self.interface.texts["ModelName"] or self.path.stem, flags=re.ASCII).strip("_")
+        return name if name[:1].isalpha() else f"dll_{name}"
+
+
+READER = "fmus.vendor_dll.reading"
+"""Module whose process reads a DLL."""
+
+
+def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
+    """Read a DLL in a process of its own, and try how it keeps its state.
+
+    Parameters
+    ----------
+    path
+        The vendor's file.
+    reader
+        Module that is run for it; one that closes its process off first.
+
+    Raises
+    ------
+    DllError
+        If it is no such DLL, is not for this machine, or declares what no host can run.
+    """
+    path = Path(path).absolute()
+    platform = _platform_of(path)
+    answer, end = _ask(path, reader, "--try")
+    if end and not answer:
+        answer, again = _ask(path, reader)
+        if again and not answer:
+            raise DllError(f"{path.name}: the process that loads it {end}; ask its author for a DLL that loads")
+        answer["trial"] = Trial("not tried", why=f"with inputs that move, the process that ran it {end}").as_json()
+    if "error" in answer:
+        raise DllError(f"{path.name}: {answer['error']}")
+    interface = DllInterface.from_json(answer["interface"])
+    if faults := interface.faults():
+        raise DllError(f"{path.name}: {'; '.join(faults)}; its author must mend that")
+    return VendorDll(path, interface, Trial.from_json(answer["trial"]), platform)
+
+
+def _platform_of(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            head = file.read(8)
+    except OSError as error:
+        raise DllError(f"{path.name}: cannot be read: {error.strerror}") from error
+    here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
+    for mark, platform, words in _FORMATS:
+        if head.startswith(mark):
+            if platform != here:
+                raise DllError(
+                    f"{path.name}: it is {words}, and this machine runs {here}; ask its author for such a build, or "
+                    "build the FMU on a machine of its kind"
+                )
+            assert platform is not None
+            return platform
+    raise DllError(
+        f"{path.name}: it is no shared library (it begins with {head[:4]!r}); give the vendor's .dll or .so file"
+    )
+
+
+def _ask(path: Path, reader: str, *more: str) -> tuple[dict[str, Any], str]:
+    """The answer of the reading process, and how it ended where it gave none."""
+    folder = own_folder("dll")
+    try:
+        answer = folder / "answer.json"
+        command = [sys.executable, "-m", reader, str(path), str(answer), *more]
+        search = [entry for entry in sys.path if entry] + [str(Path(__file__).parents[2])]
+        try:
+            done = subprocess.run(
+                command,
+                check=False,
+                cwd=folder,
+                timeout=_LONGEST,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
+            )
+        except subprocess.TimeoutExpired:
+            return {}, f"does not end within {_LONGEST} s"
+        if answer.exists():
+            found: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
+            return found, ""
+        name = signal.Signals(-done.returncode).name if done.returncode < 0 else f"exit code {done.returncode}"
+        return {}, f"ends with {name}"
+    finally:
+        remove(folder)
+
+
+def dll_fmu(
+    dll: VendorDll, destination: Path, texts: Mapping[str, str] | None = None, device: Device | None = None
+) -> Path:
+    """Write the FMU of a DLL into a folder; it holds the DLL itself.
+
+    Parameters
+    ----------
+    dll
+        The DLL, as it was read.
+    destination
+        The folder.
+    texts
+        Value of parameters that are text; by default the DLL's own.
+    device
+        The circuit around the controller; by default there is none.
+
+    Returns
+    -------
+    pathlib.Path
+        The FMU.
+
+    Raises
+    ------
+    DllError
+        If there is no such parameter.
+    """
+    return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
+
+
+def dll_members(
+    dll: VendorDll, texts: Mapping[str, str] | None = None, device: Device | None = None
+) -> dict[str, bytes]:
+    """Members of the archive, by path; otherwise as `dll_fmu`."""
+    given = dict(texts or {}) | dict(device.texts if device else {})
+    _check_texts(dll, given)
+    interface = device.with_parameters(dll.interface) if device else dll.interface
+    circuit = device.around(dll.identifier) if device else None
+    variables = host_variables(interface, dll.trial)
+    if device and circuit:
+        variables = device_variables(interface, dll.trial, device, circuit)
+    _check_names(dll, [v.name for v in variables])
+    content = dll.path.read_bytes()
+    file = re.sub(r"[^\w.-]", "_", dll.path.name, flags=re.ASCII)
+    around = (device, circuit) if device and circuit else None
+    code = host_source(interface, dll.trial, given, file, variables, around)
+    tool = f"gfor-cosim {version_of('gfor-cosim')}"
+
+    def described(guid: str) -> bytes:
+        return dll_description(interface, dll.trial, variables, guid, dll.identifier, tool, circuit)
+
+    digest = digest_of(code, described("").decode(), hashlib.sha256(content).hexdigest(), *recipe())
+    guid, (target, *_) = guid_of(digest), TARGETS[dll.platform]
+    host = compile_for(identity_source(guid, digest) + code, target, ENDINGS[dll.platform], _LIBRARIES[dll.platform])
+    return {
+        "modelDescription.xml": described(guid),
+        f"binaries/{dll.platform}/{dll.identifier}{ENDINGS[dll.platform]}": host.read_bytes(),
+        f"resources/{file}": content,
+    }
+
+
+def _check_texts(dll: VendorDll, given: Mapping[str, str]) -> None:
+    words = {p.name for p in dll.interface.parameters if DATA_TYPES[p.data_type].kind == "String"}
+    if unknown := sorted(given.keys() - words):
+        has = ", ".join(sorted(words)) or "none"
+        raise DllError(f"{dll.path.name}: {unknown[0]!r} is no parameter that is text; there are: {has}")
+
+
+def _check_names(dll: VendorDll, names: Sequence[str]) -> None:
+    taken = Counter(names)
+    if twice := [name for name, count in taken.items() if count > 1]:
+        raise DllError(
+            f"{dll.path.name}: the name {twice[0]!r} would stand for two variables of the FMU; rename it in the DLL"
+        )

@@ -1,0 +1,156 @@
+"""Read what a DLL declares, and try how it keeps its state. Run as a process of its own: foreign code may do anything.
+
+``python -m fmus.vendor_dll.reading FILE ANSWER`` writes JSON to the file ANSWER; the DLL may print what it likes.
+"""
+
+import ctypes as c
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from fmus.vendor_dll.interface import CALLS, DATA_TYPES, DllInterface, DllParameter, Number, Signal
+from fmus.vendor_dll.state_trial import Trial, tried
+
+_TEXTS = (
+    *("ModelName", "ModelVersion", "ModelDescription", "GeneralInformation", "ModelCreated", "ModelCreator"),
+    *("ModelLastModifiedDate", "ModelLastModifiedBy", "ModelModifiedComment", "ModelModifiedHistory"),
+)
+_MOST = 100_000
+"""More signals or parameters than this are taken for a structure of another layout."""
+
+
+class _Value(c.Union):
+    """A default, or a bound."""
+
+    _fields_ = (
+        *(("char", c.c_int8), ("c_string", c.c_char_p), ("int8", c.c_int8), ("uint8", c.c_uint8)),
+        *(("int16", c.c_int16), ("uint16", c.c_uint16), ("int32", c.c_int32), ("uint32", c.c_uint32)),
+        *(("real32", c.c_float), ("real64", c.c_double)),
+    )
+
+
+class _Signal(c.Structure):
+    _fields_ = (
+        *((name, c.c_char_p) for name in ("name", "description", "unit")),
+        ("data_type", c.c_int),
+        ("width", c.c_int32),
+    )
+
+
+class _Parameter(c.Structure):
+    _fields_ = (
+        *((name, c.c_char_p) for name in ("name", "group", "description", "unit")),
+        ("data_type", c.c_int),
+        ("fixed", c.c_int32),
+        *((name, _Value) for name in ("default", "minimum", "maximum")),
+    )
+
+
+class _ModelInfo(c.Structure):
+    _fields_ = (
+        ("interface_version", c.c_uint8 * 4),
+        *((name, c.c_char_p) for name in _TEXTS),
+        ("sample_time", c.c_double),
+        ("mode", c.c_uint8),
+        *(("n_inputs", c.c_int32), ("inputs", c.POINTER(_Signal))),
+        *(("n_outputs", c.c_int32), ("outputs", c.POINTER(_Signal))),
+        *(("n_parameters", c.c_int32), ("parameters", c.POINTER(_Parameter))),
+        *((name, c.c_int32) for name in ("int_states", "float_states", "double_states")),
+    )
+
+
+def read_interface(library: c.CDLL) -> DllInterface:
+    """What a loaded DLL declares.
+
+    Raises
+    ------
+    ValueError
+        If it declares nothing, or numbers that no DLL has.
+    """
+    try:
+        get_info = library.Model_GetInfo
+    except AttributeError as error:
+        raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL") from error
+    get_info.restype = c.POINTER(_ModelInfo)
+    found = get_info()
+    if not found:
+        raise ValueError("Model_GetInfo returns no model information")
+    info = found.contents
+    for name in ("n_inputs", "n_outputs", "n_parameters"):
+        if not 0 <= getattr(info, name) <= _MOST:
+            raise ValueError(
+                f"Model_GetInfo tells {getattr(info, name)} {name[2:]}; its structure is of another layout"
+            )
+    return DllInterface(
+        texts={name: _text(getattr(info, name)) for name in _TEXTS},
+        interface_version=tuple(info.interface_version),
+        sample_time=info.sample_time,
+        mode=info.mode,
+        inputs=tuple(_signal(info.inputs[k]) for k in range(info.n_inputs)),
+        outputs=tuple(_signal(info.outputs[k]) for k in range(info.n_outputs)),
+        parameters=tuple(_parameter(info.parameters[k]) for k in range(info.n_parameters)),
+        states=(info.int_states, info.float_states, info.double_states),
+        calls=tuple(name for name in CALLS if hasattr(library, f"Model_{name}")),
+    )
+
+
+def _text(value: bytes | None) -> str:
+    return (value or b"").decode("utf-8", "replace").strip()
+
+
+def _signal(row: _Signal) -> Signal:
+    return Signal(_text(row.name), _text(row.description), _text(row.unit), row.data_type, row.width)
+
+
+def _parameter(row: _Parameter) -> DllParameter:
+    kind = DATA_TYPES.get(row.data_type)
+    text = kind is None or kind.kind == "String"
+
+    def bound(value: _Value) -> Number | None:
+        number: Number = getattr(value, kind.name) if kind else 0
+        return number
+
+    return DllParameter(
+        _text(row.name),
+        _text(row.group),
+        _text(row.description),
+        _text(row.unit),
+        row.data_type,
+        bool(row.fixed),
+        (_text(row.default.c_string) if kind else "") if text else bound(row.default) or 0,
+        None if text else bound(row.minimum),
+        None if text else bound(row.maximum),
+    )
+
+
+def read(path: Path, *, with_trial: bool) -> dict[str, Any]:
+    """What a DLL declares, and how it keeps its state where that is tried, as JSON has it."""
+    library = c.CDLL(str(path))
+    interface = read_interface(library)
+    trial = tried(library, interface, path) if with_trial and not interface.faults() else Trial("not tried")
+    return {"interface": interface.as_json(), "trial": trial.as_json()}
+
+
+def answer_for(path: Path, answer: Path, *, with_trial: bool) -> None:
+    """Write what `read` finds into a file, or the error.
+
+    Parameters
+    ----------
+    path
+        The DLL.
+    answer
+        The file.
+    with_trial
+        As `read`.
+    """
+    found: dict[str, Any]
+    try:
+        found = read(path, with_trial=with_trial)
+    except (OSError, ValueError) as error:
+        found = {"error": str(error)}
+    answer.write_text(json.dumps(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    answer_for(Path(sys.argv[1]), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"])

@@ -1,0 +1,252 @@
+"""The C source of the FMU around a DLL: tables of what the DLL declares, its host, and the functions of FMI 2.0."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fmus.toolchain.c_text import c_number, c_string
+from fmus.toolchain.model import Model
+from fmus.toolchain.variables import Input, Parameter, State, Variable
+from fmus.vendor_dll.circuit import ANGLE, BRIDGE, MEASURED, TRIMS
+from fmus.vendor_dll.circuit_source import circuit_source, kernel_source, no_circuit_source, no_kernel_source
+from fmus.vendor_dll.device import Device
+from fmus.vendor_dll.interface import DATA_TYPES, DllInterface, DllParameter, Place, Signal, layout
+from fmus.vendor_dll.state_trial import Trial
+
+_C = Path(__file__).with_name("c")
+_TOOLCHAIN = Path(__file__).parents[1] / "toolchain" / "c"
+_HEADERS = "#define _GNU_SOURCE\n" + "".join(
+    f"#include <{name}.h>\n" for name in ("math", "stdarg", "stdint", "stdio", "stdlib", "string")
+)
+
+PARAMETER, INITIAL, INPUT, OUTPUT, HELD, INT_STATE, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, SAMPLES = range(10)
+CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(10, 16)
+"""What a variable is to the host. What lies up to `INITIAL` is set before the start."""
+
+CONTROLLER = "controller."
+"""Before the names of the DLL's variables, where a circuit lies around it."""
+
+_ROLES = ("PARAMETER", "INITIAL", "INPUT", "OUTPUT", "HELD", "INT_STATE", "FLOAT_STATE", "DOUBLE_STATE",
+          "MEMORY_STATE", "SAMPLES", "CIRCUIT_PARAMETER", "CIRCUIT_INPUT", "CIRCUIT_STATE",
+          "CIRCUIT_VALUE", "HELD_INPUT", "CONSTANT_INPUT")  # fmt: skip
+_STATES = {INT_STATE: ("IntStates", 6, 4), FLOAT_STATE: ("FloatStates", 8, 4), DOUBLE_STATE: ("DoubleStates", 9, 8)}
+
+
+@dataclass(frozen=True)
+class HostVariable:
+    """A variable of the FMU; its value reference is its place in the list of all.
+
+    Attributes
+    ----------
+    role
+        `PARAMETER` to `SAMPLES`.
+    kind
+        ``Real`` or ``Integer``.
+    data_type
+        The interface's number.
+    offset
+        In the structure or array it lies in [bytes].
+    local
+        Whether it is no output, though it is one of the DLL or the circuit: phase quantities never stand still.
+    """
+
+    name: str
+    role: int
+    kind: str
+    data_type: int
+    offset: int
+    start: float = 0.0
+    unit: str = ""
+    text: str = ""
+    parameter: DllParameter | Parameter | None = None
+    declared: Variable | None = None
+    local: bool = False
+
+    @property
+    def is_state(self) -> bool:
+        """Whether it is a number that the next sample depends on and that a master may set."""
+        own = (HELD, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, CIRCUIT_STATE)
+        return self.role in own and self.data_type in (8, 9)
+
+    @property
+    def fixed(self) -> bool:
+        """Whether a parameter can be set before the start only."""
+        p = self.parameter
+        return not p.tunable if isinstance(p, Parameter) else p is None or p.fixed
+
+
+def device_variables(interface: DllInterface, trial: Trial, device: Device, circuit: Model) -> tuple[HostVariable, ...]:
+    """All variables of a controller with a circuit around it: what the circuit gives the controller is no input.
+
+    Parameters
+    ----------
+    interface, trial
+        What the DLL declares, and how it keeps its state.
+    device
+        What its signals mean at the circuit.
+    circuit
+        The circuit's model.
+    """
+    measured = {route.place.name for route in device.measured}
+    driven = {route.place.name for route in device.driven}
+    found = []
+    for v in host_variables(interface, trial):
+        kept = v
+        if v.role == INPUT and v.name in measured:
+            kept = replace(v, role=HELD_INPUT)
+        elif v.role == INPUT and v.name in device.constants:
+            kept = replace(v, role=CONSTANT_INPUT, start=device.constants[v.name])
+        hidden = v.role == OUTPUT and v.name in driven
+        found.append(replace(kept, name=f"{CONTROLLER}{v.name}", local=hidden))
+    return (*found, *_of_circuit(circuit))
+
+
+def _of_circuit(circuit: Model) -> list[HostVariable]:
+    found = []
+    for place, v in enumerate(circuit.variables):
+        role, kind, start = CIRCUIT_VALUE, "Real", 0.0
+        if isinstance(v, Parameter):
+            role, kind, start = CIRCUIT_PARAMETER, v.type, float(v.start)
+        elif isinstance(v, Input) and v.name in (*BRIDGE, *TRIMS):
+            role = CIRCUIT_STATE if v.name in BRIDGE else CIRCUIT_VALUE
+        elif isinstance(v, Input):
+            role, start = CIRCUIT_INPUT, float(v.start)
+        elif isinstance(v, State) and v.name != ANGLE:
+            role = CIRCUIT_STATE
+        parameter = v if isinstance(v, Parameter) else None
+        hidden = v.name in MEASURED
+        found.append(HostVariable(v.name, role, kind, 9, place, start, v.unit, v.text, parameter, v, hidden))
+    return found
+
+
+def host_variables(interface: DllInterface, trial: Trial) -> tuple[HostVariable, ...]:
+    """All variables of the FMU, in the order of their value references. Text is not among them."""
+    found: list[HostVariable] = []
+    taken = {row.name for rows in (interface.inputs, interface.outputs) for row in rows}
+    for place in _numbers(interface.parameters):
+        assert isinstance(place.row, DllParameter)
+        name = place.name if place.name not in taken else f"parameter.{place.name}"
+        found.append(_variable(place, name, PARAMETER, start=float(place.row.default), parameter=place.row))
+    outputs = _numbers(interface.outputs)
+    for place in outputs:
+        text = f"Value of {place.name} before the first sample, from which the DLL initialises itself"
+        found.append(_variable(place, f"initial.{place.name}", INITIAL, text=text))
+    inputs = {row.name for row in interface.inputs}
+    found += [_variable(place, place.name, INPUT) for place in _numbers(interface.inputs)]
+    for place in outputs:
+        name = place.name if place.row.name not in inputs else f"output.{place.name}"
+        found.append(_variable(place, name, OUTPUT))
+    for place in outputs:
+        if place.row.data_type in (8, 9):
+            text = f"{place.name} as held until the next sample"
+            found.append(_variable(place, f"held.{place.name}", HELD, text=text))
+    for count, role in zip(interface.states, _STATES, strict=True):
+        array, data_type, size = _STATES[role]
+        kind = DATA_TYPES[data_type].kind
+        found += [
+            HostVariable(f"{array}[{k + 1}]", role, kind, data_type, k * size, text=f"Element {k} of the DLL's {array}")
+            for k in range(count)
+        ]
+    for data_type, places in ((9, trial.doubles), (8, trial.floats)):
+        found += [
+            HostVariable(f"memory[{at:#x}]", MEMORY_STATE, "Real", data_type, at, text="In the DLL's own memory")
+            for at in places
+        ]
+    found.append(HostVariable("samples", SAMPLES, "Integer", 6, 0, text="Samples so far"))
+    return tuple(found)
+
+
+def _numbers(rows: Sequence[DllParameter] | Sequence[Signal]) -> list[Place]:
+    return [place for place in layout(rows).places if place.type.kind != "String"]
+
+
+def _variable(
+    place: Place,
+    name: str,
+    role: int,
+    *,
+    start: float = 0.0,
+    text: str = "",
+    parameter: DllParameter | None = None,
+) -> HostVariable:
+    row = place.row
+    text = text or row.description
+    return HostVariable(name, role, place.type.kind, row.data_type, place.offset, start, row.unit, text, parameter)
+
+
+def host_source(
+    interface: DllInterface,
+    trial: Trial,
+    texts: Mapping[str, str],
+    vendor_file: str,
+    variables: Sequence[HostVariable],
+    around: tuple[Device, Model] | None = None,
+) -> str:
+    """The source without its identity.
+
+    Parameters
+    ----------
+    interface, trial
+        What the DLL declares, and how it keeps its state.
+    texts
+        Value of each parameter that is text.
+    vendor_file
+        Name of the DLL in the FMU's resources.
+    variables
+        All of the FMU.
+    around
+        The circuit around the controller, if there is one.
+    """
+    code = [(_C / name).read_text(encoding="utf-8") for name in ("library.c", "host.c")]
+    functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
+    export = (_TOOLCHAIN / "fmi.h").read_text(encoding="utf-8").split("typedef")[0]
+    tables = _tables(interface, trial, texts, vendor_file, variables)
+    before, after = no_kernel_source(), no_circuit_source()
+    if around is not None:
+        device, circuit = around
+        before, after = kernel_source(circuit), circuit_source(circuit, device)
+    return "\n".join([_HEADERS, before, export, *tables, *code, after, functions])
+
+
+def _tables(
+    interface: DllInterface, trial: Trial, texts: Mapping[str, str], vendor_file: str, variables: Sequence[HostVariable]
+) -> list[str]:
+    """Declarations of the DLL's data."""
+    regions = trial.regions
+    sizes = {
+        name: layout(rows).size
+        for name, rows in (
+            ("IN_SIZE", interface.inputs),
+            ("OUT_SIZE", interface.outputs),
+            ("PAR_SIZE", interface.parameters),
+        )
+    }
+    words = [place for place in layout(interface.parameters).places if place.type.kind == "String"]
+    text_inputs = [place for place in layout(interface.inputs).places if place.type.kind == "String"]
+    numbers = sizes | dict(zip(("INTS", "FLOATS", "DOUBLES"), interface.states, strict=True))
+    numbers |= {"NV": len(variables), "TEXTS": len(words), "TEXT_INPUTS": len(text_inputs), "REGIONS": len(regions)}
+    numbers |= {"OWN_STATE": int(trial.state == "library")}
+    numbers |= {"MEMORY": sum(size for _, size in regions), "MODE": 2 if interface.mode == 2 else 1}
+    values = [
+        f"{{{c_string(v.name)}, {v.kind.upper()}, {v.role}, {v.data_type}, {v.offset}, {c_number(v.start)}, "
+        f"{c_number(v.parameter.minimum if v.parameter else None, '-INFINITY')}, "
+        f"{c_number(v.parameter.maximum if v.parameter else None, 'INFINITY')}, "
+        f"{int(v.parameter is not None and not v.fixed)}}}"
+        for v in variables
+    ]
+    given = [texts.get(place.name, str(place.row.default)) for place in words if isinstance(place.row, DllParameter)]
+    return [
+        "enum { " + ", ".join(f"{name} = {value}" for name, value in numbers.items()) + " };",
+        "enum kind { REAL, INTEGER, BOOLEAN };",
+        "enum role { " + ", ".join(_ROLES) + " };",
+        f"static const double SAMPLE_TIME = {max(0.0, interface.sample_time)!r};",
+        f"static const char VENDOR_FILE[] = {c_string(vendor_file)};",
+        "struct variable { const char *name; int kind, role, type; size_t offset; "
+        "double start, minimum, maximum; int tunable; };",
+        f"static const struct variable VARIABLE[] = {{{', '.join(values)}}};",
+        f"static const size_t TEXT_AT[] = {{{', '.join(str(place.offset) for place in words) or '0'}}};",
+        f"static const char *const WORDS[] = {{{', '.join(map(c_string, given)) or '0'}}};",
+        f"static const size_t TEXT_INPUT_AT[] = {{{', '.join(str(place.offset) for place in text_inputs) or '0'}}};",
+        'static const char *const EMPTY = "";',
+        f"static const size_t REGION[][2] = {{{', '.join(f'{{{a}, {b}}}' for a, b in regions) or '{0, 0}'}}};",
+    ]

@@ -1,0 +1,88 @@
+"""A vendor's DLL, or a device's file around one, wherever an FMU can stand: its FMU is built once and kept."""
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+from fmus.toolchain.cache import cache_directory, intact, keep
+from fmus.toolchain.extras import require
+from orchestrator.errors import InputError
+
+DLL_ENDINGS = (".so", ".dll", ".dylib")
+DEVICE_ENDING = ".toml"
+"""Of a file that lays a circuit around a DLL."""
+
+_KEPT = "dlls"
+"""Not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own."""
+
+
+_READER = "orchestrator.fmi.dll_reading"
+
+
+def is_vendor_file(path: Path) -> bool:
+    """Whether a file is taken for a DLL or a device's file, by its ending."""
+    return path.suffix.lower() in (*DLL_ENDINGS, DEVICE_ENDING)
+
+
+def as_fmu(path: Path) -> Path:
+    """The FMU of a DLL or of a device's file; every other path stays as it is.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, or its DLL declares what no host can run.
+    MissingLibraryError
+        If the extra that builds FMUs is not installed.
+    """
+    if not is_vendor_file(path):
+        return path
+    require("building the FMU of a vendor's DLL", "casadi", "ziglang")
+    from fmus.vendor_dll.device import DeviceFileError, device_of, read_device_file  # noqa: PLC0415 - needs `build`
+    from fmus.vendor_dll.fmu import DllError, dll_members, read_dll  # noqa: PLC0415 - as above
+
+    table = None
+    try:
+        library = path
+        if path.suffix.lower() == DEVICE_ENDING:
+            library, table = read_device_file(path)
+        kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
+        if intact(kept):
+            return kept
+        dll = read_dll(library, _READER)
+        device = None if table is None else device_of(path, table, dll.interface)
+        return keep(kept, _archive(dll_members(dll, device=device)))
+    except (DllError, DeviceFileError) as error:
+        raise InputError(str(error)) from error
+
+
+def _archive(members: dict[str, bytes]) -> bytes:
+    from fmus.toolchain.archive import packed  # noqa: PLC0415 - needs the extra `build`
+
+    return packed(members)
+
+
+def _digest(path: Path, library: Path) -> str:
+    """Of everything that the FMU is made of."""
+    found = hashlib.sha256(_own_code())
+    for file in (path, library):
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror}; give the vendor's .so or .dll file") from error
+        found.update(hashlib.sha256(content).digest())
+        found.update(file.name.encode("utf-8", "surrogateescape"))
+    return found.hexdigest()[:32]
+
+
+@cache
+def _own_code() -> bytes:
+    """Of the code that makes the FMU."""
+    import fmus  # noqa: PLC0415 - the place alone
+
+    root = Path(fmus.__file__).parent
+    files = sorted(file for part in ("vendor_dll", "toolchain") for file in (root / part).rglob("*.[pc]*"))
+    found = hashlib.sha256()
+    for file in files:
+        if file.suffix in (".py", ".c"):
+            found.update(file.name.encode() + file.read_bytes())
+    return found.digest()
