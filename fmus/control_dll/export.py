@@ -1,0 +1,153 @@
+"""Writing a converter's control as IEEE/CIGRE DLL, with the data sheet of the circuit around it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from fmus.control_dll.sheet import data_sheet
+from fmus.control_dll.source import dll_source
+from fmus.converter_parts.control_part import GROUP, ControlPart
+from fmus.toolchain.compiler import compile_for
+from fmus.toolchain.variables import Parameter
+
+DLL_TARGETS = {
+    # platform -> zig target, ending
+    "linux64": ("x86_64-linux-gnu.2.17", ".so"),
+    "win32": ("x86-windows-gnu", ".dll"),
+    "win64": ("x86_64-windows-gnu", ".dll"),
+}
+"""Platforms that a DLL is written for. EMT programs run on Windows; some load DLLs of 32 bits alone."""
+
+SAMPLE_TIME = 2e-5
+"""Default of ``FixedStepBaseSampleTime`` [s]."""
+
+_SHORTEST, _LONGEST = 1e-6, 2e-4
+
+
+class ControlDllError(ValueError):
+    """A control part cannot be written as a DLL."""
+
+
+@dataclass(frozen=True)
+class WrittenDll:
+    """What was written: libraries by platform, and the data sheet."""
+
+    libraries: dict[str, Path]
+    sheet: Path
+
+
+def control_names() -> tuple[str, ...]:
+    """Names of the converters whose control can be written, sorted."""
+    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
+
+
+def control_part_of(name: str) -> ControlPart:
+    """The control part of a converter.
+
+    Raises
+    ------
+    ControlDllError
+        If no converter of that name has one.
+    """
+    for entry in entry_points(group=GROUP):
+        if entry.name == name:
+            part = entry.load()()
+            assert isinstance(part, ControlPart)
+            return part
+    raise ControlDllError(f"{name!r} has no control part to write as a DLL; choose from: {', '.join(control_names())}")
+
+
+def with_values(part: ControlPart, values: Mapping[str, float], sample_time: float) -> ControlPart:
+    """The same part with other defaults; the lead is half a sample time where it is not given.
+
+    Parameters
+    ----------
+    values
+        By parameter; Booleans as 0 or 1.
+    sample_time
+        Between two calls of the control [s].
+
+    Raises
+    ------
+    ControlDllError
+        If there is no such parameter, a value is out of its bounds, or breaks a rule of the model.
+    """
+    model = part.model
+    known = {p.name: p for p in model.parameters}
+    if unknown := [name for name in values if name not in known]:
+        raise ControlDllError(f"there is no parameter {unknown[0]!r}; there are: {', '.join(known)}")
+    given = {part.lead: sample_time / 2} | dict(values)
+    for name, value in given.items():
+        _check(known[name], value)
+    starts = tuple(replace(p, start=float(given.get(p.name, p.start))) for p in model.parameters)
+    made = replace(model, parameters=starts)
+    start = [p.start for p in starts]
+    margins = made.requirements(start, made.initialise(start)[0]).full().ravel()
+    for margin, rule in zip(margins, made.requirement_texts, strict=True):
+        if not margin > 0:
+            raise ControlDllError(f"these values cannot be used: {rule}")
+    return replace(part, model=made)
+
+
+def _check(p: Parameter, value: float) -> None:
+    lowest = 0.0 if p.type == "Boolean" else p.minimum
+    highest = 1.0 if p.type == "Boolean" else p.maximum
+    whole = p.type == "Real" or float(value).is_integer()
+    inside = (lowest is None or value >= lowest) and (highest is None or value <= highest)
+    if not (math.isfinite(value) and whole and inside):
+        least, most = ("any" if bound is None else f"{bound:g}" for bound in (lowest, highest))
+        kind = "a number" if p.type == "Real" else "a whole number"
+        raise ControlDllError(f"{p.name} = {value:g}; it must be {kind} from {least} to {most}")
+
+
+def write_dll(
+    part: ControlPart,
+    folder: Path,
+    platforms: tuple[str, ...] = tuple(DLL_TARGETS),
+    sample_time: float = SAMPLE_TIME,
+    values: Mapping[str, float] | None = None,
+) -> WrittenDll:
+    """Write the libraries, each into the folder of its platform, and the data sheet beside these folders.
+
+    Parameters
+    ----------
+    part
+        As `control_part_of` gives it.
+    folder
+        It is created where missing.
+    platforms
+        Of `DLL_TARGETS`.
+    sample_time
+        Between two calls of the control [s].
+    values
+        Other defaults of the DLL's parameters, by name.
+
+    Raises
+    ------
+    ControlDllError
+        If a platform, the sample time or a value cannot be used.
+    RuntimeError
+        If the compiler fails.
+    """
+    if unknown := [name for name in platforms if name not in DLL_TARGETS]:
+        raise ControlDllError(f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}")
+    if not _SHORTEST <= sample_time <= _LONGEST:
+        raise ControlDllError(
+            f"a sample time of {sample_time:g} s; it must be from {_SHORTEST:g} to {_LONGEST:g} s, within which the "
+            "control's fast loops are stable"
+        )
+    chosen = with_values(part, values or {}, sample_time)
+    code = dll_source(chosen.model, sample_time)
+    libraries = {}
+    for platform in platforms:
+        target, ending = DLL_TARGETS[platform]
+        built = compile_for(code, target, ending)
+        libraries[platform] = folder / platform / f"{chosen.model.name}{ending}"
+        libraries[platform].parent.mkdir(parents=True, exist_ok=True)
+        libraries[platform].write_bytes(built.read_bytes())
+    sheet = folder / f"{chosen.model.name}.md"
+    sheet.parent.mkdir(parents=True, exist_ok=True)
+    sheet.write_text(data_sheet(chosen, sample_time), encoding="utf-8")
+    return WrittenDll(libraries, sheet)

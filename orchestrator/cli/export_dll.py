@@ -1,0 +1,49 @@
+"""``gfor export-dll``: a converter's control part as IEEE/CIGRE DLL for EMT programs."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.api.dll import export_dll
+from orchestrator.cli.arguments import positive
+from orchestrator.cli.terminal import said_stages
+from orchestrator.errors import InputError
+from orchestrator.units import read_value
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor export-dll``."""
+    parser.add_argument("name", metavar="NAME", help="converter, such as gfor")
+    parser.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
+    parser.add_argument(
+        "--platform", action="append", metavar="PLATFORM", help="linux64, win32 or win64 (repeatable; default: all)"
+    )
+    parser.add_argument(
+        "--sample-time", type=positive, default=2e-5, metavar="S", help="time between two calls [s] (20e-6)"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="default of a parameter (repeatable)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the libraries and the data sheet, and print their paths."""
+    with said_stages() as report:
+        report(f"{options.name}: compiling its control part; minutes where it was never compiled")
+        written = export_dll(
+            options.name,
+            options.dest,
+            platforms=options.platform,
+            sample_time=options.sample_time,
+            values=dict(map(_value, options.set)),
+        )
+    for path in (*written.libraries.values(), written.sheet):
+        print(path)
+    return 0
+
+
+def _value(entry: str) -> tuple[str, float]:
+    name, _, text = entry.partition("=")
+    value = read_value(text)
+    if not name or isinstance(value, str):
+        raise InputError(f"--set {entry}: give NAME=VALUE with a number, true or false, such as pod_p.enabled=true")
+    return name, float(value)

@@ -1,0 +1,52 @@
+"""The DLLs for Windows: what both export, and that of 64 bits under Wine beside the FMU's library for Windows.
+
+That of 32 bits is not run: a Wine of 64 bits alone ends such programs without a word.
+"""
+
+import os
+import shutil
+
+import lief
+import numpy as np
+import pytest
+
+from fmus.control_dll.export import DLL_TARGETS
+from tests.control_dll.conftest import PODS
+from tests.control_dll.hosts import compiled_host, driven, fmu_call
+
+pytestmark = pytest.mark.slow
+
+GIVEN = [f"{name.replace('.', '_')}={value}" for name, value in PODS.items()]
+MACHINES = {"win64": lief.PE.Header.MACHINE_TYPES.AMD64, "win32": lief.PE.Header.MACHINE_TYPES.I386}
+FUNCTIONS = ("GetInfo", "PrintInfo", "FirstCall", "CheckParameters", "Initialize", "Outputs", "Iterate", "Terminate")
+
+
+@pytest.mark.parametrize("platform", MACHINES)
+def test_the_library_exports_the_interface_under_plain_names(written, platform):
+    library = lief.PE.parse(str(written(platform).libraries[platform]))
+    assert library.header.machine == MACHINES[platform]
+    assert {entry.name for entry in library.get_export().entries} == {f"Model_{name}" for name in FUNCTIONS}
+
+
+@pytest.fixture(scope="module")
+def under_wine(tmp_path_factory, written, drive):
+    """Signals of a platform's DLL, or of the FMU's library for Windows of 64 bits."""
+    wine = shutil.which("wine")
+    if wine is None:
+        pytest.skip("wine is not installed")
+    home = tmp_path_factory.mktemp("wine")
+    environment = {"PATH": os.environ["PATH"], "WINEPREFIX": str(home / "prefix"), "WINEDEBUG": "-all"}
+
+    def run(platform, call):
+        folder = tmp_path_factory.mktemp(platform)
+        program = compiled_host(folder, DLL_TARGETS[platform][0], ".exe")
+        return driven([wine, program, *call], drive, folder, environment=environment)[0]
+
+    return run
+
+
+def test_under_wine_64_bits_are_the_fmus_to_the_last_bit(part, written, under_wine, drive, tmp_path):
+    ours = under_wine("win64", ["dll", written("win64").libraries["win64"], "IN", "OUT", *GIVEN])
+    call, _ = fmu_call(part, PODS, tmp_path, "win64")
+    assert len(ours) == len(drive)
+    assert np.array_equal(ours, under_wine("win64", call))
