@@ -8,6 +8,7 @@ import hashlib
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -145,11 +146,23 @@ def joined_source(*files: Path) -> str:
     return "".join(parts)
 
 
-def compile_for(source: str, target: str, ending: str) -> Path:
-    """Compile C source for one zig target; otherwise as `compile_library`."""
+def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] = ()) -> Path:
+    """Compile C source for one zig target; otherwise as `compile_library`.
+
+    Parameters
+    ----------
+    source
+        One translation unit.
+    target
+        One of those of a platform in `TARGETS`.
+    ending
+        Of the library's file, such as ``.so``.
+    libraries
+        Of the system, that the source needs beside the C library and its mathematics, such as ``dl``.
+    """
     require("compiling C", "ziglang")
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS
-    key = hashlib.sha256("\0".join([source, target, *recipe()]).encode()).hexdigest()[:32]
+    key = hashlib.sha256("\0".join([source, target, *recipe(), *libraries]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if intact(library):
         return library
@@ -159,7 +172,7 @@ def compile_for(source: str, target: str, ending: str) -> Path:
         c_file, built = folder / "source.c", folder / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
         compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
+        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm", *(f"-l{name}" for name in libraries)]
         result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         if result.returncode:
             raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}")

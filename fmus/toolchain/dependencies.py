@@ -11,13 +11,20 @@ from scipy.sparse import csr_array
 
 from fmus.toolchain.model import Model
 
+MOST = 1_000_000
+"""Dependencies of outputs, or of derivatives, that are listed. In a meshed network without states all outputs depend on
+nearly everything, and lists of that would be a hundred times as long as all the rest."""
+
+_SAMPLE = 8
+"""Rows of a pattern from which it is known how long the whole would be."""
+
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A computed variable, and the variables that it is computed from."""
+    """A computed variable, and the variables that it is computed from; None for all that it may be computed from."""
 
     reference: int
-    known: tuple[int, ...]
+    known: tuple[int, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,29 +37,67 @@ class Structure:
 
 
 def structure(model: Model) -> Structure:
-    """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs."""
+    """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs.
+
+    Where there would be more than `MOST` dependencies, nothing is listed, which means in both versions of FMI that
+    there may be any.
+    """
     np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
     nx, ny = len(model.states), len(model.outputs)
     parameters, inputs = np.arange(np_), np_ + nc + np.arange(nu)
     states = np_ + nc + nu + np.arange(nx)
     first_output, first_derivative = np_ + nc + nu + nx, np_ + nc + nu + nx + ny
 
-    f, g = model.derivatives, model.outputs_function
-    f_x, f_u, f_p, f_c = (_pattern(f, 0, k) for k in range(4))
-    g_x, g_u, g_p, g_c = (_pattern(g, 0, k) for k in range(4))
     c_p, x_p = _pattern(model.initialise, 0, 0), _pattern(model.initialise, 1, 0)
-    g_start = g_p + g_x @ x_p + g_c @ c_p
-    f_start = f_p + f_x @ x_p + f_c @ c_p
+
+    def of(function: ca.Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
+        """Dependence of a function's rows while it runs, and at the start."""
+        running = start = _all_unknown(first, function.size1_out(0))
+        if _length(function, 1) <= MOST:
+            by_x, by_u = _pattern(function, 0, 0), _pattern(function, 0, 1)
+            running = _unknowns(first, [(by_u, inputs), (by_x, states)])
+            if _length(function, 2) <= MOST:
+                by_p = _pattern(function, 0, 2) + by_x @ x_p + _pattern(function, 0, 3) @ c_p
+                start = _unknowns(first, [(by_p, parameters), (by_u, inputs)])
+        return running, start
+
+    outputs, first_outputs = of(model.outputs_function, first_output)
+    derivatives, first_derivatives = of(model.derivatives, first_derivative)
     return Structure(
-        outputs=_unknowns(first_output, [(g_u, inputs), (g_x, states)]),
-        derivatives=_unknowns(first_derivative, [(f_u, inputs), (f_x, states)]),
+        outputs=outputs,
+        derivatives=derivatives,
         initial=(
             *_unknowns(np_, [(c_p, parameters)]),
             *_unknowns(np_ + nc + nu, [(x_p, parameters)]),
-            *_unknowns(first_output, [(g_start, parameters), (g_u, inputs)]),
-            *_unknowns(first_derivative, [(f_start, parameters), (f_u, inputs)]),
+            *first_outputs,
+            *first_derivatives,
         ),
     )
+
+
+def unlisted(model: Model) -> Structure:
+    """The same unknowns, each of them with no dependencies listed; it costs nothing."""
+    np_, nc = len(model.parameters), len(model.calculated)
+    nx, first_state = len(model.states), np_ + nc + len(model.inputs)
+    outputs = _all_unknown(first_state + nx, len(model.outputs))
+    derivatives = _all_unknown(first_state + nx + len(model.outputs), nx)
+    initial = (*_all_unknown(np_, nc), *_all_unknown(first_state, nx), *outputs, *derivatives)
+    return Structure(outputs, derivatives, initial)
+
+
+def _all_unknown(first: int, count: int) -> tuple[Unknown, ...]:
+    return tuple(Unknown(first + row, None) for row in range(count))
+
+
+def _length(function: ca.Function, input_: int) -> float:
+    """About how many elements of an input the elements of the output depend on, all together."""
+    rows = function.size1_out(0)
+    if rows * function.size1_in(input_) <= MOST:
+        return 0.0
+    arguments = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
+    chosen = np.unique(np.linspace(0, rows - 1, _SAMPLE).astype(int)).tolist()
+    some = ca.Function("some", arguments, [function(*arguments)[chosen]])
+    return float(some.jac_sparsity(0, input_).nnz() * rows / len(chosen))
 
 
 def _unknowns(first: int, blocks: list[tuple[csr_array, np.ndarray]]) -> tuple[Unknown, ...]:

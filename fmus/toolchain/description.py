@@ -20,7 +20,16 @@ _GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "Ini
 """What FMI 2.0 calls the list of each kind of unknown."""
 
 
-def model_description(model: Model, guid: str, identifier: str, tool: str, *, native: bool = False) -> bytes:
+def model_description(
+    model: Model,
+    guid: str,
+    identifier: str,
+    tool: str,
+    *,
+    native: bool = False,
+    listed: bool = True,
+    source_file: str = "",
+) -> bytes:
     """Return the file's text.
 
     Parameters
@@ -33,10 +42,14 @@ def model_description(model: Model, guid: str, identifier: str, tool: str, *, na
         Name and version for ``generationTool``.
     native
         Whether the FMU runs without Python; a native one gives directional derivatives too.
+    listed
+        Whether dependencies are listed; without them the text is there at once.
+    source_file
+        Name of the C file in the folder ``sources``; empty without one.
     """
     root = root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")
-    SubElement(
+    kind = SubElement(
         root,
         "CoSimulation",
         modelIdentifier=identifier,
@@ -47,12 +60,27 @@ def model_description(model: Model, guid: str, identifier: str, tool: str, *, na
         canSerializeFMUstate="true",
         providesDirectionalDerivative="true" if native else "false",
     )
+    if source_file:
+        SubElement(SubElement(kind, "SourceFiles"), "File", name=source_file)
     write_definitions(root, model, "fmi2")
     annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
     SubElement(annotation, "ContinuousStates", settable="true")
     _variables(root, model)
-    _structure(root, model)
+    _structure(root, model, listed=listed)
     return text_of(root)
+
+
+def with_guid(text: str, guid: str, attribute: str = "guid") -> bytes:
+    """The text of a description that was made with an empty guid, with this one.
+
+    Parameters
+    ----------
+    text, guid
+        Both texts.
+    attribute
+        What this version of FMI calls it.
+    """
+    return text.replace(f' {attribute}=""', f' {attribute}="{guid}"', 1).encode()
 
 
 def _index(reference: int) -> str:
@@ -69,12 +97,12 @@ def _variables(root: Element, model: Model) -> None:
         SubElement(element, variable.kind, {**variable.own, **more})
 
 
-def _structure(root: Element, model: Model) -> None:
+def _structure(root: Element, model: Model, *, listed: bool) -> None:
     """Write outputs, derivatives and initial unknowns, each with the variables that it depends on."""
     element = SubElement(root, "ModelStructure")
-    for kind, group in unknowns(model).items():
+    for kind, group in unknowns(model, listed=listed).items():
         if group or kind == "InitialUnknown":
             parent = SubElement(element, _GROUPS[kind])
             for unknown in group:
-                dependencies = " ".join(map(_index, unknown.known))
-                SubElement(parent, "Unknown", index=_index(unknown.reference), dependencies=dependencies)
+                given = {} if unknown.known is None else {"dependencies": " ".join(map(_index, unknown.known))}
+                SubElement(parent, "Unknown", {"index": _index(unknown.reference), **given})

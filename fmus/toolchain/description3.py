@@ -47,6 +47,22 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     return text_of(root)
 
 
+def build_description(identifier: str, source_file: str) -> bytes:
+    """The text of sources/buildDescription.xml: how a tool compiles the FMU.
+
+    Parameters
+    ----------
+    identifier
+        Of the model.
+    source_file
+        Name of the C file beside it.
+    """
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    SubElement(SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file)
+    return text_of(root)
+
+
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
     for variable in described_variables(model):
@@ -69,5 +85,5 @@ def _structure(root: Element, model: Model) -> None:
     element = SubElement(root, "ModelStructure")
     for kind, group in unknowns(model).items():
         for unknown in group:
-            dependencies = " ".join(map(str, unknown.known))
-            SubElement(element, kind, valueReference=str(unknown.reference), dependencies=dependencies)
+            given = {} if unknown.known is None else {"dependencies": " ".join(map(str, unknown.known))}
+            SubElement(element, kind, {"valueReference": str(unknown.reference), **given})

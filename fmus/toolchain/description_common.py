@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from fmus.toolchain.dependencies import Unknown, structure
+from fmus.toolchain.dependencies import Unknown, structure, unlisted
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
 
@@ -69,7 +69,7 @@ def root_element(model: Model, version: str, identity: Mapping[str, str], tool: 
 def write_definitions(root: Element, model: Model, prefix: str) -> None:
     """Declare units, categories of messages (``prefix`` is ``fmi2`` or ``fmi3``) and the default experiment."""
     _write_units(root, model)
-    _write_log_categories(root, prefix)
+    write_log_categories(root, prefix)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="20", stepSize="1e-4")
 
 
@@ -90,9 +90,17 @@ def described_variables(model: Model) -> Iterator[DescribedVariable]:
         )
 
 
-def unknowns(model: Model) -> dict[str, tuple[Unknown, ...]]:
-    """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0."""
-    known = structure(model)
+def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, ...]]:
+    """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0.
+
+    Parameters
+    ----------
+    model
+        The model.
+    listed
+        Whether it is looked up what each depends on.
+    """
+    known = structure(model) if listed else unlisted(model)
     return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
 
 
@@ -111,7 +119,8 @@ def _named(name: str, reference: int, text: str) -> dict[str, str]:
     return {"name": name, "valueReference": str(reference), "description": text}
 
 
-def _write_log_categories(root: Element, prefix: str) -> None:
+def write_log_categories(root: Element, prefix: str) -> None:
+    """Declare the categories of messages; ``prefix`` is ``fmi2`` or ``fmi3``."""
     categories = SubElement(root, "LogCategories")
     for status in ("Warning", "Discard", "Error", "Fatal"):
         description = f"Messages with {prefix}{status} status"

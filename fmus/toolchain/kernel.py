@@ -20,6 +20,7 @@ from pathlib import Path
 import casadi as ca
 
 from fmus.toolchain.elimination import Elimination, plan_elimination
+from fmus.toolchain.long_functions import cut
 from fmus.toolchain.model import Model
 
 _C = Path(__file__).with_name("c")
@@ -61,7 +62,7 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
     for name, function in (functions | further).items():
         generator.add(scalar_function(function, f"{name}_code"))
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
-    parts = [str(generator.dump()), enumeration, tables]
+    parts = [cut(str(generator.dump())), enumeration, tables]
     parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
     return "\n".join(parts)
 

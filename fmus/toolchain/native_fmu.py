@@ -7,12 +7,13 @@ directional derivatives and may be stepped from many threads, one per instance a
 from importlib.metadata import version as version_of
 
 from fmus.toolchain.archive import digest_of, guid_of
+from fmus.toolchain.c_text import identity_source
 from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_library, recipe
-from fmus.toolchain.description import model_description
-from fmus.toolchain.description3 import model_description_3
+from fmus.toolchain.description import model_description, with_guid
+from fmus.toolchain.description3 import build_description, model_description_3
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.model import FmiVersion, Model
-from fmus.toolchain.native_source import identity_source, native_source
+from fmus.toolchain.native_source import native_source
 from fmus.toolchain.terminals import has_port, terminals_and_icons
 
 _FOLDERS_3 = {
@@ -33,26 +34,30 @@ class NativeFmu:
         The exported model.
     version
         Of FMI.
+    sources
+        Whether the C source is in the FMU as well, for tools that compile. It is one file that needs the C library.
     """
 
     cache_prefix = "native_"
 
-    def __init__(self, model: Model, version: FmiVersion = "2.0") -> None:
+    def __init__(self, model: Model, version: FmiVersion = "2.0", *, sources: bool = False) -> None:
         self.model, self._version = model, version
+        self._source_file = f"{model.name}.c" if sources else ""
         self._code = native_source(model, version)
         self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None
         icons = [self._icons.decode()] if self._icons else []
-        self.digest = digest_of(self._code, self._description("").decode(), *recipe(), *icons)
+        self._text = self._description("").decode()
+        self.digest = digest_of(self._code, self._text, *recipe(), *icons)
 
     def _description(self, guid: str) -> bytes:
         tool = f"gfor-cosim {version_of('gfor-cosim')}"
         if self._version == "3.0":
             return model_description_3(self.model, guid, self.model.name, tool)
-        return model_description(self.model, guid, self.model.name, tool, native=True)
+        return model_description(self.model, guid, self.model.name, tool, native=True, source_file=self._source_file)
 
     def description(self) -> bytes:
         """The text of modelDescription.xml, for which nothing is compiled."""
-        return self._description(guid_of(self.digest))
+        return with_guid(self._text, guid_of(self.digest), "guid" if self._version == "2.0" else "instantiationToken")
 
     def default_platforms(self) -> tuple[str, ...]:
         """All of them."""
@@ -71,6 +76,10 @@ class NativeFmu:
         members = {"modelDescription.xml": self.description()}
         if self._icons:
             members["terminalsAndIcons/terminalsAndIcons.xml"] = self._icons
+        if self._source_file:
+            members[f"sources/{self._source_file}"] = code.encode()
+            if self._version == "3.0":
+                members["sources/buildDescription.xml"] = build_description(self.model.name, self._source_file)
         for platform in platforms:
             ending = ENDINGS[platform]
             binaries = (

@@ -7,18 +7,13 @@ from pathlib import Path
 
 import casadi as ca
 
+from fmus.toolchain.c_text import c_number, c_string
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import FmiVersion, Model
 
 _C = Path(__file__).with_name("c")
 _SHORTEST_TEXT = 640
 """Room for a message [bytes] beside the longest rule or name it may quote."""
-
-
-def identity_source(guid: str, digest: str) -> str:
-    """The text before the source: the FMU's identity. The digest [hex] also marks the states that the FMU saves."""
-    identity = ", ".join(str(b) for b in bytes.fromhex(digest)[:16])
-    return f"static const char GUID[] = {_string(guid)};\nstatic const unsigned char IDENTITY[16] = {{{identity}}};\n"
 
 
 def native_source(model: Model, version: FmiVersion) -> str:
@@ -76,7 +71,7 @@ def _data(model: Model) -> str:
     texts = [*rules, *model.value_references]
     start = [p.start for p in parameters] + [u.start for u in model.inputs]
     rows = [
-        f"{{{p.type.upper()}, {_number(p.minimum, '-INFINITY')}, {_number(p.maximum, 'INFINITY')}, {int(p.tunable)}}}"
+        f"{{{p.type.upper()}, {c_number(p.minimum, '-INFINITY')}, {c_number(p.maximum, 'INFINITY')}, {int(p.tunable)}}}"
         for p in parameters
     ]
     lines = [
@@ -85,19 +80,9 @@ def _data(model: Model) -> str:
         "enum kind { REAL, INTEGER, BOOLEAN };",
         'static const char *const KIND[] = {"Real", "Integer", "Boolean"};',
         "struct parameter { int kind; double minimum, maximum; int tunable; };",
-        f"static const char *const NAME[] = {{{', '.join(map(_string, model.value_references))}}};",
-        f"static const double START[] = {{{', '.join(map(_number, start))}}};",
+        f"static const char *const NAME[] = {{{', '.join(map(c_string, model.value_references))}}};",
+        f"static const double START[] = {{{', '.join(map(c_number, start))}}};",
         f"static const struct parameter PARAMETER[] = {{{', '.join(rows)}}};",
-        f"static const char *const RULE[] = {{{', '.join(map(_string, rules)) or '0'}}};",
+        f"static const char *const RULE[] = {{{', '.join(map(c_string, rules)) or '0'}}};",
     ]
     return "\n".join(lines)
-
-
-def _number(value: float | None, missing: str = "0") -> str:
-    return missing if value is None else repr(float(value))
-
-
-def _string(text: str) -> str:
-    """A C string literal; octal escapes, because a hexadecimal one would swallow digits after it."""
-    plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
-    return f'"{plain}"'

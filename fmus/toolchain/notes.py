@@ -50,6 +50,12 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
     return found
 
 
+def known(entry: EntryPoint, asked: str) -> Any | None:
+    """What is noted; None if nothing is."""
+    path = note_of(entry, asked)
+    return json.loads(path.read_bytes()) if path is not None and intact(path) else None
+
+
 def note_of(entry: EntryPoint, asked: str) -> Path | None:
     """Path of a note, whether it is there or not; None for a model of another distribution."""
     if entry.module.partition(".")[0] not in _OWN:

@@ -20,17 +20,32 @@ BREAKER_TIME = 1e-3
 
 
 @dataclass(frozen=True)
-class DevicePort:
-    """Voltage at the bus, and the same at the operating point.
+class OperatingPoint:
+    """What the power flow says about a device, and the frame that it is said in.
 
     Attributes
     ----------
-    v
-        Bus voltage, network frame [pu].
     v_0, i_0
         Bus voltage and injected current of the power flow, network frame [pu, S_n].
     omega_b
         Base angular frequency [rad/s].
+    """
+
+    v_0: Phasor
+    i_0: Phasor
+    omega_b: ca.SX
+
+
+@dataclass(frozen=True)
+class DevicePort(OperatingPoint):
+    """Voltage at the bus, and the same at the operating point.
+
+    Attributes
+    ----------
+    v_0, i_0, omega_b
+        As `OperatingPoint`.
+    v
+        Bus voltage, network frame [pu].
     current_scale
         Device current [pu, S_n] times this is the current in the port's unit: mostly pu on the system base.
     connected
@@ -38,9 +53,6 @@ class DevicePort:
     """
 
     v: Phasor
-    v_0: Phasor
-    i_0: Phasor
-    omega_b: ca.SX
     current_scale: ca.SX
     connected: ca.SX
 
@@ -80,12 +92,18 @@ def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> Dev
     current_scale
         Device current [pu, S_n] times this is the current in the port's unit.
     """
+    start = declare_operating_point(m, P_0)
+    connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
+    return DevicePort(start.v_0, start.i_0, start.omega_b, v, current_scale, connected)
+
+
+def declare_operating_point(m: ModelBuilder, P_0: float) -> OperatingPoint:
+    """Declare the rated frequency and the power-flow start values; ``P_0`` is the default active power [pu, S_n]."""
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)
-    connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     bus = polar(v_0, theta_0)
-    return DevicePort(v, bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n, current_scale, connected)
+    return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n)
 
 
 def declare_port_outputs(m: ModelBuilder, port: DevicePort, current: Phasor) -> None:

@@ -13,7 +13,7 @@ import pythonfmu
 
 from fmus.toolchain.archive import digest_of, guid_of
 from fmus.toolchain.compiler import ENDINGS, compile_library, recipe
-from fmus.toolchain.description import model_description
+from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
@@ -34,7 +34,7 @@ class PythonFmu:
         self._python = python_source(model)
         self._slave = _SLAVE.read_text(encoding="utf-8")
         self._tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
-        description = model_description(model, "", model.name, self._tool).decode()
+        self._description = description = model_description(model, "", model.name, self._tool).decode()
         exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
         self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
@@ -49,7 +49,7 @@ class PythonFmu:
 
     def description(self) -> bytes:
         """The text of modelDescription.xml, for which nothing is compiled."""
-        return model_description(self.model, guid_of(self.digest), self.model.name, self._tool)
+        return with_guid(self._description, guid_of(self.digest))
 
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         """The archive's members, with a kernel for each platform [FMI 2.0 names]."""

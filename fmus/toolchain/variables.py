@@ -26,6 +26,7 @@ UNITS: dict[str, dict[str, float]] = {
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "kV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e3},
     "A": {"A": 1},
+    "kA": {"A": 1, "factor": 1e3},
 }
 
 

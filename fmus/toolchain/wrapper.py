@@ -10,15 +10,29 @@ from pathlib import Path
 
 import pythonfmu
 
+from fmus.toolchain.extras import SetupError
+
 _SECOND_TIME = b"finalizePythonInterpreter"
 _ENTRY, _RETURN = b"\xf3\x0f\x1e\xfa", b"\xc3"  # x86-64: endbr64, ret
 _X86_64, _DYNAMIC_SYMBOLS = 62, 11
 
 
 def wrapper_binaries() -> dict[Path, bytes]:
-    """FMI platform and file name → contents."""
+    """FMI platform and file name → contents.
+
+    Raises
+    ------
+    SetupError
+        If pythonfmu is not there as a whole, as while it is being installed: an FMU without them would be kept and
+        could run nowhere.
+    """
     root = Path(pythonfmu.__file__).parent / "resources" / "binaries"
-    return {file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))}
+    found = {file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))}
+    if not found:
+        raise SetupError(
+            f"pythonfmu: there are no binaries in {root}; install it again: pip install --force-reinstall pythonfmu"
+        )
+    return found
 
 
 def _mended(binary: bytes) -> bytes:

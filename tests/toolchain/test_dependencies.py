@@ -6,8 +6,12 @@ import pytest
 
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port
+from fmus.grid.phasor_grid import phasor_grid
+from fmus.toolchain import dependencies
 from fmus.toolchain.catalogue import build_model
-from fmus.toolchain.dependencies import structure
+from fmus.toolchain.dependencies import structure, unlisted
+from fmus.toolchain.description import model_description
+from orchestrator.fmi.description import parse_description
 
 
 def _chain(buses):
@@ -39,3 +43,20 @@ def test_initial_unknowns_follow_full_matrices(name):
         for row in range(len(u)):
             wanted = (*np.flatnonzero(by_parameter[row]), *(first_input + np.flatnonzero(u[row])))
             assert found[first + row] == wanted
+
+
+def test_long_lists_are_left_out_and_short_ones_stay(monkeypatch, tmp_path):
+    """All voltages of a meshed network depend on all emfs, which an FMU says without lists. An EMT network's do not."""
+    meshed, sparse = phasor_grid(_chain(40)), grid(_chain(40))
+    whole = structure(sparse)
+    assert all(unknown.known for unknown in structure(meshed).outputs)
+    monkeypatch.setattr(dependencies, "MOST", 4 * len(sparse.outputs) * 12)
+    assert len(sparse.outputs) * len(sparse.parameters) > dependencies.MOST
+    assert structure(sparse) == whole
+    found = structure(meshed)
+    assert [unknown.reference for unknown in found.outputs] == [u.reference for u in unlisted(meshed).outputs]
+    assert all(unknown.known is None for unknown in found.initial[-len(meshed.outputs) :])
+    monkeypatch.setattr(dependencies, "MOST", 10)
+    text = model_description(meshed, "guid", "meshed", "tool")
+    described = parse_description(tmp_path / "meshed.fmu", text)
+    assert described.feedthrough("b3.v_re") == described.inputs == tuple(v.name for v in meshed.inputs)

@@ -9,6 +9,7 @@ import fmpy
 import pytest
 import pythonfmu
 
+from fmus.toolchain.extras import SetupError
 from fmus.toolchain.wrapper import wrapper_binaries
 
 HOST = """
@@ -55,3 +56,10 @@ def test_nothing_else_is_changed():
         given = (root / name).read_bytes()
         changed = [at for at, (old, new) in enumerate(zip(given, mended, strict=True)) if old != new]
         assert len(changed) == (name.suffix == ".so")
+
+
+def test_a_pythonfmu_without_binaries_makes_no_fmu(monkeypatch, tmp_path):
+    """As while pip replaces it: an FMU that can run nowhere was kept in the cache."""
+    monkeypatch.setattr("pythonfmu.__file__", str(tmp_path / "__init__.py"))
+    with pytest.raises(SetupError, match="install it again"):
+        wrapper_binaries()
