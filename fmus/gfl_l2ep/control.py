@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.gfl_l2ep.electrical import COLIB, Transformer, declare_transformer, transformer_equation
+from fmus.gfl_l2ep.freezing import running
 from fmus.gfl_l2ep.limits import Limits, declare_limits, limited
 from fmus.grid_following.pll import Frame, LoopDefaults, phase_locked_loop
 from fmus.toolchain.blocks import clamp, low_pass
@@ -45,7 +46,7 @@ def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Followi
     t = declare_transformer(m, port)
     theta = m.algebraic("theta")
     bus = v.rotated(-theta)
-    frame = phase_locked_loop(m, t.start.theta, port.omega_b, bus, LOOP)
+    frame = phase_locked_loop(m, t.start.theta, port.omega_b, bus, LOOP, running(m, v.magnitude()))
     m.close(theta, frame.theta)
     u, i = bus / t.ratio, t.i.value
     inside = u + Phasor(t.R, t.X) * i

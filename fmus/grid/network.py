@@ -1,7 +1,9 @@
 """A network as data: buses, lines, loads, shunts, and the ports where devices meet it."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 from fmus.grid.element_data import LEAST_LOW_VOLTAGE, SMALLEST_REACTANCE, Line, Load, Port, Shunt, ThreeWinding, Zip
 
@@ -26,12 +28,14 @@ class Network:
         Buses at which there can be a fault.
     transformers
         Those with three windings; others are lines with a ratio.
+    phasors
+        Whether it is for a model without transients, where a bus needs neither a load nor capacitance.
 
     Raises
     ------
     ValueError
         Naming every element that refers to an unknown bus, has no reactance or repeats a name,
-        and every bus that has neither a resistive load nor capacitance.
+        and, unless it is for phasors, every bus that has neither a resistive load nor capacitance.
     """
 
     name: str
@@ -43,6 +47,7 @@ class Network:
     stray_B: float = 0.0
     faults: tuple[str, ...] = ()
     transformers: tuple[ThreeWinding, ...] = ()
+    phasors: bool = False
 
     def __post_init__(self) -> None:
         problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
@@ -55,6 +60,10 @@ class Network:
         capacitance.
         """
         return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self.needs_stray(bus)
+
+    def floats(self, bus: str) -> bool:
+        """Whether the bus has neither capacitance nor a load or shunt that conducts."""
+        return not self.has_capacitance(bus) and not self._has_conductance(bus)
 
     def needs_stray(self, bus: str) -> bool:
         """Whether the bus gets `stray_B`."""
@@ -72,22 +81,38 @@ class Network:
         """Whether only switchable loads determine the bus's voltage."""
         return not (self._has_fixed_capacitance(bus) or self.needs_stray(bus)) and (
             bool(self._capacitive_loads(bus))
-            or not any(s.bus == bus and s.g_mw > 0 for s in self.shunts)
-            or any(load.bus == bus and load.conductance_mw < 0 for load in self.loads)
+            or bus not in self._conducting
+            or any(load.conductance_mw < 0 for load in self._loads_at.get(bus, ()))
         )
 
     def _has_fixed_capacitance(self, bus: str) -> bool:
-        return any(line.B > 0 and bus in (line.from_bus, line.to_bus) for line in self.lines) or any(
-            shunt.bus == bus and shunt.b_mvar > 0 for shunt in self.shunts
-        )
+        return bus in self._charged
 
     def _capacitive_loads(self, bus: str) -> list[Load]:
-        return [load for load in self.loads if load.bus == bus and load.susceptance_mvar < 0]
+        return [load for load in self._loads_at.get(bus, ()) if load.susceptance_mvar < 0]
 
     def _has_conductance(self, bus: str, without: Load | None = None) -> bool:
-        return any(x.bus == bus and x.conductance_mw > 0 and x is not without for x in self.loads) or any(
-            x.bus == bus and x.g_mw > 0 for x in self.shunts
+        return bus in self._conducting or any(
+            x.conductance_mw > 0 and x is not without for x in self._loads_at.get(bus, ())
         )
+
+    @cached_property
+    def _charged(self) -> frozenset[str]:
+        """Buses with a line's charging or a capacitor."""
+        ends = [bus for line in self.lines if line.B > 0 for bus in (line.from_bus, line.to_bus)]
+        return frozenset([*ends, *(shunt.bus for shunt in self.shunts if shunt.b_mvar > 0)])
+
+    @cached_property
+    def _conducting(self) -> frozenset[str]:
+        """Buses with a shunt that is a conductance."""
+        return frozenset(shunt.bus for shunt in self.shunts if shunt.g_mw > 0)
+
+    @cached_property
+    def _loads_at(self) -> dict[str, list[Load]]:
+        found: dict[str, list[Load]] = {}
+        for load in self.loads:
+            found.setdefault(load.bus, []).append(load)
+        return found
 
     def _unknown_buses(self) -> Iterable[str]:
         known = set(self.buses)
@@ -106,7 +131,9 @@ class Network:
         names = [*self.buses, *(x.name for x in self.lines), *(x.name for x in self.loads)]
         names += [*(x.name for x in self.shunts), *(x.name for x in self.ports)]
         names += [x.name for x in self.transformers]
-        yield from (f"the name {name!r} is used twice" for name in sorted({n for n in names if names.count(n) > 1}))
+        yield from (
+            f"the name {name!r} is used twice" for name in sorted(n for n, k in Counter(names).items() if k > 1)
+        )
 
     def _bad_elements(self) -> Iterable[str]:
         for line in self.lines:
@@ -161,8 +188,8 @@ class Network:
                 yield f"load {load.name!r} has v_min = {load.low_voltage:g} pu; it must be from 0 to below 1"
 
     def _floating_buses(self) -> Iterable[str]:
-        floating = [b for b in self.buses if not self.has_capacitance(b) and not self._has_conductance(b)]
-        if floating:
+        floating = [b for b in self.buses if self.floats(b)]
+        if floating and not self.phasors:
             named = ", ".join(map(repr, floating[:10])) + (", …" if len(floating) > 10 else "")
             many = len(floating) > 1
             yield (

@@ -1,5 +1,7 @@
 """Solution of complex nodal equations Y·v = i with symbols, by elimination in an order that keeps them sparse."""
 
+from heapq import heapify, heappop, heappush
+
 from fmus.toolchain.frames import ZERO, Phasor
 
 Admittances = dict[str, dict[str, Phasor]]
@@ -28,18 +30,23 @@ def solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
     a bus has no admittance at all, and then its voltage is not finite.
     """
     rows = {bus: dict(entries) for bus, entries in Y.items()}
-    right, waiting, order = dict(currents), list(Y), []
+    right, place, order = dict(currents), {bus: k for k, bus in enumerate(Y)}, list[str]()
+    queue = [(len(row), place[bus], bus) for bus, row in rows.items()]
+    heapify(queue)
+    waiting = set(Y)
     while waiting:
-        bus = min(waiting, key=lambda b: (len(rows[b]), waiting.index(b)))
+        entries, _, bus = heappop(queue)
+        if bus not in waiting or entries != len(rows[bus]):
+            continue  # it has gone, or has another number of neighbours by now and stands elsewhere in the queue too
         waiting.remove(bus)
         order.append(bus)
-        for other in waiting:
-            if bus in rows[other]:
-                factor = rows[other].pop(bus) / rows[bus][bus]
-                for column, value in rows[bus].items():
-                    if column != bus:
-                        rows[other][column] = rows[other].get(column, ZERO) - factor * value
-                right[other] -= factor * right[bus]
+        for other in sorted((column for column in rows[bus] if column in waiting), key=place.__getitem__):
+            factor = rows[other].pop(bus) / rows[bus][bus]
+            for column, value in rows[bus].items():
+                if column != bus:
+                    rows[other][column] = rows[other].get(column, ZERO) - factor * value
+            right[other] -= factor * right[bus]
+            heappush(queue, (len(rows[other]), place[other], other))
     voltages: dict[str, Phasor] = {}
     for bus in reversed(order):
         known = right[bus]

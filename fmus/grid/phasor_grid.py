@@ -6,6 +6,8 @@ Elements, parameters and outputs are those of `grid`. Constant-impedance loads, 
 described there.
 """
 
+from functools import partial
+
 import casadi as ca
 
 from fmus.grid.elements import (
@@ -24,15 +26,25 @@ from fmus.grid.load_laws import FollowingLoad, declare_following_load, following
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve
 from fmus.grid.three_winding import add_windings, declare_winding_powers, declare_windings
+from fmus.toolchain.catalogue import SKETCH
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 
+LEAST_CONDUCTANCE = 1e-12
+"""Conductance to earth [pu, 100 MVA] of a bus that has no other admittance to earth: where all its lines open, its
+voltage is 0 and not 0/0."""
+
 
 def phasor_grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements, as in `grid`."""
+    return _phasor_grid(network, solved=True)
+
+
+def _phasor_grid(network: Network, *, solved: bool) -> Model:
+    """The model, or its variables with the voltages that a power flow gives, at which nothing is solved."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency")
     following: list[FollowingLoad] = []
     omega_b: ca.SX | None = None
@@ -50,7 +62,8 @@ def phasor_grid(network: Network) -> Model:
         declare_shunt(m, shunt, buses, inductor=_susceptance)
     add_stray(m, network, buses)
     for name, bus in buses.items():
-        add_admittance(Y, name, name, Phasor(bus.G, bus.B))
+        least = LEAST_CONDUCTANCE if network.floats(name) else 0.0
+        add_admittance(Y, name, name, Phasor(bus.G + least, bus.B) if least else Phasor(bus.G, bus.B))
     faults = {bus: fault_admittance(m, bus) for bus in network.faults}
     for name, y in faults.items():
         add_admittance(Y, name, name, y)
@@ -59,9 +72,9 @@ def phasor_grid(network: Network) -> Model:
     transformers = [declare_windings(m, data) for data in network.transformers]
     for transformer in transformers:
         add_windings(Y, transformer)
-    voltages = solve(Y, {name: bus.injected for name, bus in buses.items()})
+    voltages = solve(Y, {name: bus.injected for name, bus in buses.items()}) if solved else {}
     for name, bus in buses.items():
-        bus.v = voltages[name]
+        bus.v = voltages.get(name, bus.v_0)
     for following_load in following:
         following_load_equations(m, following_load)
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
@@ -72,6 +85,9 @@ def phasor_grid(network: Network) -> Model:
     for name, y in faults.items():
         declare_fault_outputs(m, name, buses[name].v * y)
     return m.build()
+
+
+setattr(phasor_grid, SKETCH, partial(_phasor_grid, solved=False))
 
 
 def _declare_source(m: ModelBuilder, port: Port, buses: dict[str, Bus], Y: Admittances) -> tuple[Phasor, Phasor]:

@@ -28,7 +28,12 @@ class LoopDefaults:
 
 
 def phase_locked_loop(
-    m: ModelBuilder, angle_0: Scalar, omega_b: ca.SX, measured: Phasor, defaults: LoopDefaults = LoopDefaults()
+    m: ModelBuilder,
+    angle_0: Scalar,
+    omega_b: ca.SX,
+    measured: Phasor,
+    defaults: LoopDefaults = LoopDefaults(),
+    running: ca.SX | None = None,
 ) -> Frame:
     """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
 
@@ -46,7 +51,10 @@ def phase_locked_loop(
         Voltage in the converter's own frame [pu], a function of states.
     defaults
         Of its parameters.
+    running
+        Factor of u_⊥ and of dθ/dt: 1, or 0 while the loop stands; None for a loop that always runs.
     """
+    seen = measured.im if running is None else measured.im * running
     with m.scope("pll"):
         f_0 = m.parameter(
             "f_0", defaults.f_0, "Hz", "Natural frequency at 1 pu", minimum=0.1, maximum=200, source=defaults.source
@@ -57,7 +65,8 @@ def phase_locked_loop(
         omega_0 = 2 * ca.pi * f_0
         x = m.state("x", 0, "pu", "Integrator, deviation of the frequency", base="f_n")
         theta = m.state("theta", angle_0, "rad", "Angle of the converter's frame in the network frame")
-        w = 1 + 2 * xi * omega_0 / omega_b * measured.im + x
-        m.derivative(x, omega_0**2 / omega_b * measured.im)
-        m.derivative(theta, omega_b * (w - 1))
+        w = 1 + 2 * xi * omega_0 / omega_b * seen + x
+        m.derivative(x, omega_0**2 / omega_b * seen)
+        turning = omega_b * (w - 1)
+        m.derivative(theta, turning if running is None else turning * running)
     return Frame(theta, w)

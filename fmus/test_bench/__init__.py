@@ -1,0 +1,1 @@
+"""An operator's test bench: a programmable source behind a settable impedance, a load, and two plants at one bus."""
