@@ -6,6 +6,7 @@ while they are written, and a model description may not define a document type.
 """
 
 import lzma
+import os
 import stat
 import struct
 import unicodedata
@@ -49,6 +50,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFErro
            ValueError, OverflowError)  # fmt: skip
 _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(1, 10))}
 """Names that are no files on Windows."""
+_ON_WINDOWS = os.name == "nt"
 
 
 def read_model_description_text(path: Path) -> bytes:
@@ -283,7 +285,7 @@ def _fault_of(entry: zipfile.ZipInfo) -> str | None:
         return _OUTSIDE[1]
     if any(part in ("", ".") for part in parts):
         return "a path with an empty part"
-    if any(part.endswith((" ", ".")) or part.split(".")[0].upper() in _DEVICES for part in parts):
+    if _ON_WINDOWS and any(part.endswith((" ", ".")) or part.split(".")[0].upper() in _DEVICES for part in parts):
         return "a name that Windows gives to something else"
     try:
         if any(len(part.encode()) > 255 for part in parts) or len(name.encode()) > 2000:

@@ -130,6 +130,10 @@ class BoundComponent(Derived):
 
     # -- what goes to the FMU itself -------------------------------------------------------------
 
+    @property
+    def one_thread(self) -> str | None:
+        return self.inner.one_thread
+
     def check(self, status: int, call: str, time: float | None = None) -> None:
         self.inner.check(status, call, time)
 

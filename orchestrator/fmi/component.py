@@ -40,6 +40,10 @@ class Component(Protocol):
     def description(self) -> FmuDescription:
         """The FMU."""
 
+    @property
+    def one_thread(self) -> str | None:
+        """Why only one thread may step it, in words; None where any thread may, beside its partners."""
+
     def check(self, status: int, call: str, time: float | None = None) -> None:
         """Raise unless a call's status is OK or Warning."""
 
@@ -128,6 +132,10 @@ class Component(Protocol):
 
 class Derived:
     """What a component does by its other methods alone; it holds no data."""
+
+    @property
+    def one_thread(self) -> str | None:
+        return "in a process of its own"
 
     def step(self: Component, time: float, step_size: float) -> None:
         with calls:

@@ -17,6 +17,7 @@ from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
 from orchestrator.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.fmi.values import Scalar, typed
+from orchestrator.fmi.vendor_files import as_fmu
 
 TOOL = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"
@@ -29,6 +30,16 @@ _TYPES_OF_3 = {"Float64": "Real", "Float32": "Real"} | {
     f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
 }
 
+
+_SAMPLED = ("input", "output", "local")
+_CAUSALITIES = {
+    "constant": ("output", "local"),
+    "fixed": ("parameter", "calculatedParameter", "local"),
+    "tunable": ("parameter", "calculatedParameter", "local"),
+    "discrete": _SAMPLED,
+    "continuous": (*_SAMPLED, "independent"),
+}
+"""That FMI 2.0 allows with each variability."""
 
 _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 
@@ -76,9 +87,10 @@ class FmuDescription:
     variables
         By name.
     states
-        Names of the continuous states, in the order of ``ModelStructure/Derivatives``.
+        Names of the continuous states, in the order of ``ModelStructure/Derivatives``, then of the discrete states that
+        a sampled controller declares under ``VendorAnnotations``.
     rates
-        Names of their derivatives, in the same order.
+        Names of the continuous states' derivatives, in the same order.
     states_are_settable
         Whether the FMU declares that a master may set its states at communication points. That is
         an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
@@ -103,6 +115,12 @@ class FmuDescription:
     specials
         Of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references;
         of every other variable whose change is an event, and nothing.
+    sample_time
+        Of a sampled controller that declares it under ``VendorAnnotations`` [s]; None where none does.
+    frequency
+        Parameter with the frequency at which its phase quantities repeat [Hz]; empty where it has none.
+    kept_in
+        Where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
     """
 
     path: Path
@@ -130,11 +148,18 @@ class FmuDescription:
     returns_early: bool = False
     clocks: tuple[FmiClock, ...] = ()
     specials: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    sample_time: float | None = None
+    frequency: str = ""
+    kept_in: str = ""
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
         return self._names("input")
+
+    @cached_property
+    def _inputs(self) -> frozenset[str]:
+        return frozenset(self.inputs)
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -152,29 +177,42 @@ class FmuDescription:
     def feedthrough(self, output: str) -> tuple[str, ...]:
         """Inputs that an output depends on directly; all inputs where the FMU declares nothing."""
         known = self.output_dependencies.get(output)
-        return self.inputs if known is None else tuple(n for n in known if n in self.inputs)
+        return self.inputs if known is None else tuple(n for n in known if n in self._inputs)
 
 
 def read_description(path: Path | str) -> FmuDescription:
-    """Read and check an FMU.
+    """Read and check an FMU, or that of a vendor's DLL or device's file, which is built first.
 
     Raises
     ------
+    InputError
+        If there can be no FMU of a DLL.
     FmuFileError
         If the file is missing, not a zip archive, or without (or with an unreadable) modelDescription.xml.
     UnsupportedFmuError
         If it is of another FMI version, not for co-simulation, or without a binary for this platform.
     """
-    path = Path(path)
-    described = parse_description(path, read_model_description_text(path), names_in(path))
-    if fmpy.platform not in described.platforms:
-        has = ", ".join(described.platforms) or "none"
-        raise UnsupportedFmuError(
-            f"{path}: it has no binary for this platform ({fmpy.platform}), only for: {has}; "
-            f"ask its author for a {fmpy.platform} build",
-            "another platform",
-        )
+    described = read_declared(path)
+    if missing := missing_binary(described):
+        raise UnsupportedFmuError(f"{described.path}: {missing}", "another platform")
     return described
+
+
+def missing_binary(described: FmuDescription) -> str | None:
+    """What an FMU lacks that it could run on this platform."""
+    if fmpy.platform in described.platforms:
+        return None
+    has = ", ".join(described.platforms) or "none"
+    return (
+        f"it has no binary for this platform ({fmpy.platform}), only for: {has}; "
+        f"ask its author for a {fmpy.platform} build"
+    )
+
+
+def read_declared(path: Path | str) -> FmuDescription:
+    """As `read_description`, also where the FMU has no binary for this platform and cannot run here."""
+    path = as_fmu(Path(path))
+    return parse_description(path, read_model_description_text(path), names_in(path))
 
 
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
@@ -202,7 +240,7 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
             "another version of FMI",
         )
     try:
-        description = fmpy.read_model_description(_only(text), validate=False)
+        description = fmpy.read_model_description(_only(_with_initial(text)), validate=False)
         exchange_only = description.coSimulation is None
         platforms = tuple(fmpy.supported_platforms(_only(text, names)))
         described = None if exchange_only else _describe(path, description, text, platforms, version)
@@ -233,6 +271,18 @@ def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:
     return content
 
 
+def _with_initial(text: bytes) -> bytes:
+    """Give ``initial`` to variables for which FMI 2.0 has no default, as some tools write them: FMPy refuses them."""
+    root = ElementTree.fromstring(text)
+    changed = False
+    for variable in root.iterfind("ModelVariables/ScalarVariable"):
+        causality, variability = variable.get("causality", "local"), variable.get("variability", "continuous")
+        if "initial" not in variable.attrib and causality not in _CAUSALITIES.get(variability, (causality,)):
+            variable.set("initial", "exact")
+            changed = True
+    return ElementTree.tostring(root) if changed else text
+
+
 def _fmi_version(path: Path, text: bytes) -> str:
     try:
         version = ElementTree.fromstring(text).get("fmiVersion", "unknown")
@@ -251,6 +301,7 @@ def _describe(
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
     }
+    discrete = _discrete_states(path, root, md)
     return FmuDescription(
         path=path,
         guid=md.guid,
@@ -259,8 +310,8 @@ def _describe(
         model_identifier=md.coSimulation.modelIdentifier,
         generation_tool=md.generationTool or "",
         variables=variables,
-        states=tuple(unknown.variable.derivative.name for unknown in md.derivatives),
-        states_are_settable=_settable(root, version),
+        states=(*_states(path, md), *discrete),
+        states_are_settable=_settable(root, version) or bool(discrete),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
         gives_directional_derivatives=_gives_directional_derivatives(root),
         output_dependencies=dependencies,
@@ -273,8 +324,37 @@ def _describe(
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
         fmi_version=version,
         rates=tuple(unknown.variable.name for unknown in md.derivatives),
+        **_sampling(path, root, variables),
         **_events(root, version),
     )
+
+
+def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
+    """What a sampled controller says of its sample time, and of the frequency at which it repeats."""
+    listed = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/DiscreteStates")
+    if listed is None:
+        return {}
+    frequency, told = listed.get("frequency", ""), listed.get("sampleTime")
+    try:
+        sample_time = _positive(told)
+    except ValueError:
+        sample_time = None
+    if (told and sample_time is None) or (frequency and frequency not in variables):
+        raise FmuFileError(
+            f"{path}: DiscreteStates under VendorAnnotations has sampleTime {(told or '')[:20]!r} and frequency "
+            f"{frequency[:40]!r}; a time above 0 and a variable's name are needed: export it again"
+        )
+    return {"sample_time": sample_time, "frequency": frequency, "kept_in": listed.get("keptIn", "")[:20]}
+
+
+def _states(path: Path, md: ModelDescription) -> list[str]:
+    for unknown in md.derivatives:
+        if unknown.variable.derivative is None:
+            raise FmuFileError(
+                f"{path}: ModelStructure/Derivatives lists {unknown.variable.name[:80]!r}, whose variable does not say "
+                "which state it is the derivative of; export it again"
+            )
+    return [unknown.variable.derivative.name for unknown in md.derivatives]
 
 
 def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
@@ -297,6 +377,21 @@ def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
     return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
 
 
+def _discrete_states(path: Path, root: ElementTree.Element, md: ModelDescription) -> tuple[str, ...]:
+    """Names of the states of a sampled controller, which FMI for co-simulation has no list for: our annotation."""
+    listed = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/DiscreteStates")
+    if listed is None or listed.get("settable") != "true":
+        return ()
+    names = {str(v.valueReference): v.name for v in reversed(md.modelVariables) if v.type == "Real"}
+    references = (listed.get("valueReferences") or "").split()
+    if unknown := [r for r in references if r not in names]:
+        raise FmuFileError(
+            f"{path}: DiscreteStates under VendorAnnotations names value reference {unknown[0][:20]!r}, which no Real "
+            "variable has; export it again"
+        )
+    return tuple(names[r] for r in references)
+
+
 def _settable(root: ElementTree.Element, version: str) -> bool:
     if version == "3.0":
         annotation = root.find(f"Annotations/Annotation[@type='{TOOL}.ContinuousStates']")
@@ -308,9 +403,10 @@ def _settable(root: ElementTree.Element, version: str) -> bool:
 def _check_names(path: Path, md: ModelDescription) -> None:
     """The identifier becomes part of a path, and value references go into 32 bits: neither is taken on trust."""
     identifier = md.coSimulation.modelIdentifier or ""
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,199}", identifier):
+    if not re.fullmatch(r"\w[\w.-]{0,199}", identifier, re.ASCII):
         raise FmuFileError(
-            f"{path}: modelIdentifier is {identifier[:80]!r}; it must be a C identifier, since it names the binary"
+            f"{path}: modelIdentifier is {identifier[:80]!r}; it must be a C identifier, since it names the binary "
+            "(dots, hyphens and a leading digit are taken as well)"
         )
     if not md.guid:
         raise FmuFileError(f"{path}: modelDescription.xml has no guid, which the binary is told; export it again")

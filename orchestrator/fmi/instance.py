@@ -80,7 +80,7 @@ def open_component(
         return BoundComponent(open_component(name, description.inner, directory, isolated=isolated), description)
     if is_isolated(description, isolated):
         return IsolatedComponent(name, description, directory)
-    return LoadedComponent(name, description, directory)
+    return LoadedComponent(name, description, directory, ours=is_ours(description.path))
 
 
 def protections_of(component: Component) -> tuple[Protection, ...]:

@@ -22,6 +22,9 @@ from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.messages import Messages, callbacks_for, texts
 from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
 
+PYTHON_BACKED = "Python-backed"
+"""Why one thread alone steps an FMU: Python's lock lets one thread run at a time."""
+
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 """Kinds of ``fmi2Get…Status``."""
 
@@ -37,6 +40,8 @@ class LoadedComponent(Derived):
         The FMU.
     directory
         Where its archive is extracted; by default a new temporary folder of its own.
+    ours
+        Whether it is known to be an FMU of this project.
 
     Attributes
     ----------
@@ -44,8 +49,10 @@ class LoadedComponent(Derived):
         Whether it said ``fmi2Fatal``: no call is allowed any more.
     """
 
-    def __init__(self, name: str, description: FmuDescription, directory: Path | None = None) -> None:
-        self.name = name
+    def __init__(
+        self, name: str, description: FmuDescription, directory: Path | None = None, *, ours: bool = False
+    ) -> None:
+        self.name, self._ours = name, ours
         self.description = description
         self.lost = False
         self._messages = Messages()
@@ -117,6 +124,12 @@ class LoadedComponent(Derived):
         self.set_real = prototype(("fmi2SetReal", library))
         self.get_real = prototype(("fmi2GetReal", library))
         self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(("fmi2DoStep", library))
+
+    @property
+    def one_thread(self) -> str | None:
+        if self.description.needs_tool:
+            return PYTHON_BACKED
+        return None if self._ours else "an FMU of others, whose instances may share data"
 
     # -- errors ----------------------------------------------------------------------------------
 

@@ -10,10 +10,9 @@
 
 #include "clock.h"
 #include "fmi.h"
+#include "waiting.h"
 
 #ifdef _WIN32
-static void rest(volatile int32_t *word, int32_t value) { Sleep(*word == value ? 1 : 0); }
-static void wake(volatile int32_t *word) {}
 static int is_gone(int64_t process) {
     DWORD code;
     return !GetExitCodeProcess((HANDLE)(intptr_t)process, &code) || code != STILL_ACTIVE;
@@ -23,21 +22,6 @@ static int is_orphan(int64_t parent) { return 0; } /* the parent ends what it st
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#ifdef __linux__
-#include <linux/futex.h>
-#include <sys/syscall.h>
-static void rest(volatile int32_t *word, int32_t value) {
-    const struct timespec most = {0, 20000000};
-    syscall(SYS_futex, word, FUTEX_WAIT, value, &most, NULL, 0);
-}
-static void wake(volatile int32_t *word) { syscall(SYS_futex, word, FUTEX_WAKE, 1, NULL, NULL, 0); }
-#else
-static void rest(volatile int32_t *word, int32_t value) {
-    const struct timespec most = {0, 50000};
-    nanosleep(&most, NULL);
-}
-static void wake(volatile int32_t *word) {}
-#endif
 /* Without reaping it: whoever started it asks for its exit code. */
 static int is_gone(int64_t process) {
     siginfo_t info = {0};
@@ -93,14 +77,6 @@ EXPORT size_t mailbox_offset(int which) {
                              offsetof(struct mailbox, instance), offsetof(struct mailbox, set_references),
                              offsetof(struct mailbox, get_references), offsetof(struct mailbox, room)};
     return places[which];
-}
-
-static void relax(void) {
-#if defined __x86_64__ || defined _M_X64
-    __asm__ __volatile__("pause");
-#elif defined __aarch64__
-    __asm__ __volatile__("yield");
-#endif
 }
 
 /* Wait until *word is no longer `old`: awake for a while, then in the kernel. Returns 0 after every sleep. */

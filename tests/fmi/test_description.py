@@ -100,6 +100,26 @@ def test_model_exchange_only(rewritten):
     refused(path, "not an FMU for co-simulation", "Model Exchange only", "ask for that export")
 
 
+@pytest.mark.parametrize("identifier", ["watertank-c", "3_tanks", "tank.v2"])
+def test_identifiers_as_tools_write_them(identifier, rewritten):
+    path = rewritten(lambda text: text.replace('modelIdentifier="gfor"', f'modelIdentifier="{identifier}"'))
+    assert read_description(path).model_identifier == identifier
+
+
+def test_a_constant_parameter_as_tools_write_it(rewritten):
+    """FMPy has no ``initial`` for it and would refuse the whole file."""
+    path = rewritten(
+        lambda text: re.sub(r'(<ScalarVariable name="S_n"[^>]*variability=)"[a-z]*"', r'\1"constant"', text)
+    )
+    found = read_description(path).variables["S_n"]
+    assert (found.causality, found.variability) == ("parameter", "constant")
+
+
+def test_a_derivative_of_nothing(rewritten):
+    path = rewritten(lambda text: re.sub(r' derivative="\d+"', "", text, count=1))
+    refused(path, "ModelStructure/Derivatives lists 'der", "does not say which state it is the derivative of")
+
+
 def test_no_binary_for_this_platform(rewritten):
     path = rewritten(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
     refused(path, "no binary for this platform", fmpy.platform, "only for", f"{fmpy.platform} build")

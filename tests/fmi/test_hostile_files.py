@@ -67,7 +67,7 @@ def test_every_limit_is_kept(limit, plain, monkeypatch):
         read_description(plain)
 
 
-@pytest.mark.parametrize("identifier", ["../../lib", "", "a b", "1x", "x" * 300])
+@pytest.mark.parametrize("identifier", ["../../lib", "", "a b", "..", "-x", "x/y", "x" * 300])
 def test_a_model_identifier_leads_nowhere_else(identifier, plain, tmp_path):
     path = tmp_path / "other.fmu"
     with zipfile.ZipFile(plain) as source, zipfile.ZipFile(path, "w") as target:
@@ -75,6 +75,18 @@ def test_a_model_identifier_leads_nowhere_else(identifier, plain, tmp_path):
             content = source.read(name).replace(b'modelIdentifier="gain"', f'modelIdentifier="{identifier}"'.encode())
             target.writestr(name, content)
     with pytest.raises(FmuFileError, match="C identifier"):
+        read_description(path)
+
+
+@pytest.mark.parametrize("name", ["resources/table.", "resources/aux.c"])
+def test_names_of_windows_are_refused_on_windows_alone(name, plain, tmp_path, monkeypatch):
+    path = tmp_path / "other.fmu"
+    path.write_bytes(plain.read_bytes())
+    with zipfile.ZipFile(path, "a") as target:
+        target.writestr(name, "x")
+    assert (extract(path) / name).read_text() == "x"
+    monkeypatch.setattr(archive, "_ON_WINDOWS", True)
+    with pytest.raises(HostileFmuError, match="Windows gives to something else"):
         read_description(path)
 
 

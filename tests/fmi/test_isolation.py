@@ -10,7 +10,8 @@ import pytest
 from fmus.toolchain.compiler import compile_library, joined_source
 from orchestrator import fmi
 from orchestrator.acceptance.runner import check_fmu
-from orchestrator.coupling.loop import CompiledLoop, PythonLoop
+from orchestrator.coupling.compiled_loop import CompiledLoop
+from orchestrator.coupling.loop import PythonLoop
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
@@ -207,7 +208,7 @@ def test_both_loops_step_it(box, monkeypatch):
     ends = []
     for kind in (CompiledLoop, PythonLoop):
         if kind is PythonLoop:
-            monkeypatch.setattr("orchestrator.coupling.loop._library", lambda: None)
+            monkeypatch.setattr("orchestrator.coupling.compiled_loop.loop_library", lambda: None)
         system = System()
         system.add("box", box(), inputs={"v_re": 1.0, "v_im": 0.01})
         with Master(system, jacobi(("box",)), H) as master:

@@ -188,7 +188,7 @@ def test_fmus_of_fmi_3_carry_it_too(tmp_path):
 def test_info_tells_of_it(fmu, fmu_path, capsys):
     assert main(["info", str(fmu)]) == 0
     said = capsys.readouterr().out
-    assert "linear model inside: 27 states, 2 inputs, 9 outputs, at the operating point of case two_area" in said
+    assert "linear model inside: 27 states, 2 inputs, 10 outputs, at the operating point of case two_area" in said
     assert "scenario pod_pq, component gfor" in said
     assert main(["info", str(fmu_path("gfor"))]) == 0
     assert "linear model" not in capsys.readouterr().out
