@@ -18,7 +18,7 @@ from orchestrator.analysis.perturbation import perturb
 from orchestrator.analysis.response_check import ContinuousModel, check_response
 from orchestrator.analysis.state_access import StateAccess
 from orchestrator.arrays import Matrix
-from orchestrator.coupling.loop import Exchange
+from orchestrator.coupling.turns import Exchange
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.linear_model import EmbeddedModel
 

@@ -165,7 +165,7 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     ])  # fmt: skip
     # Random signs excite every mode. They are the same in every call.
     shape = np.random.default_rng(1).choice([-1.0, 1.0], len(x_0)) * np.maximum(1.0, np.abs(x_0)) * settable
-    every = max(1, round(_SAMPLE / master.clock.step_size))
+    every = model.period * max(1, round(_SAMPLE / (model.period * master.clock.step_size)))
     best: Disagreement | None = None
     for size in SIZES:
         measured, start = _response(master, state, model, x_0, size * shape, every)

@@ -40,6 +40,7 @@ class CoupledState:
             last = first + len(access.batch.names)
             access.write(x[first:last])
             first = last
+        self._master.before = None
         self.settle()
 
     def settle(self) -> None:
@@ -62,12 +63,14 @@ class CoupledState:
     def put_back(self) -> Iterator[None]:
         """On leaving ``with``, restore all FMUs, the coupled outputs and the clock."""
         saved, y, index = self._save()
+        before = self._master.before
         wires = self._master.wires.state()
         try:
             with self._master.wires.quiet():
                 yield
         finally:
             self._restore(saved, y, index)
+            self._master.before = before
             self._master.wires.restore(wires)
 
     def _save(self) -> tuple[dict[str, Any], Matrix, int]:

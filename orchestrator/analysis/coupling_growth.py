@@ -97,8 +97,8 @@ def _run(master: Master, name: str, inputs: Numbers) -> Numbers:
     with ExitStack() as release:
         component = open_component(name, plan.description, isolated=plan.isolated)
         release.enter_context(component)
-        component.set(plan.parameters)
         component.setup(0.0, None)
+        component.set(plan.parameters)
         component.enter_initialization_mode()
         component.set(plan.inputs)
         into = RealBatch(component, exchange.inputs.names)

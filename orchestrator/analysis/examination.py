@@ -32,6 +32,7 @@ def examine(
     system: LinearModel | None,
     *,
     spectrum: Spectrum | None = None,
+    of_system: Spectrum | None = None,
     modes: Sequence[Mode] | None = None,
     shown: Sequence[Mode] | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
@@ -48,6 +49,8 @@ def examine(
         The step map composed of the blocks, and the continuous model; None where a component gives no derivatives.
     spectrum
         All eigenvalues of the step map, where they are known already.
+    of_system
+        All eigenvalues of the continuous model, where they are known already.
     modes
         Oscillations that must not depend on the perturbation; by default those of the range. If a component is
         doubtful, all oscillations from 0.1 to 2 Hz are added.
@@ -69,7 +72,13 @@ def examine(
     elif any(component.doubtful for component in blocks.components.values()) and len(model.names) <= WHOLE:
         modes = [*modes, *(mode for mode in find_spectrum(model).modes if mode.is_oscillation)]
     rightmost = [spectrum.rightmost] if spectrum is not None and spectrum.rightmost is not None else []
-    stability = confirmed(master, blocks, model, judge(model, spectrum, system))
+    stability = confirmed(master, blocks, model, judge(model, spectrum, system, of_system))
+    if model.period > 1:
+        told = (
+            f"sampled controllers repeat after {model.period} communication steps "
+            f"({model.period * master.clock.step_size:g} s): the modes are those of the map over this period"
+        )
+        return Examination(stability, (told, *verdict_warnings(stability), *warnings_of(master)))
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     shown = modes if shown is None else shown
     eigenvalues = [mode.eigenvalue for mode in [*shown, *rightmost]]

@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.errors import AnalysisError
 
+TOLERANCE = 1e-6
+"""Singular values below this fraction of the largest are taken for noise."""
+
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
 _LARGEST_EXPONENT = 300.0
 """Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
@@ -20,10 +23,17 @@ numbers."""
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedMode:
-    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal]."""
+    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal].
+
+    Attributes
+    ----------
+    doubts
+        Why it may be no mode of the system, where that was asked; see `mode_doubts`.
+    """
 
     eigenvalue: complex
     amplitude: float
+    doubts: tuple[str, ...] = ()
 
     @property
     def frequency_hz(self) -> float:
@@ -40,7 +50,7 @@ def identify_modes(
     times: NDArray[np.float64],
     signal: NDArray[np.float64],
     *,
-    tolerance: float = 1e-6,
+    tolerance: float = TOLERANCE,
     max_order: int = 24,
     highest_hz: float = 10.0,
 ) -> list[IdentifiedMode]:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from orchestrator.analysis.hub_elimination import HubEquations, hub_equations
 from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
@@ -50,6 +51,8 @@ class LinearModel:
         Largest difference between the two perturbation sizes, in elements of the components' matrices.
     sources
         How the linear model of every component was found.
+    period
+        Communication steps over which the map's power is that of the system; more than 1 with sampled controllers.
     """
 
     F: sp.csr_array
@@ -60,6 +63,7 @@ class LinearModel:
     step_size: float | None
     disagreement: float
     sources: Mapping[str, str] = field(default_factory=dict)
+    period: int = 1
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
@@ -87,8 +91,10 @@ class LinearModel:
         return A
 
     def apply(self, z: Vector) -> Vector:
-        """A·z, computed without forming A."""
-        result: Vector = self.F @ z + self.G @ self.settle(self.H @ z)
+        """A·z, computed without forming A; z may be complex, of shape (n,) or (n, k)."""
+        w = self.H @ z
+        settled = self.settle(w.real) + 1j * self.settle(w.imag) if np.iscomplexobj(w) else self.settle(w)
+        result: Vector = self.F @ z + self.G @ settled
         return result
 
     @cached_property
@@ -99,7 +105,11 @@ class LinearModel:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factorisation, which cannot be pickled or copied, and is made anew where it is needed."""
-        return {name: value for name, value in vars(self).items() if name != "settle"}
+        return {name: value for name, value in vars(self).items() if name not in ("settle", "_hub")}
+
+    @cached_property
+    def _hub(self) -> HubEquations | None:
+        return hub_equations(self.F, self.G, self.H, self.K)
 
     @property
     def number_of_states(self) -> int:
@@ -108,6 +118,9 @@ class LinearModel:
 
     def shifted(self, sigma: complex) -> ShiftedSolver:
         """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""
+        factors_of_hub = self._hub.at(sigma) if self._hub else None
+        if factors_of_hub:
+            return ShiftedSolver(factors_of_hub.solve, factors_of_hub.solve_adjoint)
         n, m = self.G.shape
         identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
         whole = sp.block_array([[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orchestrator.analysis.eigenvalue_shift import eigenvalue_shift
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import Mode
@@ -129,14 +130,6 @@ def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
 
 
 def _shift(model: LinearModel, varied: LinearModel, mode: Mode) -> float:
-    right, left = (np.array([vector[name] for name in model.names]) for vector in (mode.shape, mode.left))
-    change = np.vdot(left, _apply(varied, right) - _apply(model, right))
-    if model.step_size is not None:
-        change /= np.exp(mode.eigenvalue * model.step_size) * model.step_size
-    return float(abs(change)) / max(abs(mode.eigenvalue), _SLOWEST)
-
-
-def _apply(model: LinearModel, z: Vector) -> Vector:
-    """A·z for a complex z: the factors inside are real."""
-    result: Vector = model.apply(z.real.copy()) + 1j * model.apply(z.imag.copy())
-    return result
+    left, right = (np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape))
+    shift = eigenvalue_shift(model, varied, mode.eigenvalue, left, right)
+    return abs(shift) / max(abs(mode.eigenvalue), _SLOWEST)

@@ -92,8 +92,9 @@ def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
 
     A state that only one of the points has counts as 0 in the other's eigenvectors.
     """
-    common = [name for name in a.names if name in set(b.names)]
-    of_a, of_b = ([s.names.index(name) for name in common] for s in (a, b))
+    place_in_b = {name: k for k, name in enumerate(b.names)}
+    both = [(k, place_in_b[name]) for k, name in enumerate(a.names) if name in place_in_b]
+    of_a, of_b = [k for k, _ in both], [k for _, k in both]
     norm_a, norm_b = (np.einsum("ij,ij->i", s.left.conj(), s.right) for s in (a, b))
     product = similarity(a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]) / np.abs(
         np.outer(norm_a, norm_b)

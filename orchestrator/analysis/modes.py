@@ -1,6 +1,6 @@
 """Modes of a linear model: eigenvalues, damping ratio, frequency, participation factors, mode shapes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -9,6 +9,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.real_schur import RealSchur
 from orchestrator.arrays import Vector
 
 ZERO = 1e-3
@@ -25,6 +26,9 @@ HIGHEST_SWING_HZ = 5.0
 
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this decays within one step and is not a mode."""
+
+_ALL_VECTORS = 400
+"""Up to this number of states, all eigenvectors are computed: they take no time that anyone notices."""
 
 _REAL = 1e-2
 """A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
@@ -176,12 +180,26 @@ def find_spectrum(
     lowest_hz, highest_hz
         Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
     """
-    lambdas, left, right = eigenvectors(model)
-    chosen = in_range(lambdas, lowest_hz, highest_hz)
-    modes = [make_mode(lambdas[k], left[:, k], right[:, k], model.names) for k in chosen]
-    k = index_of_rightmost(lambdas)
-    rightmost = None if k is None else make_mode(lambdas[k], left[:, k], right[:, k], model.names)
+    lambdas, vectors = _values_and_vectors(model)
+    chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
+    wanted = chosen if k is None else [*chosen, k]
+    left, right = vectors(wanted)
+    modes = [make_mode(lambdas[i], left[:, j], right[:, j], model.names) for j, i in enumerate(wanted)]
+    rightmost = None if k is None else modes.pop()
     return Spectrum(lambdas, least_damped_first(modes), rightmost)
+
+
+def _values_and_vectors(
+    model: LinearModel,
+) -> tuple[NDArray[np.complex128], Callable[[Sequence[int]], tuple[Vector, Vector]]]:
+    """All eigenvalues [rad/s], and what gives the left and right eigenvectors of some of them, as columns."""
+    if len(model.names) <= _ALL_VECTORS:
+        lambdas, left, right = eigenvectors(model)
+        return lambdas, lambda chosen: (left[:, chosen], right[:, chosen])
+    form = RealSchur(model.A)
+    lambdas, alive = to_continuous(form.values, model.step_size)
+    places = np.flatnonzero(alive)
+    return lambdas, lambda chosen: form.vectors(places[chosen].tolist())
 
 
 def index_of_rightmost(values: NDArray[np.complex128]) -> int | None:
@@ -200,29 +218,6 @@ def oscillations(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
 def least_damped_first(modes: Iterable[Mode]) -> list[Mode]:
     """Sorted by damping ratio, then frequency."""
     return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
-
-
-def most_associated(modes: Iterable[Mode], states: Iterable[str]) -> Mode | None:
-    """The mode in which some states together take part most; None if there are no modes."""
-    wanted = tuple(states)
-    return max(modes, key=lambda mode: mode.participation_of(wanted), default=None)
-
-
-def most_opposed(modes: Iterable[Mode], side: Iterable[str], other: Iterable[str]) -> Mode | None:
-    """The mode in which two groups of states take part most while swinging against each other.
-
-    The measure is the geometric mean of the groups' participation; modes in which the groups'
-    summed shapes are less than 90° apart do not count.
-    """
-    side, other = tuple(side), tuple(other)
-
-    def opposition(mode: Mode) -> float:
-        one, two = (sum(mode.shape[name] for name in names) for names in (side, other))
-        apart = (one * two.conjugate()).real < 0
-        return float(np.sqrt(mode.participation_of(side) * mode.participation_of(other))) if apart else 0.0
-
-    best = max(modes, key=opposition, default=None)
-    return best if best is not None and opposition(best) > 0 else None
 
 
 def to_continuous(

@@ -252,15 +252,24 @@ def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) 
     return Hidden((lowest_hz, highest_hz), len(outside), least)
 
 
-def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearModel | None = None) -> Stability:
+def judge(
+    model: LinearModel,
+    spectrum: Spectrum | None = None,
+    system: LinearModel | None = None,
+    of_system: Spectrum | None = None,
+) -> Stability:
     """The verdict on a step map, or on a continuous model.
 
     Parameters
     ----------
+    model
+        Step map, or continuous model.
     spectrum
         All eigenvalues of the model where they are known already.
     system
         The continuous model of the same system; None where a component gives no derivatives.
+    of_system
+        All eigenvalues of ``system`` where they are known already.
     """
     spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)
@@ -268,7 +277,7 @@ def judge(model: LinearModel, spectrum: Spectrum | None = None, system: LinearMo
         return own
     if system is None:
         return replace(own, cause=Cause.UNKNOWN) if own.stable is False else own
-    continuous = _look_at(system, whole_spectrum(system))
+    continuous = _look_at(system, of_system or whole_spectrum(system))
     rate = continuous.largest_growth_rate
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
         slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"

@@ -10,6 +10,8 @@ import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.periodic import find_periodic_point
+from orchestrator.analysis.sampled import steps_of_period
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.master import Master
@@ -71,6 +73,8 @@ def find_operating_point(
     AnalysisError
         If no fixed point is found; the message names the states that move most.
     """
+    if (steps := steps_of_period(master, master.clock.step_size)) > 1:
+        return _periodic_point(master, steps, tolerance, accept, max_iterations)
     state = CoupledState(master)
     x = state.read()
     change = state.step_from(x) - x
@@ -100,6 +104,22 @@ def find_operating_point(
     return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
 
 
+def _periodic_point(master: Master, steps: int, tolerance: float, accept: float, most: int) -> OperatingPoint:
+    """The same with sampled controllers: all must repeat after a period, and the limits are those of all its steps."""
+    names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
+    found = find_periodic_point(master, accept * steps, most)
+    period = steps * master.clock.step_size
+    tolerance *= steps * min(1.0, master.clock.step_size / _SHORT)
+    if not found.residual <= tolerance:
+        worst = ", ".join(f"{names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3])
+        raise AnalysisError(
+            f"no steady state found: {_newton_in_words(found.iterations)} a period of {period:g} s, after which "
+            f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}"
+        )
+    values = dict(zip(names, found.x.tolist(), strict=True))
+    return OperatingPoint(found.residual, found.residual / period, found.first, found.iterations, values)
+
+
 def what_to_check(master: Master) -> str:
     """Where to look for the reason why an initialised system does not stand still."""
     if master.late_starts:
@@ -127,7 +147,8 @@ def _largest(change: Matrix) -> float:
 
 def _newton_correction(master: Master, n: int, change: Matrix) -> Matrix:
     """Solve (I − A)·dx = change. Outputs that the exchange holds follow from the states."""
-    model = compose(Blocks(master), gauss_seidel(master.schedule.groups))
+    schedule = gauss_seidel(master.schedule.groups)
+    model = compose(Blocks(master, schedule=schedule), schedule)
     right = np.zeros(len(model.names))
     right[:n] = change
     # A turn of all angles changes nothing, so I − A is singular. The shift keeps the solution from moving along it.

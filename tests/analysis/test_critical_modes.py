@@ -85,3 +85,11 @@ def test_equations_with_outputs_under_way_mean_their_matrix():
 def test_a_search_over_nothing_is_refused(arguments):
     with pytest.raises(AnalysisError, match="is none"):
         find_critical_modes(model(), *arguments)
+
+
+def test_equal_modes_of_equal_units_are_all_found():
+    block = [[0, 1], [-((2 * np.pi * 0.8) ** 2), -4 * np.pi * 0.8 * 0.05]]
+    A = scipy.linalg.block_diag(block, block, block, *([[-d]] for d in np.linspace(0.05, 40, 250)))
+    T = np.linalg.qr(RNG.standard_normal((len(A), len(A))))[0]
+    system = LinearModel.from_matrix(T @ A @ T.T, tuple(f"x{k}" for k in range(len(A))), None)
+    assert [m.frequency_hz for m in find_critical_modes(system)] == pytest.approx(3 * [0.8 * np.sqrt(1 - 0.05**2)])

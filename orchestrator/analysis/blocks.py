@@ -1,0 +1,262 @@
+"""Linearised components of a running system, with what connects them."""
+
+import copy
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from orchestrator.analysis.component_linearization import (
+    ComponentLinearization,
+    linearize_by_derivatives,
+    linearize_component,
+)
+from orchestrator.analysis.delays import WireLink, links_of
+from orchestrator.analysis.equations import Indices
+from orchestrator.analysis.held_inputs import LineMap, over_parts
+from orchestrator.analysis.sampled import steps_of_period
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.step_awareness import knows_step, other_step
+from orchestrator.coupling.system import Endpoint
+from orchestrator.errors import AnalysisError, InputError
+
+
+class Blocks:
+    """Linearised components with their wiring.
+
+    Parameters
+    ----------
+    master
+        A running system at its operating point. It is left as it was.
+    step_size
+        Communication step to linearise over [s]; by default the master's own. Components that know the step are
+        given this one meanwhile.
+    inputs, outputs
+        Names ``component.variable`` of the inputs and outputs of `state_space`: tunable parameters or open inputs, and
+        any outputs.
+    derivatives
+        Difference the FMUs' own derivatives as well, which `continuous_model` needs. This is not done if a component
+        knows the step, because blocks for a step map cannot serve a continuous model then.
+    without_step
+        For `continuous`: components that know the step are given 0 meanwhile.
+    directional
+        Take the FMUs' own directional derivatives instead of perturbing them.
+    known
+        Components whose linear model is known already, such as an identified one; they are not perturbed.
+    schedule
+        That the step maps will be composed for; the master's by default. Where its inputs follow straight lines,
+        components are linearised over a part of the step, and not told the step.
+
+    Attributes
+    ----------
+    parts
+        In how many parts a component does the communication step.
+    period
+        Communication steps after which the system repeats; 1 where each step is like every other.
+    declared
+        By component and output: the inputs that its FMU says it depends on directly.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable, or an input cannot be perturbed.
+    AnalysisError
+        If a component is known over the whole step, and does it in parts.
+    """
+
+    def __init__(
+        self,
+        master: Master,
+        step_size: float | None = None,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        *,
+        derivatives: bool = False,
+        without_step: bool = False,
+        directional: bool = False,
+        known: Mapping[str, ComponentLinearization] | None = None,
+        schedule: Schedule | None = None,
+    ) -> None:
+        known = known or {}
+        schedule = schedule or master.schedule
+        self._step_aware = [name for name in master.components if knows_step(master, name)]
+        self._without_step, self._directional = without_step, directional
+        self._untold = without_step or schedule.is_second_order
+        self._derivatives = without_step or (derivatives and (self._untold or not self._step_aware))
+        self.step_size = step_size or master.clock.step_size
+        self.parts = schedule.parts(self.step_size)
+        if known and self.parts > 1:
+            raise AnalysisError(
+                f"components {', '.join(known)} are known over a whole step of {self.step_size:g} s, which schedule "
+                f"{schedule.name!r} does in {self.parts} parts; take gauss-seidel or jacobi"
+            )
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
+        _check_driven(master, self._driven)
+        self.period = steps_of_period(master, self.step_size, known)
+        self.components = {name: known.get(name) or self._linearize(master, name) for name in master.exchanges}
+        # External inputs follow the coupled outputs, as if a further component gave them.
+        first_external = len(master.output_names)
+        self.sources = {
+            name: np.concatenate(
+                [exchange.sources, [first_external + self.inputs.index(f"{name}.{v}") for v in self._driven[name]]]
+            ).astype(np.int64)
+            for name, exchange in master.exchanges.items()
+        }
+        self.declared = {
+            name: {output: master.components[name].description.feedthrough(output) for output in e.outputs.names}
+            for name, e in master.exchanges.items()
+        }
+        self.schedule = master.schedule
+        self.output_names = master.output_names
+        self.links: dict[Endpoint, WireLink] = links_of(master)
+        first = 0
+        self.window: dict[str, slice] = {}
+        for name, exchange in master.exchanges.items():
+            self.window[name] = slice(first, first + len(exchange.outputs.names))
+            first += len(exchange.outputs.names)
+
+    def renew(self, master: Master, names: Iterable[str]) -> None:
+        """Linearise some components again, whose parameters were changed."""
+        self.components.update({name: self._linearize(master, name) for name in names})
+
+    def with_component(self, master: Master, name: str) -> "Blocks":
+        """The same blocks, with one component linearised as it is now: beside a parameter that was changed."""
+        other = copy.copy(self)
+        other.components = self.components | {name: self._linearize(master, name)}
+        return other
+
+    def _linearize(self, master: Master, name: str) -> ComponentLinearization:
+        return linearize_within(
+            master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
+            derivatives=self._derivatives, without_step=self._untold, directional=self._directional,
+        )  # fmt: skip
+
+    def check_made_for(self, schedule: Schedule | None) -> None:
+        """Refuse blocks whose components were given another communication step than a schedule's; None: no step."""
+        told = schedule is not None and not schedule.is_second_order
+        if self._step_aware and told == self._untold:
+            raise ValueError(
+                f"components {', '.join(self._step_aware)} know the communication step; linearise them with "
+                f"without_step={not told} for a {'step map' if told else 'continuous model'}"
+            )
+        if schedule is not None and schedule.is_second_order and schedule.parts(self.step_size) != self.parts:
+            raise ValueError(
+                f"components were linearised for {self.parts} parts of a step, and schedule {schedule.name!r} has "
+                f"{schedule.parts(self.step_size)}"
+            )
+
+    def over_step(self, name: str) -> LineMap:
+        """The map of a component over the whole step, with inputs that follow straight lines."""
+        c = self.components[name]
+        if self.parts == 1:
+            return LineMap(c.A, c.B, np.zeros_like(c.B))
+        return over_parts(c.A, c.B, self.parts)
+
+    @property
+    def serves_continuous(self) -> bool:
+        """Whether the components were linearised without a communication step."""
+        return self._without_step or not self._step_aware
+
+    @property
+    def how(self) -> dict[str, str]:
+        """How the linear model of every component was found."""
+        return {name: c.source for name, c in self.components.items()}
+
+    @property
+    def disagreement(self) -> float:
+        """The largest of all components' disagreements."""
+        return max(c.disagreement for c in self.components.values())
+
+    def linked(self, name: str) -> dict[int, int]:
+        """Inputs of a component that a connection of `links` feeds: their place among its inputs, and the link's."""
+        inputs, targets = self.components[name].inputs, list(self.links)
+        return {inputs.index(t.variable): targets.index(t) for t in targets if t.component == name}
+
+    def entries(self, name: str, newest: Indices, arriving: Indices) -> Indices:
+        """Where the values that reach a component's inputs stand in w.
+
+        Parameters
+        ----------
+        name
+            Of the component.
+        newest
+            Where the values of all outputs and external inputs stand.
+        arriving
+            Where what arrives over the links stands.
+        """
+        found: Indices = newest[self.sources[name]].copy()
+        for place, link in self.linked(name).items():
+            found[place] = arriving[link]
+        return found
+
+    def state_names(self) -> list[str]:
+        """Names ``component.state`` of all states, in their order."""
+        return [f"{name}.{state}" for name, c in self.components.items() for state in c.states]
+
+    def state_windows(self) -> dict[str, slice]:
+        """The range of each component's states in the vector of all states."""
+        windows, first = {}, 0
+        for name, c in self.components.items():
+            windows[name] = slice(first, first + len(c.states))
+            first += len(c.states)
+        return windows
+
+
+def linearize_within(
+    master: Master,
+    name: str,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
+    *,
+    derivatives: bool = False,
+    without_step: bool = False,
+    directional: bool = False,
+) -> ComponentLinearization:
+    """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
+
+    Parameters
+    ----------
+    master
+        At the operating point; it is left as it was.
+    name
+        Of the component.
+    step_size
+        Communication step to linearise over [s].
+    inputs, observed, derivatives
+        As `linearize_component`.
+    without_step, directional
+        As `Blocks`.
+    """
+    exchange, time = master.exchanges[name], master.time
+    with other_step(master, name, 0.0 if without_step else step_size):
+        if directional:
+            return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
+        return linearize_component(exchange, time, step_size, inputs, observed, derivatives=derivatives)
+
+
+def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
+    """Variables of every component among names ``component.variable``."""
+    found: dict[str, list[str]] = {name: [] for name in master.components}
+    for full in names:
+        component, _, variable = full.partition(".")
+        if component not in found or variable not in master.components[component].description.variables:
+            raise InputError(f"linear model: there is no variable {full!r}; `gfor info` lists the variables of an FMU")
+        found[component].append(variable)
+    return found
+
+
+def _check_driven(master: Master, driven: Mapping[str, Sequence[str]]) -> None:
+    """Refuse an input that cannot be changed during a run, or that a connection feeds."""
+    fed = {str(c.target): str(c.source) for c in master.system.connections}
+    for name, variables in driven.items():
+        for variable in variables:
+            info = master.components[name].description.variables[variable]
+            if f"{name}.{variable}" in fed:
+                raise InputError(f"linear model: {name}.{variable} is fed by {fed[f'{name}.{variable}']}")
+            if info.type != "Real" or not (info.causality == "input" or info.variability == "tunable"):
+                raise InputError(
+                    f"linear model: {name}.{variable} is a {info.variability} {info.causality} of type {info.type}; "
+                    "an input must be a Real tunable parameter or an open Real input"
+                )

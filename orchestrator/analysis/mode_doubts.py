@@ -1,0 +1,211 @@
+"""Doubts about modes that were identified in a signal: what a window, a model order and noise may have made up."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.analysis.identification import IdentifiedMode
+from orchestrator.analysis.window_halves import WindowPart, near
+
+FEWEST_PERIODS = 2.0
+"""A mode with fewer periods in the window may be a part of a trend."""
+
+LARGEST_DAMPING = 40.0
+"""With a higher damping [%] less than a fifteenth of an amplitude is left after one period."""
+
+LEAST_ENERGY = 1e-3
+"""Least part of the energy of all oscillations in the window."""
+
+AGREE = 0.05
+"""Largest distance, as a part of |λ|, to the same mode in another identification of the same signal."""
+
+STEEP = 10.0
+"""A straight line that changes by this many times the strongest oscillation may hide smaller ones."""
+
+SHORTER, COARSER = 0.1, 30.0
+"""The other identification leaves out this part of the window at its beginning, and takes singular values for noise
+that are this factor larger, so that its order is lower where noise made modes."""
+
+
+def with_doubts(
+    modes: Sequence[IdentifiedMode],
+    length: float,
+    others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart] = (),
+    noise_like: bool = False,
+) -> list[IdentifiedMode]:
+    """The modes, each with its doubts; real poles have none, as they do not swing.
+
+    Parameters
+    ----------
+    modes
+        As identified, all of the signal.
+    length
+        Of the window [s].
+    others
+        Modes of the same signal by another order and window; None where that shows none.
+    halves
+        The two halves of the window, each with its own modes.
+    noise_like
+        Whether the modes leave nothing of the signal but noise.
+    """
+    energies = [_energy(mode, length) for mode in modes]
+    total = sum(energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length))
+    return [
+        replace(mode, doubts=tuple(_doubts(mode, length, energy / total if total else 1.0, others, halves, noise_like)))
+        if mode.frequency_hz > 0
+        else mode
+        for mode, energy in zip(modes, energies, strict=True)
+    ]
+
+
+def is_trend(mode: IdentifiedMode, length: float) -> bool:
+    """Whether a component is a part of an offset or a trend.
+
+    In the window it changes by less than a factor e and turns by less than one radian.
+    """
+    return abs(mode.eigenvalue) * length < 1
+
+
+def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float) -> list[IdentifiedMode]:
+    """The modes without those that are too small.
+
+    A straight line comes out as exponentials of huge amplitudes that cancel, so that oscillations are compared with the
+    strongest one that swings at least once in the window.
+
+    Parameters
+    ----------
+    modes
+        As identified.
+    length
+        Of the window [s].
+    weakest
+        Least part of the largest amplitude.
+    """
+    largest = max((mode.amplitude for mode in modes), default=0.0)
+    swing = max((mode.amplitude for mode in modes if _swings(mode, length)), default=largest)
+    return [mode for mode in modes if mode.amplitude >= weakest * (swing if mode.frequency_hz > 0 else largest)]
+
+
+def _swings(mode: IdentifiedMode, length: float) -> bool:
+    return mode.frequency_hz * length >= 1
+
+
+def _doubts(
+    mode: IdentifiedMode,
+    length: float,
+    share: float,
+    others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart],
+    noise_like: bool,
+) -> list[str]:
+    found = []
+    periods = mode.frequency_hz * length
+    if periods < FEWEST_PERIODS:
+        found.append(f"the window has {_fewer(periods)} periods of it")
+    if mode.damping_percent > LARGEST_DAMPING:
+        found.append(f"its damping of {mode.damping_percent:.0f} % leaves next to nothing after a period")
+    if share < LEAST_ENERGY:
+        found.append(f"it has {100 * share:.1g} % of the energy of all oscillations")
+    shown = [half.shows(mode) for half in halves]
+    other = near(others, mode)
+    by_another = "a model of another order, of a slightly shorter window,"
+    if other is None and not (noise_like and shown == [True, True]):
+        found.append(f"{by_another} does not show it")
+    elif other is not None and (moved := abs(other.eigenvalue / mode.eigenvalue - 1)) > AGREE:
+        found.append(f"{by_another} moves it by {100 * moved:.2g} %")
+    differing = [
+        f"the {name} half of the window shows {instead.frequency_hz:.4g} Hz and {instead.damping_percent:.3g} %"
+        for name, half, shows in zip(("first", "second"), halves, shown, strict=False)
+        if shows is False and (instead := near(half.modes, mode))
+    ]
+    if differing:
+        found.append(f"{', '.join(differing)} in its place")
+    return found
+
+
+def _fewer(periods: float) -> str:
+    """A number of periods that are too few, with as many digits as show this."""
+    texts = (f"{periods:.{digits}g}" for digits in range(2, 17))
+    return next((text for text in texts if float(text) < FEWEST_PERIODS), repr(periods))
+
+
+def _energy(mode: IdentifiedMode, length: float) -> float:
+    """Integral of |A·e^{λt}|² over the window."""
+    rate = 2 * mode.eigenvalue.real * length
+    return mode.amplitude**2 * length * float(np.expm1(rate) / rate if abs(rate) > 1e-9 else 1.0)
+
+
+def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> str:
+    """A sentence on a window that is too short for the strongest oscillation; else empty.
+
+    Parameters
+    ----------
+    modes
+        The strongest first.
+    start, stop
+        Of the window [s].
+    """
+    length = stop - start
+    strongest = next((mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None)
+    if strongest is None or strongest.frequency_hz * length >= FEWEST_PERIODS:
+        return ""
+    return (
+        f"The window from {start:g} to {stop:g} s is too short: it has {_fewer(strongest.frequency_hz * length)} "
+        f"periods of its strongest oscillation at {strongest.frequency_hz:.4g} Hz, and modes need "
+        f"{FEWEST_PERIODS:g} at least. Give an earlier start, a later stop, or a longer run."
+    )
+
+
+def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
+    """A sentence where no oscillation was found in a window of this length [s]; else empty.
+
+    Parameters
+    ----------
+    modes
+        As identified.
+    length
+        Of the window [s].
+    """
+    if not modes:
+        return "Nothing above the noise: the window shows no mode."
+    if any(mode.frequency_hz > 0 and not is_trend(mode, length) for mode in modes):
+        return ""
+    return "No oscillation above the noise: the window shows a trend or a decay only."
+
+
+def straight_line(times: NDArray[np.float64], signal: NDArray[np.float64]) -> float:
+    """By how much the straight line through a signal changes from its first to its last sample [unit of the signal].
+
+    Parameters
+    ----------
+    times, signal
+        Shape (n,); [s] and any unit.
+    """
+    centred = times - times.mean()
+    return float(centred @ (signal - signal.mean()) / (centred @ centred) * (times[-1] - times[0]))
+
+
+def over_a_trend(modes: Sequence[IdentifiedMode], length: float, line: float) -> str:
+    """A sentence on a trend that is large beside the strongest oscillation, or that is all there is; else empty.
+
+    Parameters
+    ----------
+    modes
+        The strongest first.
+    length
+        Of the window [s].
+    line
+        Change of the straight line through the signal, as `straight_line`.
+    """
+    swing = max((2 * mode.amplitude for mode in modes if _swings(mode, length)), default=0.0)
+    trends = any(is_trend(mode, length) for mode in modes)
+    if not trends or abs(line) <= STEEP * swing:
+        return ""
+    beside = f"{abs(line) / swing:.0f} times its strongest oscillation" if swing else "and no oscillation was found"
+    return (
+        f"The signal drifts by {line:.3g} along a straight line, {beside}: smaller modes may be hidden below this "
+        "trend. Give a shorter window, or take a signal without the trend, such as a difference of two."
+    )

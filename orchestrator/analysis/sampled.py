@@ -1,0 +1,62 @@
+"""Sampled controllers: after how many communication steps a running system repeats.
+
+A controller that is sampled beside the communication step, or that works on phase quantities, does not do the same in
+each step. At rest it repeats after a common multiple of the step, its sample time and the network's period.
+"""
+
+from collections.abc import Iterable
+from fractions import Fraction
+from math import gcd, lcm
+
+from orchestrator.coupling.master import Master
+from orchestrator.errors import AnalysisError
+
+LONGEST = 1.0
+"""Common periods above this [s] are refused."""
+
+_FINEST = 10**12
+"""Times and frequencies are taken as fractions with denominators up to this."""
+
+
+def repeating(master: Master) -> dict[str, tuple[Fraction, ...]]:
+    """By name of a sampled component: the times after which something in it repeats [s]."""
+    found = {}
+    for name, component in master.components.items():
+        d = component.description
+        times = [Fraction(d.sample_time).limit_denominator(_FINEST)] if d.sample_time else []
+        if d.frequency:
+            value = float(component.values([d.frequency])[d.frequency])
+            times.append(1 / Fraction(value).limit_denominator(10**6))
+        if times:
+            found[name] = tuple(times)
+    return found
+
+
+def steps_of_period(master: Master, step_size: float, without: Iterable[str] = ()) -> int:
+    """Communication steps [s] after which all components repeat; 1 where each step is like every other.
+
+    Raises
+    ------
+    AnalysisError
+        If they repeat together after a second at the earliest.
+    """
+    times = {name: t for name, t in repeating(master).items() if name not in set(without)}
+    step = Fraction(step_size).limit_denominator(_FINEST)
+    if all(step % time == 0 for found in times.values() for time in found):
+        return 1
+    common = step
+    for time in (time for found in times.values() for time in found):
+        common = _common(common, time)
+    if common > LONGEST:
+        told = "; ".join(f"{name}: {', '.join(f'{float(t):.6g} s' for t in found)}" for name, found in times.items())
+        raise AnalysisError(
+            f"sampled components and the communication step of {step_size:g} s repeat together after "
+            f"{float(common):.4g} s only, more than {LONGEST:g} s ({told}); take a step that divides these times, or "
+            "that they divide"
+        )
+    return int(common / step)
+
+
+def _common(a: Fraction, b: Fraction) -> Fraction:
+    """Least common multiple."""
+    return Fraction(lcm(a.numerator, b.numerator), gcd(a.denominator, b.denominator))

@@ -1,0 +1,11 @@
+"""How many processor cores there are for a command, and how many threads it can have step."""
+
+import os
+
+MOST_THREADS = 64
+"""As ``MOST_MEMBERS`` of ``coupling/team.c``."""
+
+
+def number_of_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
