@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.loop import Exchange
+from orchestrator.coupling.memory import apart
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import ComponentPlan, Endpoint, System
+from orchestrator.coupling.turns import Exchange
 from orchestrator.coupling.wires import Wires
-from orchestrator.errors import InputError
+from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.instance import open_component
@@ -24,6 +25,8 @@ from orchestrator.fmi.instance import open_component
 _INITIAL_PASSES = 20
 _JUMP = 1e-6
 """Of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were."""
+_SAME = 1e-6
+"""Relative difference of a parameter from what was set, as of an FMU that computes in single precision."""
 
 
 def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
@@ -73,7 +76,7 @@ class CoupledComponents:
         self.system, self.schedule, self.clock = system, schedule, Clock(step_size)
         self.components: dict[str, Component] = {}
         self.late_starts: dict[str, str] = {}
-        self._release = ExitStack()
+        self._release, self._stop_time = ExitStack(), stop_time
         try:
             self._instantiate(stop_time, opener)
             self.exchanges = self._connect()
@@ -92,8 +95,28 @@ class CoupledComponents:
             component = opener(name, plan, folders[path])
             self._release.enter_context(component)
             self.components[name] = component
-            component.set(plan.parameters)
-            component.setup(0.0, stop_time)
+            _begin(component, plan, stop_time)
+
+    def restart(self, system: System) -> None:
+        """Bring the same FMUs to another common start, as if they were new.
+
+        Parameters
+        ----------
+        system
+            The same components and connections with other values; nothing may disturb a connection.
+
+        Raises
+        ------
+        ComponentError
+            If an FMU cannot be reset or initialised; the system is of no use then.
+        """
+        self.system, self.late_starts = system, {}
+        for name, plan in system.components.items():
+            component = self.components[name]
+            component.reset()
+            _begin(component, plan, self._stop_time)
+        self._values[:] = 0.0
+        self._initialise()
 
     def _connect(self) -> dict[str, Exchange]:
         sources = list(dict.fromkeys(c.source for c in self.system.connections))
@@ -110,7 +133,7 @@ class CoupledComponents:
             window = slice(own[0], own[-1] + 1) if own else slice(0)
             exchanges[name] = Exchange(
                 component,
-                RealBatch(component, [c.target.variable for c in feeding]),
+                RealBatch(component, [c.target.variable for c in feeding], apart(len(feeding))),
                 RealBatch(component, [sources[i].variable for i in own], self.y[window]),
                 window,
                 np.array([place[c.source] for c in feeding], dtype=np.int64),
@@ -125,6 +148,7 @@ class CoupledComponents:
         """Bring all FMUs through initialisation, with the first inputs that the schedule gives them."""
         for name, component in self.components.items():
             component.enter_initialization_mode()
+            _check_taken(name, component, self.system.components[name])
             component.set(self.system.components[name].inputs)
         if self.schedule.first_inputs == "consistent":
             self._propagate()
@@ -202,6 +226,33 @@ class CoupledComponents:
         self.wires.settle()
         self.exchange_inputs(name)
         self.exchanges[name].outputs.read()
+
+
+def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -> None:
+    """Set a new component up; some FMUs forget the parameters that they were given before that."""
+    component.setup(0.0, stop_time)
+    component.set(plan.parameters)
+
+
+def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
+    """Whether a component has the parameters that it was given.
+
+    Raises
+    ------
+    ComponentError
+        If it reads otherwise: a study of it would be one of another device.
+    """
+    try:
+        values = component.values(plan.parameters)
+    except ComponentError:
+        return  # what cannot be read cannot be judged
+    for parameter, given in plan.parameters.items():
+        if not np.isclose(values[parameter], given, rtol=_SAME, atol=0.0):
+            raise ComponentError(
+                name, "fmi2SetReal", "OK",
+                f"the parameter {parameter} was set to {given:g} and reads {values[parameter]:g}, so the FMU did not "
+                "take it; leave it out of the case, or have its author export the FMU with that value",
+            )  # fmt: skip
 
 
 def _jump(names: Sequence[str], before: Numbers, after: Numbers) -> str:

@@ -1,15 +1,15 @@
 /* The master's inner loop over FMI 2.0 function pointers: gather inputs, set, step, get, and note where outputs went.
-   `loop.py` describes the same structures to Python. */
+   `compiled_loop.py` describes the same structures to Python. Compiled behind `team.c`, whose threads share the calls of
+   a group. */
 #include <math.h>
-
-#include "clock.h"
-#include "fmi.h"
+#include <string.h>
 
 /* Where one output went since somebody last looked: extremes, the last value and change, and how often it turned. */
 struct track {
     double low, high, last, change, turns;
 };
 
+/* As large as two lines of the processor's cache, so that threads do not write to the same one. */
 struct call {
     void *component;
     get_set set_real, get_real;
@@ -18,12 +18,22 @@ struct call {
     double *inputs, *outputs;
     const int64_t *sources; /* index in y of what feeds each input */
     int64_t n_inputs, n_outputs;
-    int64_t group;
-    double spent; /* seconds inside the FMU's functions, summed up */
+    double *fresh; /* where a thread leaves outputs until all have stepped */
+    double spent; /* seconds for inputs and the FMU's functions, summed up */
     struct track *tracks; /* one for each output */
+    int32_t status, stage; /* of a thread's call that was refused */
+    int64_t unused;
 };
 
-enum { SET = 1, STEP = 2, GET = 3, NOT_FINITE = -1 };
+/* Calls that step side by side: from `first` to before `last`. Where threads share them, `own` are done by the caller
+   alone, and thread k begins with shared[begin[k]]. */
+struct group {
+    int64_t first, last;
+    const int64_t *own, *shared, *begin;
+    int64_t n_own;
+};
+
+enum { NONE = 0, SET = 1, STEP = 2, GET = 3, NOT_FINITE = -1 };
 
 /* Note new outputs; the index of the first that is no finite number, or -1. */
 static int64_t follow(struct track *tracks, const double *values, int64_t n) {
@@ -40,45 +50,199 @@ static int64_t follow(struct track *tracks, const double *values, int64_t n) {
     return -1;
 }
 
+/* Gather inputs, set them and step. What is refused is named in the call. */
+static int step_one(struct call *c, const double *y, double time, double step_size) {
+    for (int64_t i = 0; i < c->n_inputs; ++i) c->inputs[i] = y[c->sources[i]];
+    c->stage = SET;
+    if (c->n_inputs && (c->status = c->set_real(c->component, c->input_references, (size_t)c->n_inputs, c->inputs)) > 1)
+        return c->status;
+    c->stage = STEP;
+    if ((c->status = c->step(c->component, time, step_size, 1)) > 1) return c->status;
+    c->stage = NONE;
+    return 0;
+}
+
+static int read_one(struct call *c, double *outputs) {
+    if (!c->n_outputs) return 0;
+    c->stage = GET;
+    if ((c->status = c->get_real(c->component, c->output_references, (size_t)c->n_outputs, outputs)) > 1) return c->status;
+    c->stage = NONE;
+    return 0;
+}
+
+/* One communication step of all. */
+struct now {
+    struct call *calls;
+    const double *y;
+    double time, step_size;
+};
+
+static void whole_call(void *of, int64_t which) {
+    const struct now *now = of;
+    struct call *c = &now->calls[which];
+    const double start = seconds();
+    if (!step_one(c, now->y, now->time, now->step_size)) read_one(c, c->fresh);
+    c->spent += seconds() - start;
+}
+
+static int timed_step(const struct now *now, struct call *c) {
+    const double start = seconds();
+    const int status = step_one(c, now->y, now->time, now->step_size);
+    c->spent += seconds() - start;
+    return status;
+}
+
+static int timed_reading(struct call *c) {
+    const double start = seconds();
+    const int status = read_one(c, c->outputs);
+    c->spent += seconds() - start;
+    return status;
+}
+
+/* Step a group; the status of what was refused, NOT_FINITE, or 0, and failure = {, call, SET | STEP | GET or output}. */
+static int step_group(const struct now *now, const struct group *g, struct team *team, int64_t *failure) {
+    const int together = team && g->begin;
+    if (together) team_do(team, g->own, g->n_own, g->shared, g->begin);
+    for (int64_t i = g->first; i < g->last; ++i) {
+        struct call *c = &now->calls[i];
+        if (together ? c->stage == SET || c->stage == STEP : timed_step(now, c)) {
+            failure[1] = i, failure[2] = c->stage;
+            return c->status;
+        }
+    }
+    for (int64_t i = g->first; i < g->last; ++i) {
+        struct call *c = &now->calls[i];
+        if (together ? c->stage == GET : timed_reading(c)) {
+            failure[1] = i, failure[2] = GET;
+            return c->status;
+        }
+        if (together) memcpy(c->outputs, c->fresh, (size_t)c->n_outputs * sizeof *c->outputs);
+        if ((failure[2] = follow(c->tracks, c->outputs, c->n_outputs)) >= 0) {
+            failure[1] = i;
+            return NOT_FINITE;
+        }
+    }
+    return 0;
+}
+
 /* Do `count` communication steps from `index`. Returns 0, or the status of the call that failed with
    failure = {steps completed, call, SET | STEP | GET}; or NOT_FINITE with failure = {steps completed, call, output}.
-   Calls of one group stand together, in order. */
-EXPORT int advance(struct call *calls, int64_t n, const double *y, int64_t index, int64_t count, double step_size,
-                   int64_t *failure) {
+   Where several are refused in one step, it is the first in the schedule's order, whoever did it. */
+EXPORT int advance(struct call *calls, const struct group *groups, int64_t n_groups, struct team *team, const double *y,
+                   int64_t index, int64_t count, double step_size, int64_t *failure) {
+    struct now now = {calls, y, 0, step_size};
+    if (team) team_agree(team, whole_call, &now);
     for (int64_t k = index; k < index + count; ++k) {
-        const double time = (double)k * step_size;
-        for (int64_t first = 0, last; first < n; first = last) {
-            for (last = first; last < n && calls[last].group == calls[first].group; ++last) {
-                struct call *c = &calls[last];
-                int status;
-                for (int64_t i = 0; i < c->n_inputs; ++i) c->inputs[i] = y[c->sources[i]];
-                const double start = seconds();
-                if (c->n_inputs && (status = c->set_real(c->component, c->input_references, (size_t)c->n_inputs, c->inputs)) > 1) {
-                    failure[0] = k, failure[1] = last, failure[2] = SET;
-                    return status;
-                }
-                if ((status = c->step(c->component, time, step_size, 1)) > 1) {
-                    failure[0] = k, failure[1] = last, failure[2] = STEP;
-                    return status;
-                }
-                c->spent += seconds() - start;
-            }
-            for (int64_t i = first; i < last; ++i) {
-                struct call *c = &calls[i];
-                int status;
-                if (!c->n_outputs) continue;
-                const double start = seconds();
-                if ((status = c->get_real(c->component, c->output_references, (size_t)c->n_outputs, c->outputs)) > 1) {
-                    failure[0] = k, failure[1] = i, failure[2] = GET;
-                    return status;
-                }
-                c->spent += seconds() - start;
-                if ((failure[2] = follow(c->tracks, c->outputs, c->n_outputs)) >= 0) {
-                    failure[0] = k, failure[1] = i;
-                    return NOT_FINITE;
-                }
+        now.time = (double)k * step_size;
+        for (int64_t g = 0; g < n_groups; ++g) {
+            const int status = step_group(&now, &groups[g], team, failure);
+            if (status) {
+                failure[0] = k;
+                return status;
             }
         }
+    }
+    return 0;
+}
+
+/* -- steps in which inputs follow straight lines: `MidpointLoop` in second_order.py, to the last bit ------------------ */
+
+enum { UNSETTLED = -2, PASSES = 20 };
+
+static int give(struct call *c) {
+    if (!c->n_inputs) return 0;
+    return c->set_real(c->component, c->input_references, (size_t)c->n_inputs, c->inputs);
+}
+
+/* One component's step in parts, with inputs on lines from `from` to `to`. Returns the failing call's kind, or 0. */
+static int walk(struct call *c, const double *from, const double *to, int64_t k, int64_t parts, double step_size,
+                int *status) {
+    const double part = step_size / (double)parts;
+    for (int64_t j = 0; j < parts; ++j) {
+        const double along = ((double)j + 0.5) / (double)parts;
+        for (int64_t i = 0; i < c->n_inputs; ++i) {
+            const int64_t s = c->sources[i];
+            const double slope = to[s] - from[s], rise = slope * along;
+            c->inputs[i] = from[s] + rise;
+        }
+        if ((*status = give(c)) > 1) return SET;
+        if ((*status = c->step(c->component, (double)(k * parts + j) * part, part, 1)) > 1) return STEP;
+    }
+    return 0;
+}
+
+/* Whether a component's inputs differ from the newest outputs; they are gathered. */
+static int renewed(struct call *c, const double *y) {
+    int changed = 0;
+    for (int64_t i = 0; i < c->n_inputs; ++i) {
+        if (c->inputs[i] != y[c->sources[i]]) changed = 1;
+        c->inputs[i] = y[c->sources[i]];
+    }
+    return changed;
+}
+
+/* As `advance`. `direct` tells which components' outputs depend on inputs directly; `before` has the outputs one step
+   earlier, `end` is room for as many. y is written through the calls' outputs. */
+EXPORT int advance_lines(struct call *calls, const struct group *groups, int64_t n_groups, const double *y,
+                         const int64_t *direct, double *before, double *end, int64_t outputs, int64_t parts, int64_t index,
+                         int64_t count, double step_size, int64_t *failure) {
+    const int64_t n = n_groups ? groups[n_groups - 1].last : 0;
+    for (int64_t k = index; k < index + count; ++k) {
+        int status;
+        failure[0] = k;
+        for (int64_t i = 0; i < outputs; ++i) {
+            const double twice = 2 * y[i];
+            end[i] = twice - before[i];
+            before[i] = y[i];
+        }
+        for (int64_t g = 0; g < n_groups; ++g) {
+            const int64_t first = groups[g].first, last = groups[g].last;
+            for (int64_t m = first; m < last; ++m) {
+                const double start = seconds();
+                if ((failure[2] = walk(&calls[m], before, end, k, parts, step_size, &status))) {
+                    failure[1] = m;
+                    return status;
+                }
+                calls[m].spent += seconds() - start;
+            }
+            for (int64_t m = first; m < last; ++m) {
+                struct call *c = &calls[m];
+                const double start = seconds();
+                failure[1] = m;
+                if (direct[m]) {
+                    for (int64_t i = 0; i < c->n_inputs; ++i) c->inputs[i] = end[c->sources[i]];
+                    failure[2] = SET;
+                    if ((status = give(c)) > 1) return status;
+                }
+                failure[2] = GET;
+                if ((status = read_one(c, c->outputs)) > 1) return status;
+                c->spent += seconds() - start;
+            }
+            for (int64_t m = first; m < last; ++m)
+                for (int64_t i = 0; i < calls[m].n_outputs; ++i) end[calls[m].outputs - y + i] = calls[m].outputs[i];
+        }
+        int changed = 1;
+        for (int pass = 0; changed && pass < PASSES; ++pass) {
+            changed = 0;
+            for (int64_t m = 0; m < n; ++m) {
+                struct call *c = &calls[m];
+                if (!renewed(c, y)) continue;
+                const double start = seconds();
+                failure[1] = m, failure[2] = SET;
+                if ((status = give(c)) > 1) return status;
+                if (direct[m]) {
+                    failure[2] = GET;
+                    if ((status = read_one(c, c->outputs)) > 1) return status;
+                    changed = 1;
+                }
+                c->spent += seconds() - start;
+            }
+        }
+        for (int64_t m = 0; m < n; ++m) {
+            failure[1] = m;
+            if ((failure[2] = follow(calls[m].tracks, calls[m].outputs, calls[m].n_outputs)) >= 0) return NOT_FINITE;
+        }
+        if (changed) return UNSETTLED;
     }
     return 0;
 }

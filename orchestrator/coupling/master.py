@@ -31,6 +31,8 @@ class Master(Stepper):
         Told to the FMUs at set-up [s].
     opener
         Brings a component to life, from its name, its plan and the folder with its FMU's files.
+    threads
+        How many step FMUs; None for as many as make a step shortest, up to one for each core. No value depends on it.
 
     Attributes
     ----------
@@ -62,8 +64,9 @@ class Master(Stepper):
         step_size: float,
         stop_time: float | None = None,
         opener: Callable[[str, ComponentPlan, Path], Component] = open_plan,
+        threads: int | None = 1,
     ) -> None:
-        super().__init__(system, schedule, step_size, stop_time, opener)
+        super().__init__(system, schedule, step_size, stop_time, opener, threads)
 
     def run(
         self,

@@ -154,12 +154,13 @@ class Run:
                     self._set(event)
 
     def _set(self, event: Event) -> None:
-        changes = event.changes()
+        changes, y = event.changes(), self._stepper.y.copy()
         for name, settings in changes.items():
             self._stepper.components[name].set(settings)
         for name in changes:
             self._stepper.components[name].read(self._stepper.exchanges[name].outputs)
         self._require_finite(changes)
+        self._stepper.jumped(y)
 
     def _require_finite(self, names: Iterable[str]) -> None:
         """What components gave without a step, at the start and at events; the inner loop looks after the steps."""

@@ -1,16 +1,42 @@
 """Where the time of a run goes: calls, seconds and share of every FMU, and of the coupling itself."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
 class ComponentStatistics:
-    """Of one component: number of steps, time inside its FMI calls [s], and its share of the run."""
+    """Of one component: number of steps, time inside its FMI calls [s], and its share of the run's threads."""
 
     name: str
     steps: int
     seconds: float
     share: float
+
+
+@dataclass(slots=True)
+class StepCounts:
+    """What a tolerance made of the communication steps.
+
+    Attributes
+    ----------
+    accepted
+        Steps that count, in pairs of equal length.
+    rejected
+        Pairs that were taken back, because their error was too large or a component refused them.
+    shortest, longest
+        Of the steps that count [s].
+    """
+
+    accepted: int = 0
+    rejected: int = 0
+    shortest: float = float("inf")
+    longest: float = 0.0
+
+    def accept(self, count: int, step_size: float) -> None:
+        """Count steps [s]."""
+        self.accepted += count
+        self.shortest, self.longest = min(self.shortest, step_size), max(self.longest, step_size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +48,24 @@ class StepStatistics:
     steps, seconds
         Communication steps done, and wall-clock time [s] they took, recording included.
     components
-        In the order of the schedule. What is left of the time is the coupling and the observers.
+        In the order of the schedule. What is left of the time is the coupling, the observers, and threads that wait.
+    simulated
+        Time that was simulated [s].
+    threads
+        How many stepped FMUs.
+    one_thread
+        By component, why only one thread may step it.
+    adaptive
+        The steps that a tolerance made, where there is one.
     """
 
     steps: int
     seconds: float
     components: tuple[ComponentStatistics, ...]
+    simulated: float = 0.0
+    threads: int = 1
+    one_thread: Mapping[str, str] = field(default_factory=dict)
+    adaptive: StepCounts | None = None
 
     @property
     def steps_per_second(self) -> float:
@@ -35,6 +73,11 @@ class StepStatistics:
         return self.steps / self.seconds if self.seconds > 0 else 0.0
 
     @property
+    def real_time_factor(self) -> float:
+        """Simulated time by wall-clock time; above 1 the run was faster than real time."""
+        return self.simulated / self.seconds if self.seconds > 0 else 0.0
+
+    @property
     def share_in_fmus(self) -> float:
-        """Part of the stepping time spent inside FMI calls, 0 to 1."""
+        """Part of all threads' stepping time that was spent inside FMI calls, 0 to 1."""
         return sum(c.share for c in self.components)

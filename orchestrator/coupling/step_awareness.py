@@ -10,12 +10,25 @@ STEP_PARAMETER = "communication_step"
 """A component with a parameter of this name is given the communication step [s], unless the parameter is set."""
 
 
-def tell_step(system: System, step_size: float) -> None:
-    """Give the communication step [s] to the components that have the parameter and no value for it."""
-    for plan in system.components.values():
+INTERNAL_STEP = "internal_step"
+"""Parameter of our FMUs: longest step of their own integrator [s]."""
+
+
+def tell_step(system: System, step_size: float) -> frozenset[str]:
+    """Give the communication step [s] to the components that have the parameter and no value for it; their names."""
+    told = set()
+    for name, plan in system.components.items():
         info = plan.description.variables.get(STEP_PARAMETER)
-        if info is not None and info.causality == "parameter":
-            plan.parameters.setdefault(STEP_PARAMETER, step_size)
+        if info is not None and info.causality == "parameter" and STEP_PARAMETER not in plan.parameters:
+            plan.parameters[STEP_PARAMETER] = step_size
+            told.add(name)
+    return frozenset(told)
+
+
+def shortest_internal_step(system: System) -> float | None:
+    """The shortest step [s] of the components' own integrators; None where none says it."""
+    plans = [plan for plan in system.components.values() if INTERNAL_STEP in plan.description.variables]
+    return min((plan.number(INTERNAL_STEP) for plan in plans), default=None)
 
 
 def knows_step(master: Master, name: str) -> bool:

@@ -1,17 +1,21 @@
 """Communication steps: values are exchanged and components step along a schedule."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.coupling.adaptive import AdaptiveLoop
 from orchestrator.coupling.coupled import CoupledComponents
-from orchestrator.coupling.loop import Turn, make_loop
+from orchestrator.coupling.loop import make_loop
 from orchestrator.coupling.schedule import Schedule
+from orchestrator.coupling.second_order import line_loop
 from orchestrator.coupling.statistics import ComponentStatistics, StepStatistics
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.coupling.tracks import Tracks
+from orchestrator.coupling.turns import Loop, Turn
 from orchestrator.coupling.wire_bank import WireBank
 from orchestrator.fmi.component import Component, RealBatch
 
@@ -21,7 +25,7 @@ class Stepper(CoupledComponents):
 
     Parameters
     ----------
-    system, schedule, step_size, stop_time, opener
+    system, schedule, step_size, stop_time, opener, threads
         As `orchestrator.coupling.master.Master`.
 
     Attributes
@@ -41,6 +45,7 @@ class Stepper(CoupledComponents):
         step_size: float,
         stop_time: float | None,
         opener: Callable[[str, ComponentPlan, Path], Component],
+        threads: int | None = 1,
     ) -> None:
         self.index = 0
         super().__init__(system, schedule, step_size, stop_time, opener)
@@ -48,7 +53,18 @@ class Stepper(CoupledComponents):
         self.handed_over = False
         self.tracks = Tracks(len(self.y), len(self._values) - len(self.y))
         hand_over = self._hand_over if self._single else None
-        self._loop = make_loop(self._turns(), self._values, self.tracks, schedule, hand_over)
+        self._loop: Loop
+        self._adaptive: AdaptiveLoop | None = None
+        if schedule.is_second_order:
+            groups = [[self.exchanges[name] for name in group] for group in schedule.groups]
+            self._loop = self._lines = line_loop(groups, self.y, self.tracks, schedule)
+            if schedule.tolerance is not None:
+                self._loop = self._adaptive = AdaptiveLoop(
+                    self._lines, groups, self.y, self.tracks, schedule, step_size
+                )
+        else:
+            self._loop = make_loop(self._turns(), self._values, self.tracks, schedule, hand_over, threads)
+        self._release.callback(self._loop.close)
 
     def _turns(self) -> list[list[Turn]]:
         """Groups of the schedule, each after the bank of connections that lead into it where there is one."""
@@ -118,6 +134,21 @@ class Stepper(CoupledComponents):
     def before(self, values: NDArray[np.float64] | None) -> None:
         self._loop.before = values
 
+    def jumped(self, y: NDArray[np.float64]) -> None:
+        """After an event: where inputs follow lines, all outputs agree again, and the lines go on from the jump.
+
+        Parameters
+        ----------
+        y
+            All outputs before the event.
+        """
+        if self.schedule.is_second_order:
+            self._lines.settle()
+            if self._loop.before is not None:
+                self._loop.before = self._loop.before + (self.y - y)
+        if self._adaptive is not None:
+            self._adaptive.begin_anew()
+
     def seconds(self) -> Sequence[float]:
         """Wall-clock time inside each turn's calls so far [s], in the order of the schedule."""
         return self._loop.seconds()
@@ -139,8 +170,13 @@ class Stepper(CoupledComponents):
         if self.wires:  # the banks' own share is none of a component
             banks = [isinstance(turn, WireBank) for group in self._turns() for turn in group]
             spent = [seconds for seconds, of_bank in zip(spent, banks, strict=True) if not of_bank]
+        threads = self._loop.threads
         return StepStatistics(
             steps,
             seconds,
-            tuple(ComponentStatistics(n, steps, s, s / seconds) for n, s in zip(names, spent, strict=True)),
+            tuple(ComponentStatistics(n, steps, s, s / (threads * seconds)) for n, s in zip(names, spent, strict=True)),
+            self.clock.time(steps),
+            threads,
+            {name: reason for name, c in self.components.items() if (reason := c.one_thread)},
+            None if self._adaptive is None else replace(self._adaptive.counts),
         )

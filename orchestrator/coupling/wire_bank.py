@@ -91,7 +91,7 @@ class WireBank:
         If a delay is no multiple of the communication step, or a noise's bandwidth is beyond what the step shows.
     """
 
-    name = "connections"
+    name, one_thread = "connections", "no FMU"
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
-from orchestrator.coupling import loop as loops
+from orchestrator.coupling import compiled_loop as loops
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event, ParameterChange
 from orchestrator.coupling.master import Master
@@ -28,8 +28,8 @@ TOLERANCE = 1e-12
 def inner_loop(request, monkeypatch):
     """Every test runs with the loop in C and with the loop in Python."""
     if request.param == "python":
-        monkeypatch.setattr(loops, "_library", lambda: None)
-    elif loops._library() is None:
+        monkeypatch.setattr(loops, "loop_library", lambda: None)
+    elif loops.loop_library() is None:
         pytest.skip("no compiler for this platform")
     return request.param
 
@@ -568,6 +568,9 @@ def test_statistics_count_steps_and_share_out_the_time():
     assert statistics.share_in_fmus == pytest.approx(sum(c.seconds for c in statistics.components) / statistics.seconds)
     assert 0 < statistics.share_in_fmus < 1
     assert statistics.steps_per_second == pytest.approx(400 / statistics.seconds)
+    assert statistics.simulated == pytest.approx(0.4)
+    assert statistics.real_time_factor == pytest.approx(0.4 / statistics.seconds)
+    assert statistics.threads == 1
 
 
 def test_a_run_of_no_steps():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.coupling import loop as loops
+from orchestrator.coupling import compiled_loop as loops
 from orchestrator.coupling import wire_bank
 from orchestrator.coupling.events import NotANumber, Silence, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Noise, Quantisation
@@ -25,9 +25,9 @@ IN_TURN = gauss_seidel((("ramp",), ("sink", "other")))
 def inner_loop(request, monkeypatch):
     """Every test runs with loop and connections in C, and with both in Python."""
     if request.param == "python":
-        monkeypatch.setattr(loops, "_library", lambda: None)
+        monkeypatch.setattr(loops, "loop_library", lambda: None)
         monkeypatch.setattr(wire_bank, "_library", lambda: None)
-    elif loops._library() is None or wire_bank._library() is None:
+    elif loops.loop_library() is None or wire_bank._library() is None:
         pytest.skip("no compiler for this platform")
     return request.param
 

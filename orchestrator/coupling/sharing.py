@@ -1,0 +1,86 @@
+"""Which thread does which calls of a group: shares of equal cost, by the time that each call was seen to take."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+HANDOVER = 2e-6
+"""What a further thread costs a group in every step [s]: it is told to begin, and fetches what others wrote."""
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Who does the calls of one group.
+
+    Attributes
+    ----------
+    own
+        Calls that the calling thread alone may do.
+    of
+        Calls of each thread, the calling one first; any of them may do those of another that has not begun them.
+    seconds
+        Cost of the thread that has most to do [s].
+    """
+
+    own: tuple[int, ...]
+    of: tuple[tuple[int, ...], ...]
+    seconds: float
+
+
+def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
+    """Share out the calls of a group, the costly ones first, each to who has least.
+
+    Parameters
+    ----------
+    calls
+        Numbers of the calls.
+    bound
+        Of every call, whether the calling thread alone may do it.
+    costs
+        Of every call [s].
+    threads
+        How many share them.
+    """
+    own = tuple(call for call in calls if bound[call])
+    loads = [0.0] * threads
+    loads[0] = float(costs[list(own)].sum())
+    parts: list[list[int]] = [[] for _ in range(threads)]
+    for call in sorted((c for c in calls if not bound[c]), key=lambda c: -costs[c]):
+        least = loads.index(min(loads))
+        parts[least].append(call)
+        loads[least] += float(costs[call])
+    return Shares(own, tuple(tuple(sorted(part)) for part in parts), max(loads))
+
+
+def best_number(
+    groups: Sequence[Sequence[int]], bound: NDArray[np.bool_], costs: NDArray[np.float64], most: int
+) -> int:
+    """The number of threads, from 1 to ``most``, by which a step should take the least time.
+
+    Parameters
+    ----------
+    groups
+        The calls of each.
+    bound, costs
+        As for `shares`.
+    most
+        Threads that there can be.
+    """
+
+    def seconds(threads: int) -> float:
+        found = (_of_group(group, bound, costs, threads) for group in groups)
+        return sum(one.seconds + (HANDOVER * (threads - 1) if len(one.of) > 1 else 0.0) for one in found)
+
+    return min(range(1, most + 1), key=seconds)
+
+
+def worth_sharing(group: Sequence[int], bound: NDArray[np.bool_]) -> bool:
+    """Whether a second thread would find anything to do."""
+    free = sum(not bound[call] for call in group)
+    return free > 1 or (free == 1 and len(group) > 1)
+
+
+def _of_group(group: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
+    return shares(group, bound, costs, threads if worth_sharing(group, bound) else 1)

@@ -1,0 +1,167 @@
+"""What the inner loop steps, and what it offers: the forms that the loop in C and the one in Python share."""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import NotFiniteError
+from orchestrator.fmi.component import Component, RealBatch
+
+
+class Exchange:
+    """The coupled inputs and outputs of one component.
+
+    Attributes
+    ----------
+    inputs, outputs
+        Batches of the connected variables. The outputs' values are a window of the system's vector y.
+    window
+        Where in y that is.
+    sources
+        For each input the index in y of the output that feeds it.
+    delivered
+        The index of what arrives at each input: the same, or behind the outputs the place of what a connection makes
+        of it (`orchestrator.coupling.wires`).
+    """
+
+    def __init__(
+        self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
+    ) -> None:
+        self.component, self.inputs, self.outputs = component, inputs, outputs
+        self.window, self.sources, self.delivered = window, sources, sources
+
+    @property
+    def follows_directly(self) -> bool:
+        """Whether an output depends on a connected input directly, or the FMU does not say."""
+        fed = set(self.inputs.names)
+        return any(fed.intersection(self.component.description.feedthrough(name)) for name in self.outputs.names)
+
+
+class Stepped(Protocol):
+    """What the loop calls of a component."""
+
+    @property
+    def name(self) -> str:
+        """For errors."""
+
+    @property
+    def one_thread(self) -> str | None:
+        """As `Component` has it."""
+
+    @property
+    def pointer(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def set_real(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def get_real(self) -> Any:
+        """As `Component` has it."""
+
+    @property
+    def do_step(self) -> Any:
+        """As `Component` has it."""
+
+    def check(self, status: int, call: str, time: float | None = None) -> None:
+        """As `Component` has it."""
+
+    def step(self, time: float, step_size: float) -> None:
+        """As `Component` has it."""
+
+
+class Batch(Protocol):
+    """What the loop needs of the values that a component takes or gives."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the variables."""
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The values, shape (n,)."""
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """Of the functions that set and get them."""
+
+    @property
+    def component(self) -> Stepped:
+        """Whose they are."""
+
+
+class Turn(Protocol):
+    """What takes its turn in the loop: a component with its connected values, or a bank of connections."""
+
+    @property
+    def component(self) -> Stepped:
+        """What is stepped."""
+
+    @property
+    def inputs(self) -> Batch:
+        """What it takes."""
+
+    @property
+    def outputs(self) -> Batch:
+        """What it gives."""
+
+    @property
+    def window(self) -> slice:
+        """Where its outputs stand."""
+
+    @property
+    def delivered(self) -> NDArray[np.int64]:
+        """Where what it takes stands."""
+
+
+class Loop(Protocol):
+    """Steps a system.
+
+    Attributes
+    ----------
+    completed
+        Communication steps that the last call did.
+    before
+        The outputs one step earlier, where inputs are extrapolated; else None.
+    """
+
+    def advance(self, index: int, count: int, step_size: float) -> None:
+        """Do communication steps.
+
+        Raises
+        ------
+        ComponentError
+            If a call fails; ``completed`` tells how many steps were done before.
+        NotFiniteError
+            If a step gives an output that is no finite number.
+        """
+
+    completed: int
+    before: NDArray[np.float64] | None
+
+    def seconds(self) -> list[float]:
+        """Time spent inside each component's FMI calls [s], in the order of the schedule."""
+
+    @property
+    def threads(self) -> int:
+        """How many threads have stepped it."""
+
+    def close(self) -> None:
+        """End the threads that were started for it."""
+
+
+def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
+    """The error of an output that is no finite number.
+
+    Parameters
+    ----------
+    outputs
+        Of the component.
+    index
+        Which of them.
+    time
+        At which it was read [s].
+    """
+    return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)
