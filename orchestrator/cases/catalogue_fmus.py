@@ -3,14 +3,17 @@ wrong.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from fmus.grid.network import Network
-from fmus.toolchain.catalogue import build_model, entry_of
+from fmus.toolchain.catalogue import build_model, entry_of, sketch_model
 from fmus.toolchain.extras import require
-from fmus.toolchain.notes import noted
+from fmus.toolchain.notes import known, noted
 from orchestrator.fmi.description import FmuDescription, parse_description, read_description
+
+_TO_COME = "not-built"
+"""Identity of an FMU that is not there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,14 +22,21 @@ class PlannedFmu:
 
     Attributes
     ----------
-    recipe
-        What it is built by; None if it is there.
+    model, network, native, parts
+        As `plan_fmu`.
     description
-        Its description; of one that is not there, as it will be.
+        Its description; of one that is not there, as it will be, but for its identity and the dependencies of its
+        outputs, which need its equations.
+    is_there
+        Whether it is built already.
     """
 
-    recipe: Any
+    model: str
+    network: Network | None
+    native: bool
+    parts: tuple[tuple[str, str], ...]
     description: FmuDescription
+    is_there: bool
 
 
 @cache
@@ -56,30 +66,39 @@ def plan_fmu(
     require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
-    recipes: list[Any] = []
-
-    def find() -> list[str]:
-        recipes.append(_recipe(model, network, native, parts))
-        return _place(recipes[0])
-
-    asked = f"fmu {model} {native} {parts!r} {network!r}"
-    folder = cache_directory("fmus")
-    path = folder.joinpath(*noted(entry_of(model), asked, find))
-    if intact(path):
-        return PlannedFmu(None, read_description(path))
-    recipe = recipes[0] if recipes else _recipe(model, network, native, parts)
-    return PlannedFmu(
-        recipe, parse_description(cache_directory("fmus").joinpath(*_place(recipe)), recipe.description())
-    )
+    place = known(entry_of(model), _asked(model, network, native, parts))
+    if place is not None and intact(path := cache_directory("fmus").joinpath(*place)):
+        return PlannedFmu(model, network, native, parts, read_description(path), is_there=True)
+    name, text = noted(entry_of(model), f"sketch of {_asked(model, network, native, parts)}", partial(
+        _sketch, model, network, native, parts
+    ))  # fmt: skip
+    path = cache_directory("fmus") / _TO_COME / f"{name}.fmu"
+    return PlannedFmu(model, network, native, parts, parse_description(path, text.encode()), is_there=False)
 
 
-def _recipe(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> Any:
-    """What an FMU is built by; for its hash the model is built, which takes up to seconds."""
+def _sketch(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> tuple[str, str]:
+    """Name of an FMU that is not there, and its description as far as it is known without equations."""
+    from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports CasADi
+
+    sketch = sketch_model(model, **_arguments(network, parts))
+    return sketch.name, model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()
+
+
+def _asked(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> str:
+    return f"fmu {model} {native} {parts!r} {network!r}"
+
+
+def _arguments(network: Network | None, parts: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+    return dict(parts) | ({"network": network} if network is not None else {})
+
+
+def _recipe(planned: PlannedFmu) -> Any:
+    """What an FMU is built by; for its hash the model is built, which takes up to minutes."""
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    arguments = dict(parts) | ({"network": network} if network is not None else {})
-    return (NativeFmu if native else PythonFmu)(build_model(model, **arguments))
+    made = build_model(planned.model, **_arguments(planned.network, planned.parts))
+    return (NativeFmu if planned.native else PythonFmu)(made)
 
 
 def _place(recipe: Any) -> list[str]:
@@ -93,11 +112,19 @@ def _place(recipe: Any) -> list[str]:
 @cache
 def build_fmu(planned: PlannedFmu) -> FmuDescription:
     """Build the FMU if it is not there."""
-    if planned.recipe is None:
+    if planned.is_there:
         return planned.description
     from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`
 
-    return read_description(cached(planned.recipe))
+    recipes: list[Any] = []
+
+    def find() -> list[str]:
+        recipes.append(_recipe(planned))
+        return _place(recipes[0])
+
+    asked = _asked(planned.model, planned.network, planned.native, planned.parts)
+    noted(entry_of(planned.model), asked, find)
+    return read_description(cached(recipes[0] if recipes else _recipe(planned)))
 
 
 def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:

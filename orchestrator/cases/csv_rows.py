@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
+from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError
 
 Row = dict[str, str]
@@ -22,15 +23,19 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     Raises
     ------
     InputError
-        If the file or one of the columns is missing, the file is not text in UTF-8, or it has more than `MOST_ROWS`
-        rows.
+        If the file or one of the columns is missing, a column stands twice, columns are separated by semicolons or
+        tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
     """
+    path = seen_from_here(path)
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; it should hold the columns {', '.join(columns)}")
+        wanted = f"it should hold the columns {', '.join(columns)}" if columns else "give the path of a .csv"
+        raise InputError(f"{path}: there is no such file; {wanted}")
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write the mark
             reader = csv.DictReader(file)
-            missing = [c for c in columns if c not in (reader.fieldnames or ())]
+            names = reader.fieldnames or ()
+            _check_names(path, names)
+            missing = [c for c in columns if c not in names]
             if missing:
                 raise InputError(f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}")
             rows = [row | {PLACE: f"{path}, line {n}"} for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)]
@@ -39,6 +44,19 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     if len(rows) > MOST_ROWS:
         raise InputError(f"{path}: it has more than {MOST_ROWS} rows, which is the most that a table may have")
     return rows
+
+
+def _check_names(path: Path, names: Sequence[str]) -> None:
+    """A reader would take the last of two columns in silence."""
+    for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+        if len(names) == 1 and mark in names[0]:
+            raise InputError(
+                f"{path}, line 1: its columns are separated by {word}; separate them by commas, and write decimals "
+                "with a point"
+            )
+    for k, name in enumerate(names):
+        if name and name in names[:k]:
+            raise InputError(f"{path}, line 1: the column {name!r} stands twice; leave one of them out")
 
 
 def place_of(row: Row) -> str:

@@ -68,6 +68,8 @@ class Draft:
         Questions about unusual data.
     parameter_files
         The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
+    misfits
+        Components whose form the network cannot take, each with its model; what follows from that is not noted.
     whole
         Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     """
@@ -91,6 +93,7 @@ class Draft:
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    misfits: dict[str, str] = field(default_factory=dict)
     whole: bool = True
     _missed: set[tuple[str, str]] = field(default_factory=set)
 

@@ -41,7 +41,7 @@ class Named:
             self.components.add(name)
             self.homes.add(name)
             self.states |= {f"{name}.{state}" for state in fmu.states}
-            if draft.tables[name].fmu is not None:
+            if draft.tables[name].file is not None:
                 self.foreign.add(name)
             self.outputs |= {f"{name}.{v}" for v in fmu.outputs if fmu.variables[v].type == "Real"}
             self.homes |= {v.rpartition(".")[0] for v in fmu.outputs} - {""}

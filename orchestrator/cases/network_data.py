@@ -11,6 +11,7 @@ from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_o
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
+from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError, Problem
 
 
@@ -127,7 +128,7 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     if table.leave_out:
         raise InputError("leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'")
     if table.matpower is not None:
-        imported = import_network(read_matpower(directory / table.matpower))
+        imported = import_network(read_matpower(seen_from_here(directory / table.matpower)))
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
     return _Source(imported)
@@ -152,11 +153,6 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
     generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
     return _Source(replace(imported, generation=generation), model.changes)
-
-
-def seen_from_here(path: Path) -> Path:
-    """The path as a user in the working directory writes it; places in messages are read there."""
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:

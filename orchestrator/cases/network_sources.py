@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.extras import require
 from orchestrator.cases.kept_tables import kept_tables
 from orchestrator.cases.names import close_names
+from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.cases.source_tables import SourceTables
 from orchestrator.errors import InputError
 
@@ -69,7 +70,7 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
     InputError
         If there is neither, or its own power flow has no solution.
     """
-    path = directory / name
+    path = seen_from_here(directory / name)
     changed = path.stat().st_mtime_ns if name.endswith(".json") and path.is_file() else 0
     return _solved_pandapower(name, path, changed)
 

@@ -6,7 +6,7 @@ A question is a warning: the case runs. It is answered by the key ``meant`` of t
 
 import fnmatch
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
@@ -32,7 +32,12 @@ def check_plausibility(draft: Draft) -> None:
             _check_rule(draft, name, plan, rule)
     _check_frequencies(draft)
     _check_meant(draft)
-    draft.questions += _merged([d for d in _doubts(draft) if not _is_meant(draft, d.name)])
+    question(draft, _doubts(draft))
+
+
+def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
+    """Add questions to the draft's, without those that the case answers; equal ones become one."""
+    draft.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
 
 
 def _check_meant(draft: Draft) -> None:
@@ -71,7 +76,7 @@ def question_loading(draft: Draft) -> None:
     is one.
     """
     asked = {question.place for question in draft.questions}  # one question about a rating is enough
-    draft.questions += _merged([d for d in _overloaded(draft) if not _is_meant(draft, d.name) and d.place not in asked])
+    question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
 
 def _overloaded(draft: Draft) -> Iterator[UnusualValue]:

@@ -19,8 +19,8 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class FlowUnit:
-    """A unit that feeds P_0 [pu, S_n] and holds v_0 [pu] together with the others at its bus. An unconnected unit does
-    neither.
+    """A unit that feeds P_0 [pu, S_n] and holds v_0 [pu] together with the others at its bus; or, where Q_0 [pu, S_n]
+    is given, feeds that as well and holds nothing. An unconnected unit does neither.
     """
 
     name: str
@@ -29,6 +29,12 @@ class FlowUnit:
     P_0: float
     v_0: float
     connected: bool = True
+    Q_0: float | None = None
+
+    @property
+    def fed(self) -> complex:
+        """P + jQ of a unit that holds no voltage [pu, 100 MVA]."""
+        return complex(self.P_0, self.Q_0 or 0.0) * self.S_n / SYSTEM_BASE_MVA
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,8 @@ def solve_power_flow(
     """Solve the power flow.
 
     Units at one bus hold its voltage together. They share its reactive power in proportion to their ratings; at the
-    slack bus they share the remaining active power in the same way.
+    slack bus they share the remaining active power in the same way. Units with a given reactive power feed it and their
+    active power, at any bus.
 
     Parameters
     ----------
@@ -94,9 +101,12 @@ def solve_power_flow(
         to it, or no solution is found.
     """
     at_bus: dict[str, list[FlowUnit]] = {}
-    for unit in units:
-        if unit.connected:
+    fixed: dict[str, complex] = {}
+    for unit in (unit for unit in units if unit.connected):
+        if unit.Q_0 is None:
             at_bus.setdefault(unit.bus, []).append(unit)
+        else:
+            fixed[unit.bus] = fixed.get(unit.bus, 0j) + unit.fed
     for bus, members in at_bus.items():
         if len({u.v_0 for u in members}) > 1:
             wanted = ", ".join(f"{u.name} wants {u.v_0:g}" for u in members)
@@ -105,14 +115,15 @@ def solve_power_flow(
             )
     if slack_bus not in at_bus:
         raise InputError(
-            f"power flow: no unit is connected at the slack bus {slack_bus!r}, so nothing feeds what is left; "
-            "choose another slack in [power_flow]"
+            f"power flow: no unit {'that holds a voltage ' if slack_bus in fixed else ''}is connected at the slack bus "
+            f"{slack_bus!r}, so nothing feeds what is left; choose another slack in [power_flow]"
         )
     check_connected(buses, lines, slack_bus)
     active = {bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA for bus, members in at_bus.items()}
     held = {bus: members[0].v_0 for bus, members in at_bus.items()}
-    equations = FlowEquations.of(buses, lines, loads, shunts, active, held, slack_bus)
-    known = limits or {}
+    drawn = [*loads, *(FlowLoad(b, *(-SYSTEM_BASE_MVA * x for x in (s.real, s.imag))) for b, s in fixed.items())]
+    equations = FlowEquations.of(buses, lines, drawn, shunts, active, held, slack_bus)
+    known = _left(limits or {}, fixed)
     if keep_limits:
         final, result, at_limits = solve_with_limits(equations, known)
     else:
@@ -121,19 +132,38 @@ def solve_power_flow(
 
         def with_stray(share: float) -> FlowEquations:
             fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
-            return FlowEquations.of(buses, lines, loads, fewer, active, held, slack_bus)
+            return FlowEquations.of(buses, lines, drawn, fewer, active, held, slack_bus)
 
         raise InputError(explain(equations, result, with_stray if any(s.stray for s in shunts) else None))
     voltages = dict(zip(equations.buses, map(complex, result.voltages), strict=True))
-    flow = _shares(voltages, nodal_powers(voltages, lines, loads, shunts), at_bus, slack_bus)
+    flow = _shares(voltages, nodal_powers(voltages, lines, drawn, shunts), at_bus, slack_bus)
     if not flow.residual <= _TOLERANCE:
         raise InputError(
             f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
             "check for very small reactances"
         )
-    powers = flow.powers | {unit.name: 0j for unit in units if not unit.connected}
-    beyond = tuple(exceeded(final, result.voltages, known))
+    powers = flow.powers | {u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None}
+    powers |= {unit.name: 0j for unit in units if not unit.connected}
+    beyond = (*exceeded(final, result.voltages, known), *_fed_beyond(fixed, at_bus, limits or {}, voltages))
     return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond)
+
+
+def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
+    """What the limits of a bus leave to the units that hold its voltage."""
+    fed = {bus: fixed.get(bus, 0j).imag for bus in limits}
+    return {bus: (least - fed[bus], most - fed[bus]) for bus, (least, most) in limits.items()}
+
+
+def _fed_beyond(
+    fixed: Mapping[str, complex], held: Mapping[str, object], limits: Limits, voltages: Mapping[str, complex]
+) -> list[Excess]:
+    """Buses of given reactive power that exceeds their limits."""
+    found = []
+    for bus in (bus for bus in fixed if bus in limits and bus not in held):
+        q, (least, most) = fixed[bus].imag, limits[bus]
+        if not least <= q <= most:
+            found.append(Excess(bus, q, most if q > most else least, abs(voltages[bus]), abs(voltages[bus])))
+    return found
 
 
 def _shares(

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from orchestrator.cases.names import file_name
+from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
 from orchestrator.toml_files import Table
 from orchestrator.units import to_unit
 
@@ -43,17 +44,20 @@ class SolverTable(Table):
     step_size: Seconds = Field(default=1e-4, gt=0, le=0.1)
     stop_time: Seconds = Field(default=20.0, gt=0)
     record_interval: Seconds = Field(default=0.005, gt=0)
-    schedule: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    schedule: ScheduleName = "gauss-seidel"
+    micro_step: Seconds | None = Field(default=None, gt=0, le=0.1)
+    tolerance: Number | None = Field(default=None, ge=TOLERANCES[0], le=TOLERANCES[1])
     groups: list[list[str]] | None = None
     record: list[str] = ["*"]
     record_filter: Literal["none", "low-pass"] = "none"
 
 
 class ComponentTable(Table):
-    """An FMU file, behind a binding or not, or a model of the catalogue, with its values."""
+    """An FMU file or a vendor's DLL, behind a binding or not, or a model of the catalogue, with its values."""
 
     model: str | None = None
     fmu: str | None = None
+    dll: str | None = None
     binding: str | None = None
     isolated: bool | None = None
     bus: str | None = None
@@ -64,6 +68,11 @@ class ComponentTable(Table):
     stabilizer: str | None = None
     parameters: dict[str, Any] = {}
     inputs: dict[str, Any] = {}
+
+    @property
+    def file(self) -> str | None:
+        """Path of what is not of the catalogue; None for a model."""
+        return self.fmu if self.fmu is not None else self.dll
 
 
 class PowerFlowTable(Table):
@@ -173,6 +182,7 @@ class UnitsTable(Table):
     file: str | None = None
     dyr: str | None = None
     dyr_leave_out: list[str] = []
+    dyr_approximate: Annotated[bool, Field(strict=True)] = False
     alpha: Number = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str

@@ -9,12 +9,10 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_transformers import inner_buses, legs_of
+from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
-
-RESULTS = ("Q_0", "theta_0")
-"""What the power flow computes of a unit, so that it cannot be set."""
 
 
 def start_from_power_flow(
@@ -30,7 +28,7 @@ def start_from_power_flow(
     """Solve the power flow and set the start values of the grid and of all units.
 
     Lines, loads and units have the values that are set in the system. Every override therefore moves the operating
-    point as well.
+    point as well. A unit whose ``Q_0`` is set feeds it; every other holds its ``v_0``.
 
     Parameters
     ----------
@@ -145,7 +143,7 @@ def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
 
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
     connected = _is_connected(plan, "connected") and _is_connected(grid, f"{name}.connected")
-    return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected)
+    return flow_unit(name, bus, plan, connected=connected)
 
 
 def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]) -> Limits:

@@ -33,6 +33,10 @@ class UnitRow:
         Limits of reactive power [Mvar]; infinite without.
     converter
         Model of the converter that the whole unit is by its record.
+    doubts
+        Questions about the generator's data: parameter, place and text.
+    replaced
+        Lines of records for which the converter's model stands, each with what it leaves out.
     """
 
     label: str
@@ -47,6 +51,8 @@ class UnitRow:
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
     converter: str | None = None
+    doubts: tuple[tuple[str, str, str], ...] = ()
+    replaced: tuple[tuple[int, str], ...] = ()
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:

@@ -13,10 +13,14 @@ from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
-from orchestrator.cases.network_data import bus_name, seen_from_here
+from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
+from orchestrator.cases.plausibility import question
+from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.cases.psse.dyr_units import rows_of_machines, with_records
 from orchestrator.cases.schema import ComponentTable, UnitsTable
+from orchestrator.cases.seen_paths import seen_from_here
+from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError
 
@@ -101,7 +105,8 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         ]  # fmt: skip
         return [checked(row, "the network's source") for row in rows]
     rows = []
-    for entry in _known_rows(directory / table.file):
+    path = seen_from_here(directory / table.file)
+    for entry in _known_rows(path):
         bus = bus_name(entry["bus"])
         name = _name_in(entry)
         given = None if name else generation.get(bus)  # the source's figures are those of all units of the bus
@@ -122,7 +127,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         label = f"{entry['bus']}_{name}" if name else entry["bus"]
         unit = UnitRow(label, bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(checked(unit, place_of(entry)))
-    _require_names(rows, directory / table.file)
+    _require_names(rows, path)
     return [_with_limits_of_bus(row, [r for r in rows if r.bus == row.bus]) for row in rows]
 
 
@@ -180,7 +185,16 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced, idle)
+    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced, idle, approximate=table.dyr_approximate)
+    machine_rows = [row for row in rows if row.label not in replaced]
+    question(
+        draft, [UnusualValue(f"sg{row.label}.{v}", at, text) for row in machine_rows for v, at, text in row.doubts]
+    )
+    changes = Changes(str(path))
+    for row in rows:
+        for line, text in row.replaced:
+            changes.note(line, f"grid-following converter as {row.converter}: {text}")
+    draft.questions += changes.listed()
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith("_phasor"):
         raise InputError(

@@ -88,7 +88,7 @@ def _scenario(case: Case, component: str, wanted: str | None) -> str:
 
 def _component(case: Case, wanted: str | None, fmu: Path) -> str:
     """Name of the component that is an FMU."""
-    files = {n: case.directory / t.fmu for n, t in case.table.components.items() if t.fmu is not None}
+    files = {n: case.directory / t.file for n, t in case.table.components.items() if t.file is not None}
     known = ", ".join(files) or "none"
     if wanted is not None:
         if wanted not in case.table.components:

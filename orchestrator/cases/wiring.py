@@ -1,7 +1,11 @@
 """Connections of a case: those written in the file, and those of every component that names its bus."""
 
+from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
+
+_PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")
+"""What a device gives to a network of phasors."""
 
 
 def connect(draft: Draft) -> None:
@@ -10,9 +14,62 @@ def connect(draft: Draft) -> None:
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
         if not ends & set(draft.scenario.remove):
             _try_connect(draft, wire.source, wire.target, draft.place("connections", index))
-    for name, table in draft.tables.items():
-        if table.bus is not None and name in draft.system.components:
-            _connect_to_bus(draft, name, table.bus)
+    at_buses = [n for n, table in draft.tables.items() if table.bus is not None and n in draft.system.components]
+    _check_forms(draft, at_buses)
+    for name in at_buses:
+        _connect_to_bus(draft, name, draft.tables[name].bus or "")
+
+
+def _check_forms(draft: Draft, names: list[str]) -> None:
+    """Refuse EMT models in a network of phasors, and question phasor models in a network of the other kind; once for
+    each model, whatever the number of its components.
+    """
+    if draft.network_failed or draft.network is None or draft.grid not in draft.system.components:
+        return
+    taken = draft.system.components[draft.grid].description.inputs
+    phasors: dict[str, list[str]] = {}
+    for name in names:
+        given = draft.system.components[name].description.outputs
+        wanted = {v for v in _PHASOR_PORT if f"{name}.{v}" in taken}
+        if wanted - {*given}:
+            draft.misfits[name] = draft.tables[name].model or draft.tables[name].file or ""
+        elif not wanted and f"{name}.i_re" in taken and {*_PHASOR_PORT} <= {*given}:
+            phasors.setdefault(draft.tables[name].model or draft.tables[name].file or "", []).append(name)
+    for model in dict.fromkeys(draft.misfits.values()):
+        others = [name for name, its in draft.misfits.items() if its == model]
+        draft.note(
+            _place_of_model(draft, others[0]),
+            f"{_all(others)}: {model!r} is an EMT model, and the network {draft.grid!r} is one of phasors "
+            f"({draft.tables[draft.grid].model}), to which a device gives an emf behind an admittance; "
+            f"{_remedy(model)}",
+        )
+    for model, others in phasors.items():
+        text = (
+            f"{_all(others)}: {model!r} is a phasor model, and the network {draft.grid!r} is an EMT one "
+            f"({draft.tables[draft.grid].model}): its current would follow the voltage at once; take "
+            f"{model.removesuffix('_phasor')!r}, or model = 'phasor_grid' for the network and phasor models for all"
+        )
+        draft.questions.append(Problem(_place_of_model(draft, others[0]), text))
+
+
+def _remedy(model: str) -> str:
+    phasor = f"{model}_phasor"
+    if phasor in model_names():
+        return f"take {phasor!r}, or model = 'grid' for the network and EMT models for all"
+    if model in model_names():
+        return "it has no phasor form: take another model, or model = 'grid' for the network and EMT models for all"
+    return f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that, or give the network the model 'grid'"
+
+
+def _place_of_model(draft: Draft, name: str) -> str:
+    origin = draft.origins.get(name)
+    if origin is None:
+        return draft.place("components", name, "model" if draft.tables[name].model else "fmu")
+    return draft.place("units", origin.common.removesuffix("_parameters"))
+
+
+def _all(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
 
 
 def check_inputs(draft: Draft) -> None:
@@ -25,6 +82,8 @@ def check_inputs(draft: Draft) -> None:
             )
     for endpoint in draft.system.unconnected_inputs():
         if draft.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
+            continue
+        if endpoint.component == draft.grid and endpoint.variable.rpartition(".")[0] in draft.misfits:
             continue
         draft.note(
             draft.place("components", endpoint.component),
@@ -54,7 +113,7 @@ def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
         # The grid's inputs decide which outputs of a device are connected: its current, or an emf with its admittance.
         for taken in draft.system.components[draft.grid].description.inputs:
             port, _, variable = taken.rpartition(".")
-            if port == name:
+            if port == name and name not in draft.misfits:
                 _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{taken}", where)
 
 

@@ -212,7 +212,7 @@ BAD = [
         CASE,
         '"sg1.machine.H" = 5.0',
         '"sg1.Q_0" = 0.1',
-        'line 32, scenarios.base.set."sg1.Q_0": sg1: Q_0 cannot be set, because the power flow computes it; r',
+        'line 32, scenarios.base.set."sg1.Q_0": sg1: Q_0 = 0.1 pu and v_0 = 1.02 pu are both set, and the ',
         id="Q_0 set",
     ),
     pytest.param(

@@ -440,7 +440,7 @@ def test_a_network_of_ones_own_starts_in_steady_state(written):
         ("X = 0.02, B", "X = 0, B", "line 7, network: network 'three_grid': line 'l12' has the reactance 0 pu"),
         ('bus = "b2"', 'bus = "b9"', "line 7, network: network 'three_grid': port 'vsc' is at bus 'b9'"),
         ('"0.9 GW"', '"9 GW"', "line 4, power_flow: scenario 'three': power flow: no solution found"),
-        ("P_0 = 0.8", "P_0 = 0.8, Q_0 = 0.1", "line 19, components.vsc.parameters.Q_0: vsc: Q_0 cannot be set"),
+        ("P_0 = 0.8", "P_0 = 0.8, Q_0 = 0.1", "line 19, components.vsc.parameters.Q_0: vsc: Q_0 = 0.1 pu and v_0 = "),
         ('S_n = "1000 MVA"', 'S_n = "100 MVA"', "line 4, power_flow: scenario 'three': sg would have to feed P_0 = "),
         ('p = "0.9 GW"', 'p = "0.9 pu"', "line 11, network.loads.d3.p: '0.9 pu' is in pu, but MW is needed"),
     ],

@@ -4,10 +4,50 @@ from dataclasses import replace
 
 import pytest
 
+from fmus.grid import phasor_grid
+from fmus.grid.network import Line, Load, Network, Port, Shunt, Zip
 from fmus.grid.two_area import TWO_AREA
 from fmus.toolchain import notes
 from orchestrator.cases import catalogue_fmus
-from orchestrator.cases.catalogue_fmus import catalogue_fmu, plan_fmu
+from orchestrator.cases.case import load_case
+from orchestrator.cases.catalogue_fmus import build_fmu, catalogue_fmu, plan_fmu
+from orchestrator.errors import CaseError
+
+NETWORK = Network(
+    "net",
+    ("one", "two"),
+    (Line("line", "one", "two", X=0.1, R=0.01, B=0.02, tap=1.05),),
+    (Load("town", "two", 50.0, 10.0, active=Zip(0.5, 0.5, 0.0)),),
+    (Port("unit", "one"),),
+    (Shunt("bank", "two", 0.0, 20.0, switched=True),),
+    faults=("two",),
+)
+
+TOO_MUCH = """
+name = "too_much"
+title = "More load than the line can carry"
+source = "made up"
+[solver]
+step_size = "5 ms"
+stop_time = "1 s"
+record_interval = "5 ms"
+[power_flow]
+grid = "grid"
+slack = "gen"
+[components.grid]
+model = "phasor_grid"
+[components.gen]
+model = "synchronous_generator_st1_phasor"
+bus = "one"
+parameters = { S_n = "500 MVA", v_0 = 1.0 }
+[network]
+buses = ["one", "two"]
+[network.lines]
+line = { from = "one", to = "two", X = 0.5, B = 0.01 }
+[network.loads]
+town = { bus = "two", p = "400 MW", q = "80 Mvar" }
+[scenarios.base]
+"""
 
 WANTED = [
     ("infinite_bus", None, False, ()),
@@ -37,9 +77,9 @@ def test_no_model_is_built_to_find_its_kept_fmu(monkeypatch):
 def test_each_argument_names_a_note_of_its_own(tmp_path, monkeypatch):
     """A line's reactance counts to its last bit."""
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(catalogue_fmus, "_recipe", lambda *asked: pytest.fail(repr(asked)))
+    monkeypatch.setattr(catalogue_fmus, "sketch_model", lambda *asked, **_: pytest.fail(repr(asked)))
     asked = []
-    monkeypatch.setattr(catalogue_fmus, "noted", lambda entry, text, _: asked.append((entry, text)) or ["", ""])
+    monkeypatch.setattr(catalogue_fmus, "known", lambda *one: asked.append(one))
     for arguments in WANTED:
         with pytest.raises(pytest.fail.Exception):
             plan_fmu(*arguments)
@@ -48,8 +88,37 @@ def test_each_argument_names_a_note_of_its_own(tmp_path, monkeypatch):
 
 def test_a_note_of_an_fmu_that_is_gone_leads_to_its_building(tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    first = plan_fmu("probe_a")
+    first = build_fmu(plan_fmu("probe_a"))
     plan_fmu.cache_clear()
-    second = plan_fmu("probe_a")
-    assert first.recipe.digest == second.recipe.digest
-    assert first.description.guid == second.description.guid
+    assert plan_fmu("probe_a").description.guid == first.guid
+    first.path.unlink()
+    plan_fmu.cache_clear()
+    planned = plan_fmu("probe_a")
+    assert not planned.is_there
+    assert build_fmu(planned).guid == first.guid
+    assert first.path.is_file()
+
+
+@pytest.mark.parametrize(("model", "network"), [("phasor_grid", NETWORK), ("grid", NETWORK), ("gfor", None)])
+def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path, monkeypatch):
+    """All that a case is checked by: names, bounds, start values, states. Only dependencies need the equations."""
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
+    planned = plan_fmu(model, network)
+    assert not planned.is_there
+    built = build_fmu(planned)
+    assert planned.description.variables == built.variables
+    assert planned.description.states == built.states
+    assert planned.description.rates == built.rates
+    assert planned.description.model_name == built.model_name
+    assert planned.description.guid != built.guid
+
+
+def test_a_power_flow_that_fails_builds_no_model(tmp_path, monkeypatch):
+    """Not even the equations of its grid are written, though nothing of it was built before."""
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("a model is built"))
+    monkeypatch.setattr(phasor_grid, "solve", lambda *_: pytest.fail("the grid is solved with symbols"))
+    path = tmp_path / "case.toml"
+    path.write_text(TOO_MUCH, encoding="utf-8")
+    with pytest.raises(CaseError, match="power flow: no solution"):
+        load_case(path).prepare()

@@ -36,10 +36,19 @@ def test_the_modes_of_each_outage(case):
     assert min(lines, key=lambda line: lines[line][0]) == "line_5_7"
 
 
+@pytest.mark.parametrize(("stop", "kinds"), [(5.0, {"not_judged"}), (10.0, set())])
+def test_a_fault_that_is_cleared_in_time_is_no_growth(case, stop, kinds):
+    """Two swings beat, and magnitudes have their harmonics: until 5 s they seem to grow."""
+    assert {finding.kind for finding in case.scenario("cleared").run(stop=stop).findings} <= kinds
+
+
 def test_a_late_clearing_loses_synchronism(case):
     lost = {}
     for name in ("cleared", "late"):
         run = case.scenario(name).run(stop=3.0)
+        kinds = {finding.kind for finding in run.findings}
+        assert "growing_oscillation" not in kinds
+        assert name == "late" or "not_judged" in kinds
         lost[name] = [finding for finding in run.findings if finding.kind == "loss_of_synchronism"]
         time = run.signal("sg1.omega").time.values
         current = np.hypot(*(run.signal(f"grid.bus_7.fault.i_{part}").values for part in ("re", "im")))

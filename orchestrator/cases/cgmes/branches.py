@@ -77,7 +77,19 @@ def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
         ends = row.bus1_id, row.bus2_id
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):
             y = complex(row.g1, row.b1), complex(row.g2, row.b2)
-            yield branch(row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), complex(row.r, row.x), y)
+            yield _shorter(branch(row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), complex(row.r, row.x), y))
+
+
+def _shorter(line: Branch) -> Branch:
+    """A line between two nominal voltages has a ratio in pu. Where the same two-port without a ratio has smaller
+    admittances to earth, the line stands for a transformer in pu, and that is what it is.
+    """
+    if line.tap == 1.0 or not line.z:
+        return line
+    y, t = 1 / line.z, line.tap
+    to_earth = (y + line.to_earth[0]) / t**2 - y / t, y + line.to_earth[1] - y / t
+    plain = Branch(line.name, line.start, line.end, t * line.z, to_earth, 1.0, 0.0)
+    return plain if sum(map(abs, to_earth)) < sum(map(abs, line.to_earth)) else line
 
 
 def transformers(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:

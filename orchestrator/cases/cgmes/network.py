@@ -30,6 +30,9 @@ names those that may go."""
 _NO_LIMIT = 9998.0
 """Mvar and MW by which exports say that there is no limit."""
 
+_ONE_LEVEL = 1.05
+"""Nominal voltages with a larger ratio are two levels of voltage."""
+
 _MOST_RATING = 9998.0
 """MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is."""
 
@@ -110,7 +113,8 @@ class _Reading:
         self._refuse(leaving_out)
         self._buses(leaving_out)
         self._injections()
-        self._branches += [*lines(self._source, self._nominal), *transformers(self._source, self._nominal)]
+        self._lines()
+        self._branches += transformers(self._source, self._nominal)
         for star, legs in stars(self._source, self._nominal):
             self._inner(star)
             self._branches += legs
@@ -219,6 +223,16 @@ class _Reading:
     def _add(self, bus: str, column: int, value: complex) -> None:
         self._rows[self._numbers[bus]][column] += value.real
         self._rows[self._numbers[bus]][column + 1] += value.imag
+
+    def _lines(self) -> None:
+        for line in lines(self._source, self._nominal):
+            self._branches.append(line)
+            one, two = sorted((self._nominal[line.start], self._nominal[line.end]))
+            if two > _ONE_LEVEL * one and any(line.to_earth):
+                self._changes.note(
+                    line.name, "line between two nominal voltages: taken as it is; CGMES has one charging for both of "
+                    "its ends, so an export that wrote a transformer as a line has lost a part of it"
+                )  # fmt: skip
 
     # -- injections ----------------------------------------------------------------------------------
 

@@ -1,85 +1,39 @@
 """PSS/E dynamics data (DYR): machines with their controls, and converters, of the generators of a RAW file."""
 
-import math
-import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
+from orchestrator.cases.psse.dyr_following import followed, is_following, remedy_for
+from orchestrator.cases.psse.dyr_records import DynamicRecord, given_values
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.errors import InputError
 
-MOST_BYTES = 100_000_000
-"""Of a file."""
-
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
 
-_TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
 _MOST_SHOWN = 20
 _WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
 """Parts of a generator for which a file has no record: what PSS/E assumes."""
 
-_FOLLOWING = ("REGC", "REEC", "REPC", "WTG", "WT4", "WT3", "PVGU", "PVEU", "PLNTB")
-"""How the names of grid-following converters and their controls begin."""
-
-
-@dataclass(frozen=True)
-class DynamicRecord:
-    """One record: ``bus 'NAME' id values … /``."""
-
-    place: str
-    bus: int
-    name: str
-    machine: str
-    values: tuple[str, ...]
+_SAME = 1e-3
+"""Part by which two figures for one reactance may differ: files round them."""
 
 
 @dataclass(frozen=True)
 class MachineModel:
-    """What a generator is made of, and the parameters that its records set; or the model of a converter."""
+    """What a generator is made of, and the parameters that its records set; or the model of a converter.
+
+    ``doubts`` are texts with the parameter and the place that they are about; ``replaced`` are lines of records that an
+    approximation stands for, with what it leaves out.
+    """
 
     parts: Mapping[str, str]
     parameters: Mapping[str, float]
     converter: str | None = None
-
-
-def read_dyr(path: Path) -> list[DynamicRecord]:
-    """Records of a DYR file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is too large, or a record is not of that form.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
-    if (size := path.stat().st_size) > MOST_BYTES:
-        raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
-    records: list[DynamicRecord] = []
-    tokens: list[str] = []
-    begin = 0
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-        if line.lstrip().startswith(("//", "@!")):
-            continue
-        for quoted, plain, slash, _ in _TOKEN.findall(line):
-            if slash:
-                records.append(_record(f"{path}, line {begin or number}", tokens))
-                tokens = []
-                break  # what follows on the line is a comment
-            if quoted or plain:
-                begin = begin if tokens else number
-                tokens.append(quoted.strip() or plain)
-    if tokens:
-        raise InputError(f"{path}, line {begin}: the record does not end with a slash; the file is cut short")
-    return records
-
-
-def _record(place: str, tokens: Sequence[str]) -> DynamicRecord:
-    if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
-        raise InputError(f"{place}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /")
-    return DynamicRecord(place, int(tokens[0]), tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:]))
+    doubts: tuple[tuple[str, str, str], ...] = ()
+    replaced: tuple[tuple[int, str], ...] = ()
 
 
 def machine_models(
@@ -88,6 +42,8 @@ def machine_models(
     leaving_out: Sequence[str] = (),
     replaced: Collection[tuple[int, str]] = (),
     idle: Collection[tuple[int, str]] = (),
+    *,
+    approximate: bool = False,
 ) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines in service, by bus and identifier.
 
@@ -103,6 +59,9 @@ def machine_models(
         Machines in whose place a converter of the case stands: they need no record.
     idle
         Machines of the RAW file that are out of service.
+    approximate
+        Whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else they are
+        refused.
 
     Raises
     ------
@@ -115,25 +74,19 @@ def machine_models(
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
+    of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     for record in records:
         key = (record.bus, record.machine)
         if key not in at and key not in idle and record.name in _KNOWN:
-            ids = sorted(name for bus, name in {*at, *idle} if bus == record.bus)
-            there = f"which has {', '.join(map(repr, ids))}" if ids else "which has no generator in the RAW file"
-            problems.append(
-                f"{record.place}: {record.name} is of machine {record.machine!r} at bus {record.bus}, {there}; correct "
-                "its bus or identifier, or remove the record"
-            )
-        if key not in at or record.name in left:
+            problems.append(_of_nobody(record, {*at, *idle}))
+        if key in at:
+            of[key].append(record)
+        if key not in at or record.name in left or (approximate and record.name in FIELDS):
             continue
         known = _KNOWN.get(record.name)
         if known is None:
             problems.append(f"{record.place}: no part of ours stands for {record.name} (bus {record.bus})")
-            if record.name.startswith(_FOLLOWING):
-                problems[-1] += (
-                    ", a grid-following converter; name its records in dyr_leave_out, and give its unit alpha = 1 with "
-                    "a converter of ours"
-                )
+            problems[-1] += remedy_for(record.name, approximate=approximate)
         elif known.kind in parts[key]:
             problems.append(f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}")
         else:
@@ -142,14 +95,10 @@ def machine_models(
                 values[key] |= _values(record, known)
             except InputError as error:
                 problems.append(str(error))
-    for (bus, name), own in parts.items():
-        if "converter" in own and len(own) > 1:
-            others = ", ".join(kind for kind in own if kind != "converter")
-            problems.append(
-                f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
-            )
-        elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
-            problems.append(f"machine {name!r} at bus {bus} has no record of a machine")
+    following = _followed(of, left, problems) if approximate else {}
+    for key in following:
+        parts[key]["converter"] = MODEL
+    problems += _unfit(parts, replaced)
     if problems:
         more = f"\n  and {len(problems) - _MOST_SHOWN} more" if len(problems) > _MOST_SHOWN else ""
         raise InputError(
@@ -157,11 +106,69 @@ def machine_models(
             "dyr_leave_out:\n  " + "\n  ".join(problems[:_MOST_SHOWN]) + more
         )
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
-    return {
-        key: _model(at[key], parts[key], values[key], key in open_)
+    return following | {
+        key: replace(
+            _model(at[key], parts[key], values[key], key in open_), doubts=tuple(_doubts(at[key], of[key], values[key]))
+        )
         for key in at
-        if {"machine", "converter"} & {*parts[key]}
+        if {"machine", "converter"} & {*parts[key]} and key not in following
     }
+
+
+def _unfit(parts: Mapping[tuple[int, str], Mapping[str, str]], replaced: Collection[tuple[int, str]]) -> Iterator[str]:
+    """Machines whose records are too many or too few."""
+    for (bus, name), own in parts.items():
+        if "converter" in own and len(own) > 1:
+            others = ", ".join(kind for kind in own if kind != "converter")
+            yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
+        elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
+            yield f"machine {name!r} at bus {bus} has no record of a machine"
+
+
+def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> str:
+    ids = sorted(name for bus, name in machines if bus == record.bus)
+    there = f"which has {', '.join(map(repr, ids))}" if ids else "which has no generator in the RAW file"
+    return (
+        f"{record.place}: {record.name} is of machine {record.machine!r} at bus {record.bus}, {there}; correct its bus "
+        "or identifier, or remove the record"
+    )
+
+
+def _followed(
+    of: Mapping[tuple[int, str], Sequence[DynamicRecord]], left: Collection[str], problems: list[str]
+) -> dict[tuple[int, str], MachineModel]:
+    """Models of the machines that are grid-following converters; ``problems`` takes what speaks against one."""
+    found = {}
+    for key, own in of.items():
+        if is_following(own, left):
+            try:
+                parameters, replaced = followed(own, left)
+            except InputError as error:
+                problems.append(str(error))
+                parameters, replaced = {}, []
+            found[key] = MachineModel({}, parameters, MODEL, replaced=tuple(replaced))
+    return found
+
+
+def _doubts(
+    machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[tuple[str, str, str]]:
+    """What two files say of one machine and should be the same."""
+    x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
+    if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
+        return
+    record = next(record for record in records if "machine.X_d2" in _sets(record.name))
+    yield (
+        "machine.X_d2",
+        record.place,
+        f"{record.name} has X''d = {x_d2:g} pu, and the RAW file has ZX = {x_source:g} pu of the same machine in line "
+        f"{machine.line}; PSS/E wants one figure in both, and X''d counts here; correct the one that is wrong",
+    )
+
+
+def _sets(name: str) -> set[str]:
+    """Parameters that a record sets."""
+    return {p for field in (_KNOWN[name].fields if name in _KNOWN else ()) for p in field.parameters}
 
 
 def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
@@ -179,17 +186,7 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     """Parameters that a record sets."""
-    following = next((text for text in record.values[2:] if text.upper() in _KNOWN), None)
-    if following is not None:
-        raise InputError(
-            f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
-        )
-    if len(record.values) != len(known.fields):
-        raise InputError(
-            f"{record.place}: {record.name} has {len(record.values)} values, and needs {len(known.fields)}: "
-            f"{', '.join(field.name for field in known.fields)}"
-        )
-    given = {field.name: _number(record, field, text) for field, text in zip(known.fields, record.values, strict=False)}
+    given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
     found: dict[str, float] = {}
     for field in known.fields:
         value = given[field.name]
@@ -210,13 +207,3 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
         product = bool(value) if field.switch else value * given[field.times] if field.times else value
         found |= dict.fromkeys(field.parameters, product) | dict.fromkeys(field.negated, -product)
     return found
-
-
-def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
-    try:
-        value = float(text.upper().replace("D", "E"))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number")
-    return value

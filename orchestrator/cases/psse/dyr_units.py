@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.cases.network_data import bus_name
-from orchestrator.cases.psse.dyr import machine_models, read_dyr
+from orchestrator.cases.psse.dyr import machine_models
+from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
 
@@ -49,6 +50,8 @@ def with_records(
     leaving_out: Sequence[str],
     without: Collection[str],
     idle: Collection[tuple[int, str]] = (),
+    *,
+    approximate: bool = False,
 ) -> list[UnitRow]:
     """The units with what the records say of them.
 
@@ -64,6 +67,8 @@ def with_records(
         Labels of units that are converters of the case alone, and need no record.
     idle
         Bus and identifier of the machines that are out of service.
+    approximate
+        Whether grid-following converters become `gfl_phasor`.
 
     Raises
     ------
@@ -72,14 +77,15 @@ def with_records(
     """
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
-    models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle)
+    models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate)
     found = []
     for key, row in zip(keys, rows, strict=True):
         model = models.get(key)
         if model is None:
             found.append(row)
         elif model.converter is None:
-            found.append(replace(row, parameters={"sg": model.parameters}, parts=model.parts))
+            found.append(replace(row, parameters={"sg": model.parameters}, parts=model.parts, doubts=model.doubts))
         else:
-            found.append(replace(row, parameters={"gfor": model.parameters}, converter=model.converter))
+            own = {"gfor": model.parameters}
+            found.append(replace(row, parameters=own, converter=model.converter, replaced=model.replaced))
     return found

@@ -103,6 +103,9 @@ class _Reading:
         self._load_parts: dict[int, tuple[complex, complex]] = {}
 
     def network(self, leaving_out: Sequence[str]) -> RawNetwork:
+        for line, section in self._raw.guessed.items():
+            text = f"does not say which data begin, as other lines do: taken as {section} data, which are next in order"
+            self._changes.note(line, text)
         leave_out(self._raw, leaving_out, self._changes)
         self._buses()
         self._loads()

@@ -30,6 +30,11 @@ _ALIASES = {"two-terminal dc line": "two-terminal dc", "vsc dc": "vsc dc line", 
             "inter-area": "inter-area transfer", "switching device": "system switching device"}  # fmt: skip
 _TOKEN = re.compile(r"""'([^']*)'?|"([^"]*)"?|(,)|(/)|([^\s,'"/]+)""")
 _BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
+_END = re.compile(r"END OF\s+(.*?)\s+DATA", re.IGNORECASE)
+_REMEDY = (
+    "(such as '0 / END OF BUS DATA, BEGIN LOAD DATA'), and their order is not known for this file; export the case "
+    "from PSS/E as revision 35"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +98,9 @@ class RawFile:
         System base [MVA], and rated frequency [Hz] where the file says it.
     sections
         Records by the section's name in small letters; one with several lines is several records.
+    guessed
+        Lines between sections that do not say which data begin, though others do, and the section that was taken by the
+        revision's order.
     """
 
     place: str
@@ -100,6 +108,7 @@ class RawFile:
     base_mva: float
     frequency: float | None
     sections: dict[str, list[Record]] = field(default_factory=dict)
+    guessed: dict[int, str] = field(default_factory=dict)
 
     def of(self, section: str) -> list[Record]:
         """Records of a section."""
@@ -135,7 +144,7 @@ def read_records(path: Path) -> RawFile:
     frequency = head.number(5, "the frequency BASFRQ [Hz]", 0.0)
     for _ in range(2):  # two lines of titles
         next(lines, None)
-    return RawFile(str(path), revision, base, frequency or None, _sections(path, revision, lines))
+    return RawFile(str(path), revision, base, frequency or None, *_sections(path, revision, lines))
 
 
 def _text_of(path: Path) -> str:
@@ -158,8 +167,13 @@ def _numbered(text: str) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def _sections(path: Path, revision: int, lines: Iterator[tuple[int, str]]) -> dict[str, list[Record]]:
+def _sections(
+    path: Path, revision: int, lines: Iterator[tuple[int, str]]
+) -> tuple[dict[str, list[Record]], dict[int, str]]:
+    """Records by section, and the sections that only the order gives although other lines say theirs."""
     sections: dict[str, list[Record]] = {}
+    guessed: dict[int, str] = {}
+    named = False
     order = list(_ORDER.get(revision, ()))
     name = "bus" if revision == 33 else "system-wide"
     for number, line in lines:
@@ -167,30 +181,43 @@ def _sections(path: Path, revision: int, lines: Iterator[tuple[int, str]]) -> di
         if not stripped:
             continue
         if stripped.upper() == "Q":
-            return sections
+            return sections, guessed if named else {}
         if re.match(r"0\s*(/|$)", stripped):
+            named = named or bool(_BEGIN.search(stripped) and name != "system-wide")
             name = _following(path, number, stripped, name, order)
+            if not (_BEGIN.search(stripped) or _END.search(stripped)) and name != "end":
+                guessed[number] = name
+        elif name == "end":
+            raise InputError(f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}")
         else:
             sections.setdefault(name, []).append(Record(str(path), number, _fields(line)))
     if not {"bus", "branch"} <= {*sections} or name in _HEAD:
         raise InputError(f"{path}: it ends within its {name} data; export the case once more")
-    return sections
+    return sections, guessed if named else {}
 
 
 def _following(path: Path, number: int, line: str, name: str, order: list[str]) -> str:
     """The section that begins: the one that the line names, or else the next in the revision's order."""
-    if found := _BEGIN.search(line):
-        named = " ".join(found[1].lower().split())
-        return _ALIASES.get(named, named)
-    if "END OF" in line.upper():
-        return "end"
-    if name not in order:
+    ended = _known_as(found[1]) if (found := _END.search(line)) else ""
+    if ended in order and name in order and ended != name:
         raise InputError(
-            f"{path}, line {number}: the line does not say which data begin (such as '0 / END OF BUS DATA, BEGIN LOAD "
-            "DATA'), and their order is not known for this file; export the case from PSS/E as revision 35"
+            f"{path}, line {number}: it ends the {ended} data, and what stands before it are {name} data by the lines "
+            "between sections; one of these is missing or wrong: export the case once more"
         )
+    if found := _BEGIN.search(line):
+        return _known_as(found[1])
+    if name not in order:
+        if ended:
+            return "end"
+        raise InputError(f"{path}, line {number}: the line does not say which data begin {_REMEDY}")
     following = order.index(name) + 1
     return order[following] if following < len(order) else "end"
+
+
+def _known_as(text: str) -> str:
+    """A section by the name that is used here."""
+    name = " ".join(text.lower().split())
+    return _ALIASES.get(name, name)
 
 
 def _fields(line: str) -> list[str]:

@@ -7,6 +7,8 @@ LINES = (
     (4, 5, 0.010, 0.085, 0.176), (4, 6, 0.017, 0.092, 0.158), (5, 7, 0.032, 0.161, 0.306),
     (6, 9, 0.039, 0.170, 0.358), (7, 8, 0.0085, 0.072, 0.149), (8, 9, 0.0119, 0.1008, 0.209),
 )  # fmt: skip
+REACTANCES = {1: 0.12, 2: 0.2, 3: 0.2}
+"""Of the machines' sources, ZX: X''d of the tests' dynamics data."""
 TRANSFORMERS = ((4, 1, 0.0576), (7, 2, 0.0625), (9, 3, 0.0586))
 """P. W. Sauer, M. A. Pai, "Power System Dynamics and Stability" (1998), figure 7.4: pu on 100 MVA, MW, Mvar."""
 
@@ -28,7 +30,7 @@ def records(revision):
     ]
     found["LOAD"] = [f"{n},'1 ',1,1,1,{p},{q},0,0,0,0,1,1,0" for n, (p, q) in LOADS.items()]
     found["GENERATOR"] = [
-        f"{n},'1 ',{p},0,300,-300,{v},0,{node}{base},0,0.2,0,0,1,1,100,{base},0,1,1"
+        f"{n},'1 ',{p},0,300,-300,{v},0,{node}{base},0,{REACTANCES[n]},0,0,1,1,100,{base},0,1,1"
         for n, (p, v, base) in MACHINES.items()
     ]
     found["BRANCH"] = [f"{i},{j},'1 ',{r},{x},{b},{name}{rates},0,0,0,0,1,1,0,1,1" for i, j, r, x, b in LINES]

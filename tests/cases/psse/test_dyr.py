@@ -5,7 +5,7 @@ import json
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.psse.dyr import read_dyr
+from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.errors import CaseError, InputError
 from tests.cases.psse import raw, records
 

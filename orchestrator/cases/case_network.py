@@ -1,0 +1,127 @@
+"""The network of a scenario: what is read for it, and which network stands behind the grid component."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from fmus.grid.network import Network, Port
+from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.names import close_names
+from orchestrator.cases.network_data import network_data
+from orchestrator.cases.schema import BusFaultTable, CaseTable, ComponentTable, ShuntReconnectionTable, ShuntTripTable
+from orchestrator.errors import InputError
+
+Tables = Mapping[str, ComponentTable]
+
+
+def takes_network(table: ComponentTable) -> bool:
+    """Whether a component's model is built for the case's network table."""
+    return table.model in model_names() and needs_arguments(table.model or "")
+
+
+def read_network(draft: Draft) -> None:
+    """Read the elements of the network table. Its source may have data for the units."""
+    table = draft.case.network
+    if table is None:
+        return
+    given = [key for key in ("matpower", "pandapower", "raw", "cgmes") if getattr(table, key) is not None]
+    if len(given) > 1:
+        names = " or ".join(map(repr, given))
+        draft.note_network(draft.place("network"), f"give either {names}, not both")
+        return
+    source = given[0] if given else None
+    try:
+        draft.data = network_data(table, draft.directory)
+        draft.questions += draft.data.changes
+    except InputError as error:
+        where = draft.place("network", source) if source else draft.place("network")
+        draft.note_network(where, str(error))
+
+
+def check_network_is_used(draft: Draft, everything: Tables) -> None:
+    """Refuse a network that nothing is built from; its frequency alone would still set that of every component."""
+    tables = everything.values()
+    unknown = [table.model for table in tables if table.model is not None and table.model not in model_names()]
+    if draft.case.network is None or draft.case.units is not None or unknown:
+        return
+    if not any(takes_network(table) for table in tables):
+        draft.note(
+            draft.place("network"),
+            "no component is built from this network; give the grid the model 'grid' or 'phasor_grid', or remove "
+            "the table",
+        )
+
+
+def find_network(draft: Draft, everything: Tables) -> None:
+    """The network behind the grid component: the model's own, or the file's table."""
+    if draft.grid is None:
+        _check_buses_have_a_grid(draft)
+        return
+    grid = draft.tables.get(draft.grid)
+    if grid is None:
+        hint = close_names(draft.grid, draft.tables, f"the case has: {', '.join([*draft.tables][:12])}")
+        draft.note_network(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}")
+    elif takes_network(grid):
+        draft.network = _from_table(draft, grid, everything)
+    elif grid.model in model_names():
+        draft.network = _with_switches(network_of(grid.model or ""), draft.case)
+
+
+def _check_buses_have_a_grid(draft: Draft) -> None:
+    """Name the first of the components at a bus; what is said of it holds for all."""
+    for name, table in draft.tables.items():
+        if table.bus is not None:
+            place = "units" if name in draft.origins else "components"
+            where = draft.place(place) if place == "units" else draft.place(place, name, "bus")
+            draft.note_network(
+                where,
+                "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
+            )
+            return
+
+
+def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Network | None:
+    data = draft.data
+    if data is None:
+        if draft.case.network is None:
+            draft.note_network(
+                draft.place("power_flow", "grid"),
+                f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
+            )
+        return None
+    if draft.network_failed:
+        return None
+    held = {table.bus for table in everything.values()}
+    idle = [bus for bus in data.generation if bus not in held]
+    if idle:
+        draft.note_network(
+            draft.place("network"),
+            f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; "
+            "add a row to the units' file, or a component with this bus",
+        )
+        return None
+    ports = tuple(Port(n, t.bus) for n, t in draft.tables.items() if t.bus)
+    name = f"{draft.case.name}_grid"
+    try:
+        network = Network(
+            name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B, (), data.transformers,
+            phasors=grid.model == "phasor_grid",
+        )  # fmt: skip
+        return _with_switches(network, draft.case)
+    except ValueError as error:
+        draft.note_network(draft.place("network"), str(error))
+        return None
+
+
+def _with_switches(network: Network | None, case: CaseTable) -> Network | None:
+    """The network with the faults and switched shunts of all scenarios, which share one FMU.
+
+    Unknown names are the events' matter.
+    """
+    tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
+    faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
+    switched = {table.shunt for table in tables if isinstance(table, ShuntTripTable | ShuntReconnectionTable)}
+    if network is None or not (faults or switched):
+        return network
+    shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
+    return replace(network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts)

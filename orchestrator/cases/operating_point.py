@@ -1,0 +1,98 @@
+"""Operating point of a scenario: its power flow, and what is unusual about the solution."""
+
+from collections.abc import Sequence
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.flow_units import note_contradictions, undecided_units
+from orchestrator.cases.plausibility import question
+from orchestrator.cases.power_flow import PowerFlow
+from orchestrator.cases.start_values import start_from_power_flow
+from orchestrator.errors import InputError, Problem
+
+_USUAL_VOLTAGES = (0.8, 1.2)
+"""Magnitudes [pu] of bus voltages that are not questioned."""
+
+_SHOWN = 5
+"""Buses that a question names; the others are counted."""
+
+
+def power_flow_of(draft: Draft) -> PowerFlow | None:
+    """The power flow with the values that are set; None without a network, or with a problem, which is noted."""
+    table = draft.case.power_flow
+    if table is None or draft.network is None:
+        return None
+    units = {p.name: p.bus for p in draft.network.ports if p.name in draft.system.components}
+    wanted = table.slack or (draft.data.slack if draft.data else None)
+    if wanted is None:
+        draft.note(
+            draft.place("power_flow"),
+            "the key 'slack' is missing; name a unit or a bus with one that feeds what is left",
+        )
+        return None
+    slack = units.get(wanted, wanted)
+    if slack not in units.values():
+        known = ", ".join(units)
+        draft.note(
+            draft.place("power_flow", "slack"),
+            f"{wanted!r} is neither a unit of this scenario nor a bus with one; units: {known}",
+        )
+        return None
+    note_contradictions(draft, units)
+    if draft.problems:
+        return None
+    undecided = list(undecided_units(draft, units, slack))
+    try:
+        flow = start_from_power_flow(
+            draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
+            keep_limits=table.reactive_limits is True,
+        )  # fmt: skip
+    except InputError as error:
+        draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}")
+        return None
+    question(draft, undecided)
+    draft.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
+    return flow
+
+
+def _first_few(texts: Sequence[str]) -> str:
+    return ", ".join(texts[:_SHOWN]) + (f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else "")
+
+
+def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
+    """Ask about voltages with which no network is run."""
+    low, high = _USUAL_VOLTAGES
+    unusual = [f"{bus!r} {abs(v):.3f} pu" for bus, v in flow.voltages.items() if not low <= abs(v) <= high]
+    if not unusual:
+        return []
+    return [
+        Problem(
+            draft.place("power_flow"),
+            f"the power flow gives voltages outside of {low:g} to {high:g} pu: {_first_few(unusual)}; check loads, "
+            "shunts and stray_B there",
+        )
+    ]
+
+
+def _reactive_limits(draft: Draft) -> dict[str, tuple[float, float]]:
+    """Limits of the source's generators, which the units' file overrides [Mvar]."""
+    generation = draft.data.generation if draft.data else {}
+    return {bus: (g.q_min_mvar, g.q_max_mvar) for bus, g in generation.items()} | draft.reactive_limits
+
+
+def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
+    """What is to be said of limits of reactive power."""
+    kept = draft.case.power_flow.reactive_limits if draft.case.power_flow else None
+    where = draft.place("power_flow", *(["reactive_limits"] if kept is not None else []))
+    found = []
+    if flow.at_limits:
+        told = _first_few([excess.text(kept=True) for excess in flow.at_limits])
+        found.append(Problem(where, f"limits of reactive power are reached: {told}"))
+    if flow.beyond_limits and kept is not False:
+        told = _first_few([excess.text(kept=False) for excess in flow.beyond_limits])
+        remedy = (
+            "the slack bus keeps no limit; take another slack"
+            if kept
+            else "write reactive_limits = true to keep the limits, or false if the voltages are meant"
+        )
+        found.append(Problem(where, f"limits of reactive power are exceeded: {told}; {remedy}"))
+    return found

@@ -1,0 +1,111 @@
+"""Records of a PSS/E dynamics file (DYR), as they stand there."""
+
+import math
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fmus.synchronous_generator.dyr_fields import DyrField
+from orchestrator.errors import InputError
+
+MOST_BYTES = 100_000_000
+"""Of a file."""
+
+_TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
+
+
+@dataclass(frozen=True)
+class DynamicRecord:
+    """One record: ``bus 'NAME' id values … /``, with its file and line."""
+
+    file: str
+    line: int
+    bus: int
+    name: str
+    machine: str
+    values: tuple[str, ...]
+
+    @property
+    def place(self) -> str:
+        """File and line."""
+        return f"{self.file}, line {self.line}"
+
+
+def read_dyr(path: Path) -> list[DynamicRecord]:
+    """Records of a DYR file.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, it is too large, or a record is not of that form.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
+    if (size := path.stat().st_size) > MOST_BYTES:
+        raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
+    records: list[DynamicRecord] = []
+    tokens: list[str] = []
+    begin = 0
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+        if line.lstrip().startswith(("//", "@!")):
+            continue
+        for quoted, plain, slash, _ in _TOKEN.findall(line):
+            if slash:
+                records.append(_record(str(path), begin or number, tokens))
+                tokens = []
+                break  # what follows on the line is a comment
+            if quoted or plain:
+                begin = begin if tokens else number
+                tokens.append(quoted.strip() or plain)
+    if tokens:
+        raise InputError(f"{path}, line {begin}: the record does not end with a slash; the file is cut short")
+    return records
+
+
+def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
+    if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
+        raise InputError(
+            f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"
+        )
+    return DynamicRecord(file, line, int(tokens[0]), tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:]))
+
+
+def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
+    """Values of a record by the names of its fields.
+
+    Parameters
+    ----------
+    record
+        With its values as text.
+    fields
+        Those of its kind, in order.
+    known
+        Names of records; one among the values is the next record, before which a slash is missing.
+
+    Raises
+    ------
+    InputError
+        If it has another number of values, or one is no number.
+    """
+    following = next((text for text in record.values[2:] if text.upper() in known), None)
+    if following is not None:
+        raise InputError(
+            f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
+        )
+    if len(record.values) != len(fields):
+        raise InputError(
+            f"{record.place}: {record.name} has {len(record.values)} values, and needs {len(fields)}: "
+            f"{', '.join(field.name for field in fields)}"
+        )
+    return {field.name: _number(record, field, text) for field, text in zip(fields, record.values, strict=True)}
+
+
+def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
+    try:
+        value = float(text.upper().replace("D", "E"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number")
+    return value
