@@ -1,7 +1,6 @@
 """Limits that stay active: the component, the beginning and the duration."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +8,8 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.watch.finding import Finding
+from orchestrator.watch.limit import BYPASS_TIME, Lead, Limit
+from orchestrator.watch.machine_limits import MACHINE_LIMITS
 from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
@@ -21,87 +22,41 @@ AT_LIMIT = 1 - 1e-9
 digits."""
 
 
-@dataclass(frozen=True)
-class Lead:
-    """The limited quantity, reconstructed as signal + T/gain·(d state/dt) from the state of a block or of a control's
-    integrator.
-
-    Attributes
-    ----------
-    state
-        The state whose derivative is read.
-    time, gain
-        Parameters with T [s] and the gain; None stands for 1.
-    """
-
-    state: str
-    time: str
-    gain: str | None = None
-
-
-@dataclass(frozen=True)
-class Limit:
-    """The variables of an FMU that show an active limit. The limit is watched if the FMU has all of them.
-
-    Attributes
-    ----------
-    name
-        Name of the limit in messages.
-    signal
-        The limited signal, or a signal that follows it.
-    limit
-        Parameter with the limit of the magnitude; None if the signal is given as a part of the limit.
-    lead
-        Reconstruction of the limited quantity from a derivative, if the signal only follows this quantity.
-    enabled
-        Switch that must be on for the limited signal to have an effect.
-    represented
-        Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
-    """
-
-    name: str
-    signal: str
-    limit: str | None
-    lead: Lead | None = None
-    enabled: str | None = None
-    represented: bool = True
-
-    def variables(self) -> tuple[str, ...]:
-        """Signals to be read."""
-        return (self.signal,) if self.lead is None else (self.signal, f"der({self.lead.state})")
-
-    def needed(self) -> tuple[str, ...]:
-        """All variables that an FMU must have."""
-        lead = (self.lead.time, self.lead.gain) if self.lead is not None else ()
-        parameters = (self.limit, self.enabled, *lead)
-        return (*self.variables(), *(p for p in parameters if p is not None))
+KIND = "current_limit.kind"
+"""Parameter of the grid-forming converter: 0 for its box in q and d, above for its other limits."""
 
 
 def _current_limit(what: str, axis: str) -> Limit:
     """The reference is the current and what the integrator of the current control, R/τ·(reference - current), adds."""
     lead = Lead(f"current_control.x_{axis}", "current_control.tau", "filter.R_c")
     return Limit(f"limit of the {what} current reference (i_{axis})", f"filter.i_s_{axis}",
-                 f"voltage_control.i_{axis}_max", lead)  # fmt: skip
+                 f"voltage_control.i_{axis}_max", lead, unless=KIND)  # fmt: skip
 
 
 LIMITS = (
     _current_limit("active", "q"),
     _current_limit("reactive", "d"),
     Limit("current limit (which the phasor model lacks)", "current_limit", None, represented=False),
-    Limit("limit of the current reference", "current_demand", None),
+    Limit("limit of the current reference", "current_demand", None, lacks=(KIND,)),
+    Limit("limit of the current reference", "current_demand", None, enabled=KIND),
     Limit("fault current limit", "fault_current", None),
     Limit("output limit of POD-P", "delta_p_pod", "pod_p.limit", enabled="pod_p.enabled"),
     Limit("output limit of POD-Q", "delta_q_pod", "pod_q.limit", enabled="pod_q.enabled"),
     Limit("output limit of the stabiliser", "pss.lead_lag_2", "pss.limit", Lead("pss.lead_lag_2", "pss.T_3"),
           "pss.enabled"),
+    *MACHINE_LIMITS,
 )  # fmt: skip
 """Limits of the catalogue's models. A foreign FMU with the same variables is watched as well."""
+
+
+SCALED = 1e-3
+"""The same for a limit in proportion to a signal: the model may take that from an earlier pass of its iteration."""
 
 
 def limits_of(plan: ComponentPlan) -> Iterator[Limit]:
     """The limits that can be seen in a component."""
     for limit in LIMITS:
-        if all(name in plan.description.variables for name in limit.needed()):
+        if limit.fits(plan.description.variables):
             yield limit
 
 
@@ -113,7 +68,7 @@ def limit_signals(system: System) -> list[str]:
 
 def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
     """Limits that act for longer than `LEAST_DURATION` in all, or still act at the end, while their component is on the
-    grid: what a tripped one limits concerns nobody.
+    grid: what a tripped one limits concerns nobody. An upper and a lower limit of one signal are one finding.
     """
     for name, plan in system.components.items():
         limits = list(limits_of(plan))
@@ -121,34 +76,69 @@ def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Fi
             continue
         on = settings.connected(name) > 0
         for limit in limits:
-            acting = _acting(seen, name, limit, settings) & on
-            duration = float(acting[1:].sum()) * seen.interval
-            if duration > LEAST_DURATION or (len(acting) > 1 and acting[-1]):
-                yield _finding(seen.times, name, limit, acting, duration)
+            present = on
+            if limit.unless is not None and limit.unless in plan.description.variables:
+                present = on & (settings.values(name, limit.unless) <= 0)
+            acting = {parameter: acts & present for parameter, acts in _acting(seen, name, limit, settings).items()}
+            either = np.logical_or.reduce([*acting.values()])
+            duration = _duration(seen, either)
+            if duration > LEAST_DURATION or (len(either) > 1 and either[-1]):
+                of_each = {parameter: _duration(seen, acts) for parameter, acts in acting.items() if parameter}
+                yield _finding(seen.times, name, limit, either, duration, of_each)
 
 
-def _acting(seen: Seen, name: str, limit: Limit, settings: Settings) -> NDArray[np.bool_]:
+def _duration(seen: Seen, acting: NDArray[np.bool_]) -> float:
+    return float(acting[1:].sum()) * seen.interval
+
+
+def _acting(seen: Seen, name: str, limit: Limit, settings: Settings) -> dict[str, NDArray[np.bool_]]:
+    """When each limit of a signal acts, by the limit's parameter; empty for one of the magnitude."""
     signal = seen.values[f"{name}.{limit.signal}"]
     if limit.lead is not None:
-        factor = settings.values(name, limit.lead.time)
-        if limit.lead.gain is not None:
-            gain = settings.values(name, limit.lead.gain)
-            factor = np.divide(factor, gain, out=np.zeros_like(factor), where=gain != 0)
-        signal = signal + factor * seen.values[f"{name}.der({limit.lead.state})"]
+        signal = signal + _lead_time(name, limit.lead, settings) * seen.values[f"{name}.der({limit.lead.state})"]
     bound = settings.values(name, limit.limit) if limit.limit is not None else np.ones(len(seen.times))
-    acting: NDArray[np.bool_] = (np.abs(signal) >= AT_LIMIT * bound) & (bound > 0)
-    return acting & (settings.values(name, limit.enabled) > 0) if limit.enabled is not None else acting
+    enabled = settings.values(name, limit.enabled) > 0 if limit.enabled is not None else np.ones(len(bound), dtype=bool)
+    if limit.low is None or limit.limit is None:
+        return {"": (np.abs(signal) >= AT_LIMIT * bound) & (bound > 0) & enabled}
+    low, scale = settings.values(name, limit.low), 1.0 if limit.scale is None else seen.values[f"{name}.{limit.scale}"]
+    # Of a signal that rests at 0 by a limit of 0, such as a closed valve, the last digits are those of 1.
+    part = 1 - AT_LIMIT if limit.scale is None else SCALED
+    slack = part * np.maximum(1.0, np.abs(signal))
+    high_acts, low_acts = signal >= bound * scale - slack, signal <= low * scale + slack
+    return {limit.limit: high_acts & enabled, limit.low: low_acts & enabled}
 
 
-def _finding(times: Numbers, name: str, limit: Limit, acting: NDArray[np.bool_], duration: float) -> Finding:
+def _lead_time(name: str, lead: Lead, settings: Settings) -> Numbers:
+    """T/gain of a lead [s] at every look."""
+    factor = settings.values(name, lead.time)
+    if lead.lag is not None:
+        factor = np.where(settings.values(name, lead.lag) > 0, factor, BYPASS_TIME)
+    if lead.gain is None:
+        return factor
+    gain = settings.values(name, lead.gain)
+    return np.divide(factor, gain, out=np.zeros_like(factor), where=gain != 0)
+
+
+def _finding(
+    times: Numbers,
+    name: str,
+    limit: Limit,
+    acting: NDArray[np.bool_],
+    duration: float,
+    of_each: Mapping[str, float],
+) -> Finding:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], acting, [False]]).astype(np.int8)))
-    begin, stretches = float(times[edges[0]]), len(edges) // 2
+    # A look shows what acted since the one before, which is how the duration counts.
+    begin, stretches = float(times[max(edges[0] - 1, 0)]), len(edges) // 2
     lasts = bool(acting[-1])
     end = None if lasts else float(times[edges[-1] - 1])
     acts = "acts" if limit.represented else "would act"
     times_over = f", in {stretches} stretches" if stretches > 1 else ""
+    which = [parameter for parameter, seconds in of_each.items() if seconds > 0]
+    shares = [f"{parameter} for {of_each[parameter]:.3g} s" for parameter in which]
+    named = f" ({', '.join(shares if len(which) > 1 else which)})" if which else ""
     message = (
-        f"the {limit.name} of {name} {acts} from t = {begin:.4g} s "
+        f"the {limit.name} of {name}{named} {acts} from t = {begin:.4g} s "
         f"{'to the end of the run' if end is None else f'to t = {end:.4g} s'}, for {duration:.3g} s in all{times_over}"
     )
     figures = {"duration_s": duration, "stretches": float(stretches)}

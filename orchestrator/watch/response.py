@@ -1,15 +1,16 @@
 """The response after an event: an oscillation that grows, or one that neither grows nor decays."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
-from orchestrator.watch.finding import Finding, Kind
+from orchestrator.watch.confirmation import STEADY, change, doubt, irregular_doubt, rms
+from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
+from orchestrator.watch.machine_limits import is_inner
 from orchestrator.watch.oscillation import (
     LEAST_PERIODS,
     Oscillation,
@@ -20,13 +21,19 @@ from orchestrator.watch.oscillation import (
 )
 from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
+from orchestrator.watch.swing import KEPT, Swing
+from orchestrator.watch.swing_findings import (
+    doubtful_irregular_swing,
+    doubtful_swing,
+    growing,
+    irregular_swing,
+    sustained,
+    swing_rises,
+)
 
 FEWEST_LOOKS = 60
 """Least number of looks in the judged part: the last three quarters of the time from one event to the next, or to the
 end."""
-
-KEPT = 0.7
-"""A swing is decaying if its last third is smaller than this part of its middle third."""
 
 SMALLEST = 1e-7
 """Smallest oscillation that is reported, as a part of 1 or of the signal's start."""
@@ -36,9 +43,6 @@ SMALLEST_FAST = 1e-5
 
 SMALLEST_PART = 0.01
 """Smallest reported oscillation, as a part of the signal's largest deviation since the event."""
-
-STEADY = 0.05
-"""An oscillation is sustained if the logarithm of its amplitude changes by less than this over the stretch."""
 
 SAME_FREQUENCY = 0.05
 """An oscillation is confirmed if the stretch and its second half show the same frequency, with at most this relative
@@ -68,10 +72,6 @@ CLEAN = 0.15
 """In a stretch with noise, the largest part of a swing that a reported oscillation leaves unexplained. An oscillation
 that noise excites wanders in amplitude and phase, and leaves more."""
 
-FAR_ABOVE, _RISING = 10.0, 1.3
-"""A swing of any other shape grows if it rises by the first factor from the first to the last quarter of the judged
-part, and by the second one at least from each quarter to the next. With noise only such a swing is reported."""
-
 _SMOOTHEST = 3
 """Number of signals in which a clean oscillation is searched in a stretch with noise: those that noise moves least."""
 
@@ -81,37 +81,6 @@ _TRIED = 8
 ONE = 0.3
 """An oscillation continues over events if it explains the swing between any two of them except for less than this
 part."""
-
-_PARTS, _SHORT = 40, 0.1
-"""Largest number of pieces and their least length [s]. The oscillation is searched in the first piece."""
-
-
-@dataclass(frozen=True)
-class Swing:
-    """A signal that still swings at the end as it did before.
-
-    Attributes
-    ----------
-    size
-        Root mean square in the last third without the trend, relative to ``scale``.
-    scale
-        1 or the start's magnitude [the signal's unit].
-    response
-        Times [s] since the event, and the signal at them.
-    times, signal
-        The same in the last three quarters.
-    turns_hz
-        Half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
-        followed between the looks.
-    """
-
-    name: str
-    size: float
-    scale: float
-    response: tuple[Numbers, Numbers]
-    times: Numbers
-    signal: Numbers
-    turns_hz: float | None = None
 
 
 def unsettled_response(
@@ -151,12 +120,19 @@ def unsettled_response(
     quick = [s for s in swings if s.turns_hz is not None]
     others = [s for s in swings if s.turns_hz is None and not (quick and too_fast(s.times, s.signal))]
     if noisy:
-        grown = [s for s in swings if _rises(s)]
+        grown = [s for s in swings if swing_rises(s)]
         told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
         smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
         return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
     told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
-    return told or _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
+    if judgements(told):
+        return told
+    return _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks) or told
+
+
+def judgements(found: Sequence[Finding]) -> list[Finding]:
+    """The findings that are no mere remarks."""
+    return [finding for finding in found if finding.kind != NOT_JUDGED]
 
 
 def enough_looks(seen: Seen, stretch: Stretch) -> bool:
@@ -173,7 +149,8 @@ def _judged_from(stretch: Stretch) -> float:
 def _told(
     swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
 ) -> list[Finding]:
-    """The first finding of each kind; a swing without a frequency only where there is none with one.
+    """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
+    swing in doubt only where there is no finding.
 
     Parameters
     ----------
@@ -187,18 +164,27 @@ def _told(
         Whether only swings count that are one oscillation and nothing else.
     """
     told: dict[Kind, Finding] = {}
-    irregular = []
+    irregular, doubtful = list[Finding](), list[Finding]()
     for swing in swings:
         oscillation = _fast(swing) if swing.turns_hz is not None else _single(swing)
         if clean and not (oscillation and _is_clean(swing, oscillation)):
             continue
         if oscillation is not None:
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
-            if finding is not None and finding.kind not in told and _goes_on(swing, oscillation, stretch.breaks):
+            if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
+                continue
+            why = "" if clean else doubt(swing, oscillation)
+            if not why:
                 told[finding.kind] = finding
+            elif not doubtful:
+                doubtful.append(doubtful_swing(swing, oscillation, why, stretch))
         elif irregular_as_well and _is_irregular(swing):
-            irregular.append(_irregular(swing, unit(swing.name, system), stretch))
-    return [*told.values()] or irregular[:1]
+            why = "" if swing_rises(swing) else irregular_doubt(swing)
+            if not why:
+                irregular.append(irregular_swing(swing, unit(swing.name, system), stretch))
+            elif not doubtful:
+                doubtful.append(doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
+    return [*told.values()] or irregular[:1] or doubtful
 
 
 def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
@@ -206,7 +192,12 @@ def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
     everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
     found = {}
     for name, signal in everything.items():
-        if is_derivative(name) or unit(name, system) == "rad" or not np.isfinite(signal).all():
+        if (
+            is_derivative(name)
+            or is_inner(name, system)
+            or unit(name, system) == "rad"
+            or not np.isfinite(signal).all()
+        ):
             continue
         if not name.endswith(("_re", "_im")):
             found[name] = signal
@@ -223,14 +214,10 @@ def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | 
     """The swing of a signal, if it is large enough to be examined. The signal and its times begin with the event."""
     deviation, scale = float(np.abs(signal - signal[0]).max()), max(1.0, abs(float(signal[0])))
     rows = times >= begin
-    _, middle, last = (_rms(part) for part in np.array_split(signal[rows], 3))
+    _, middle, last = (rms(part) for part in np.array_split(signal[rows], 3))
     if last < KEPT * middle or np.sqrt(2) * last < max(SMALLEST * scale, SMALLEST_PART * deviation):
         return None
     return Swing(name, last / scale, scale, (times, signal), times[rows], signal[rows])
-
-
-def _rms(signal: Numbers) -> float:
-    return float(np.sqrt(np.mean(without_trend(signal) ** 2)))
 
 
 def _goes_on(swing: Swing, oscillation: Oscillation, breaks: Sequence[float]) -> bool:
@@ -274,29 +261,7 @@ def _is_clean(swing: Swing, oscillation: Oscillation) -> bool:
     shape, whole = without_trend(np.column_stack([turn.real, turn.imag])), without_trend(swing.signal)
     rest = whole - shape @ np.linalg.lstsq(shape, whole, rcond=None)[0]
     part = float(np.linalg.norm(rest) / np.linalg.norm(whole))
-    change = oscillation.rate * float(swing.times[-1] - swing.times[0])
-    return part < (CLEAN if change > STEADY + 2 * part else CLEAN / 3)
-
-
-def _rises(swing: Swing) -> bool:
-    """Whether a swing grows from quarter to quarter of the judged part, to far above its beginning."""
-    quarters = np.array_split(swing.signal, 4)
-    sizes = [float(y.mean()) if swing.turns_hz is not None else _rms(y) for y in quarters]
-    return sizes[3] > FAR_ABOVE * sizes[0] and all(late > _RISING * early for early, late in pairwise(sizes))
-
-
-def _since(swing: Swing, frequency: float | None) -> float:
-    """The first time [s] from which on the swing is about as large as at the end."""
-    times, signal = swing.response
-    length = float(times[-1] - times[0])
-    periods = length * frequency / 2 if frequency and swing.turns_hz is None else length / _SHORT
-    count = int(min(_PARTS, periods, len(times) // 4))
-    if count < 2:
-        return float(times[0])
-    sizes = [float(y.mean()) if swing.turns_hz else _rms(y) for y in np.array_split(signal, count)]
-    last = float(np.mean(sizes[-max(1, count // 4) :]))
-    ago = next((k for k, size in enumerate(reversed(sizes)) if not KEPT * last < size < last / KEPT), count)
-    return float(np.array_split(times, count)[count - max(ago, 1)][0])
+    return part < (CLEAN if change(swing, oscillation.rate) > STEADY + 2 * part else CLEAN / 3)
 
 
 def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None:
@@ -331,10 +296,10 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
 
 def _regular(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding | None:
     """A finding, unless the oscillation decays."""
-    change = oscillation.rate * float(swing.times[-1] - swing.times[0])
-    if change < -STEADY:
+    grown = change(swing, oscillation.rate)
+    if grown < -STEADY:
         return None
-    return (_growing if change > STEADY else _sustained)(swing, oscillation, unit, stretch)
+    return (growing if grown > STEADY else sustained)(swing, oscillation, unit, stretch)
 
 
 def _is_irregular(swing: Swing) -> bool:
@@ -368,64 +333,3 @@ def _fast(swing: Swing) -> Oscillation | None:
     if abs(rate) * float(times[-1] - times[0]) < scatter:
         rate = 0.0
     return Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)
-
-
-def _growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    message = (
-        f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
-        f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
-        f"is {oscillation.amplitude:.3g} {unit}"
-    )
-    return _finding("growing_oscillation", stretch.begin, swing, message, oscillation, stretch)
-
-
-def _sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    since = _since(swing, oscillation.frequency_hz)
-    message = (
-        f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
-        f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
-        f"{oscillation.amplitude:.3g} {unit}"
-    )
-    return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
-
-
-def _irregular(swing: Swing, unit: str, stretch: Stretch) -> Finding:
-    amplitude, since = float(np.sqrt(2)) * swing.size * swing.scale, _since(swing, None)
-    fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
-    grows = _rises(swing)
-    message = (
-        f"the response {'grows' if grows else 'does not settle'}: from t = {since:.4g} s to {_end(stretch)} "
-        f"{_shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
-    )
-    kind: Kind = "growing_oscillation" if grows else "sustained_oscillation"
-    figures = {"amplitude": amplitude}
-    return Finding(kind, since, *_place(swing.name), message, _until(stretch), figures)
-
-
-def _finding(
-    kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation, stretch: Stretch
-) -> Finding:
-    figures = {
-        "growth_rate": oscillation.rate,
-        "frequency_hz": oscillation.frequency_hz,
-        "amplitude": oscillation.amplitude,
-    }
-    return Finding(kind, time, *_place(swing.name), message, _until(stretch), figures)
-
-
-def _end(stretch: Stretch) -> str:
-    return "the end" if stretch.last else f"the next event at t = {stretch.end:.4g} s"
-
-
-def _until(stretch: Stretch) -> float | None:
-    return None if stretch.last else stretch.end
-
-
-def _place(name: str) -> tuple[str, str]:
-    component, _, variable = name.partition(".")
-    return component, variable
-
-
-def _shown(name: str) -> str:
-    """A pair of real and imaginary part is shown as its magnitude."""
-    return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name

@@ -47,7 +47,7 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
     names = [name for name in system.components if _angle_variable(system, name) is not None]
     if len(names) < 2:
         return
-    on = np.array([settings.connected(name) > 0 for name in names])
+    on = np.array([_on_the_grid(system, settings, name) for name in names])
     angles = np.array([_angle(seen, system, settings, name) for name in names])
     _forget_turns_off_the_grid(angles, on)
     sides = _sides(angles, on)
@@ -63,6 +63,16 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
         if apart:
             variable = _angle_variable(system, names[group[0]]) or ""
             yield _finding(seen.times, variable, [names[k] for k in group], apart, names)
+
+
+def _on_the_grid(system: System, settings: Settings, name: str) -> NDArray[np.bool_]:
+    """Whether a unit is on the grid, shape (n,). A source inside a grid has a breaker of its own beside its angle."""
+    on = settings.connected(name) > 0
+    scope = (_angle_variable(system, name) or "").rpartition(".")[0]
+    breaker = f"{scope}.connected"
+    if scope and breaker in system.components[name].description.variables:
+        on &= settings.values(name, breaker) > 0
+    return on
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
+from orchestrator.watch.machine_limits import is_inner
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen, is_derivative, unit
 
@@ -70,7 +71,7 @@ def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
     """
     found = {}
     for name, signal in {**seen.values, **seen.last}.items():
-        if is_derivative(name) or unit(name, system) == "rad":
+        if is_derivative(name) or is_inner(name, system) or unit(name, system) == "rad":
             continue
         low, high, start = seen.low.get(name, signal), seen.high.get(name, signal), signal[0]
         far = np.maximum(high[:count] - start, start - low[:count]) / max(1.0, abs(float(start)))

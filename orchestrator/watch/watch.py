@@ -16,8 +16,8 @@ from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
 from orchestrator.watch.finding import UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
-from orchestrator.watch.response import enough_looks, resting_signals, unsettled_response
-from orchestrator.watch.run_away import run_away, speed_signals
+from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
+from orchestrator.watch.run_away import run_away, speed_signals, still_moving_away
 from orchestrator.watch.seen import Seen, Watcher, look_every
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.short_stretches import is_short, still_departing, too_short
@@ -123,6 +123,7 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
         responses.short.append(parts[-1])
     found = [*found, *told, *not_judged(responses.masked)]
     if whole and not any(finding.kind in UNSTABLE for finding in found):
+        found += still_moving_away(seen, system, settings, parts[-1], found) if parts else []
         found += too_short(responses.short) or still_departing(seen, system, responses.clear)
     return found
 
@@ -150,8 +151,8 @@ class _Responses:
         """Findings in a stretch as a whole, or, if it shows no findings, between its unnoticed events."""
         pieces = list(part.parts())
         told = self._one(part, told=len(pieces) == 1)
-        if part.breaks and not told:
-            told = [f for piece in pieces for f in self._one(piece)]
+        if part.breaks and not judgements(told):
+            told = [f for piece in pieces for f in self._one(piece)] or told
         if not told and not among(self._disturbances, part):
             self.clear.append(part)
         return told

@@ -59,3 +59,14 @@ def units(**ratings):
     for name, rating in ratings.items():
         made.add(name, unit_fmu(), {"S_n": rating})
     return made
+
+
+@cache
+def source_fmu():
+    """A grid whose stiff source has a breaker of its own."""
+    m = ModelBuilder("small_source", "A grid with a source")
+    u = m.input("u", "1", "Input")
+    with m.scope("source"):
+        closed = m.switch("connected", True, "Breaker of the source", tunable=True)
+    m.output("source.theta", u * closed, "rad", "Angle of the source", base="S_n")
+    return read_description(cached(PythonFmu(m.build())))

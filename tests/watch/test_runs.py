@@ -174,8 +174,18 @@ def test_a_pod_at_its_limit_is_told_with_its_duration():
     found = findings("two_area_rms", "pod_p", gfor__pod_p__limit=1e-4)
     (limit,) = [f for f in found if f.kind == "active_limit"]
     assert (limit.component, limit.variable) == ("gfor", "delta_p_pod")
-    assert 1.0 < limit.time < 1.5
+    assert 1.0 <= limit.time < 1.5
     assert limit.figures["duration_s"] > 0.1
+
+
+def test_a_limit_that_acts_without_a_break_is_told_for_its_whole_interval():
+    """0.105 s were told between 1.04 s and 1.14 s."""
+    (ready,) = load_case("two_area_rms").prepare(["pod_p"], {"gfor.pod_p.limit": 1e-4}, stop_time=3.0)
+    trip = UnitSwitching(1.2, "grid", "gfor", False)
+    result = run_scenario(replace(ready, events=[*ready.events, trip]))
+    (limit,) = [f for f in result.findings if f.kind == "active_limit"]
+    assert limit.figures["stretches"] == 1
+    assert limit.until - limit.time == pytest.approx(limit.figures["duration_s"])
 
 
 @pytest.mark.parametrize(("limit", "trip"), [(0.1, 1.0), (1e-4, 3.0)])

@@ -6,7 +6,7 @@ import pytest
 from orchestrator.coupling.events import ParameterChange
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.synchronism import lost_synchronism
-from tests.watch.seen import seen_of, units
+from tests.watch.seen import seen_of, source_fmu, units
 
 TURN = 2 * np.pi
 STOP = 10.0
@@ -63,3 +63,14 @@ def test_turns_off_the_grid_count_for_nothing():
     assert finding.figures["slips_at_the_end"] == 0.0
     assert "when one of both leaves the grid" in finding.message
     assert found({"a": 100, "b": 900}, [trip], a=slip(50.0, since=4.1), b=slip(0.0)) == []
+
+
+def test_a_source_behind_its_own_open_breaker_keeps_nobody_in_step():
+    """The plant is alone from 2 s on, and its frequency is its own."""
+    system = units(plant=100)
+    system.add("grid", source_fmu())
+    seen = seen_of({"plant.delta": slip(9.0), "grid.source.theta": slip(0.0)}, STOP)
+    opened = ParameterChange(2.0, "grid", "source.connected", value=False)
+    assert list(lost_synchronism(seen, system, Settings(system, [opened], seen.times))) == []
+    (finding,) = lost_synchronism(seen, system, Settings(system, [], seen.times))
+    assert finding.message.startswith("plant loses synchronism with grid")

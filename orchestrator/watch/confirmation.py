@@ -1,0 +1,128 @@
+"""Whether the whole response confirms an oscillation that does not decay at its end.
+
+Over a few periods two decaying oscillations that beat, or the harmonics that a large swing has in magnitudes of
+voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
+every part of the response, while that of a beat changes from part to part.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
+from orchestrator.watch.swing import KEPT, Swing
+
+STEADY = 0.05
+"""An oscillation is sustained if the logarithm of its amplitude changes by less than this over the judged part."""
+
+PERIODS = 4.5
+"""Number of periods that the response must have of an oscillation that grows or lasts. With fewer it cannot be told
+from a beat with a mode of a similar frequency: of eleven faults on nine buses, each watched until 50 different times,
+those that seemed to grow in every part of the response had 4 at most."""
+
+SAME = 0.05
+"""Largest relative difference of frequency between the judged part and the whole response."""
+
+AGREE = 2.0
+"""Largest factor between the growth rates of the judged part and of the whole response."""
+
+FAR_ABOVE, RISING = 10.0, 1.3
+"""A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
+at least from each quarter to the next."""
+
+
+_PIECES, _CERTAIN = 8, 3.0
+"""Number of pieces of the judged part whose sizes tell whether a swing of any shape decays, and least number of its
+standard errors that the slope of their logarithms has if it does."""
+
+
+def change(swing: Swing, rate: float) -> float:
+    """Change of the logarithm of an amplitude over the judged part, for a growth rate [1/s]."""
+    return rate * float(swing.times[-1] - swing.times[0])
+
+
+def rms(signal: Numbers) -> float:
+    """Root mean square of a signal around its trend."""
+    return float(np.sqrt(np.mean(without_trend(signal) ** 2)))
+
+
+def rises(signal: Numbers, *, extents: bool = False) -> bool:
+    """Whether a swing grows from quarter to quarter, to far above its beginning.
+
+    Parameters
+    ----------
+    signal
+        The signal.
+    extents
+        Whether it is the extent of a swing, and does not swing itself.
+    """
+    sizes = [float(part.mean()) if extents else rms(part) for part in np.array_split(signal, 4)]
+    return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
+
+
+def doubt(swing: Swing, oscillation: Oscillation) -> str:
+    """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it.
+
+    Parameters
+    ----------
+    swing
+        The signal that shows it.
+    oscillation
+        As the end of the response shows it.
+    """
+    grows = change(swing, oscillation.rate) > STEADY
+    if swing.turns_hz is not None:
+        first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+        return "" if last > (1.0 if grows else KEPT) * first else "it was larger before"
+    times, signal = (part[1:] for part in swing.response)  # the first look is that before the event
+    if grows and rises(signal):
+        return ""
+    periods = float(times[-1] - times[0]) * oscillation.frequency_hz
+    if periods < PERIODS:
+        return f"{periods:.2g} periods cannot tell that from a beat of oscillations that decay"
+    whole = strongest_oscillation(times, signal)
+    if not grows:
+        falls = whole is not None and _same(whole, oscillation) and change(swing, whole.rate) < -2 * STEADY
+        return f"over the whole response it decays at {whole.rate:+.3g} 1/s" if falls and whole is not None else ""
+    if whole is None or not _same(whole, oscillation):
+        return "the whole response does not show that oscillation as the strongest"
+    if not oscillation.rate / AGREE < whole.rate < AGREE * oscillation.rate:
+        return f"over the whole response its rate is {whole.rate:+.3g} 1/s"
+    halves = (np.array_split(swing.times, 2), np.array_split(swing.signal, 2))
+    parts = [strongest_oscillation(t, y, least_periods=1) for t, y in zip(*halves, strict=True)]
+    if any(part is not None and part.rate < 0 for part in parts):
+        return "in one half of its end it decays"
+    return ""
+
+
+def irregular_doubt(swing: Swing) -> str:
+    """Why a swing of any shape, which seems to last, may decay; empty where its sizes from piece to piece do not fall.
+
+    Parameters
+    ----------
+    swing
+        The signal that shows it.
+    """
+    sizes = np.array([rms(piece) for piece in np.array_split(swing.signal, _PIECES)])
+    if not (sizes > 0).all():
+        return ""
+    at = (np.arange(_PIECES) + 0.5) / _PIECES
+    (slope, _), covariance = np.polyfit(at, np.log(sizes), 1, cov=True)
+    late = float(np.polyfit(at[_PIECES // 2 :], np.log(sizes[_PIECES // 2 :]), 1)[0])
+    if late < 0 and slope < -max(STEADY, _CERTAIN * float(np.sqrt(covariance[0, 0]))):
+        rate = slope / float(swing.times[-1] - swing.times[0])
+        return f"from piece to piece it decays at {rate:+.3g} 1/s, to the end"
+    first, second = (rms(half) for half in np.array_split(swing.signal, 2))
+    return "it was larger before" if second < KEPT * first else ""
+
+
+def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
+    """Time until which a run should go on for a clear answer [s]."""
+    begin, end = float(swing.response[0][0]), float(swing.times[-1])
+    longer = begin + 1.5 * (end - begin)
+    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz) if oscillation is not None else longer
+
+
+def _same(one: Oscillation, other: Oscillation) -> bool:
+    return abs(one.frequency_hz - other.frequency_hz) <= SAME * other.frequency_hz

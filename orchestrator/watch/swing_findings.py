@@ -1,0 +1,165 @@
+"""What is said of a swing that does not decay, and since when it swings like that."""
+
+import numpy as np
+
+from orchestrator.watch.confirmation import STEADY, change, needed_end, rises, rms
+from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
+from orchestrator.watch.oscillation import Oscillation, too_fast
+from orchestrator.watch.stretches import Stretch
+from orchestrator.watch.swing import KEPT, Swing
+
+_PARTS, _SHORT = 40, 0.1
+"""Largest number of pieces and their least length [s]. The oscillation is searched in the first piece."""
+
+
+def swing_rises(swing: Swing) -> bool:
+    """Whether a swing grows from quarter to quarter of the judged part, to far above its beginning."""
+    return rises(swing.signal, extents=swing.turns_hz is not None)
+
+
+def _since(swing: Swing, frequency: float | None) -> float:
+    """The first time [s] from which on the swing is about as large as at the end."""
+    times, signal = swing.response
+    length = float(times[-1] - times[0])
+    periods = length * frequency / 2 if frequency and swing.turns_hz is None else length / _SHORT
+    count = int(min(_PARTS, periods, len(times) // 4))
+    if count < 2:
+        return float(times[0])
+    sizes = [float(y.mean()) if swing.turns_hz else rms(y) for y in np.array_split(signal, count)]
+    last = float(np.mean(sizes[-max(1, count // 4) :]))
+    ago = next((k for k, size in enumerate(reversed(sizes)) if not KEPT * last < size < last / KEPT), count)
+    return float(np.array_split(times, count)[count - max(ago, 1)][0])
+
+
+def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
+    """An oscillation that grows.
+
+    Parameters
+    ----------
+    swing, oscillation
+        The signal that shows it, and what it shows.
+    unit
+        Of the signal.
+    stretch
+        The judged part of the run.
+    """
+    message = (
+        f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
+        f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
+        f"is {oscillation.amplitude:.3g} {unit}"
+    )
+    return _finding("growing_oscillation", stretch.begin, swing, message, oscillation, stretch)
+
+
+def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
+    """An oscillation that neither decays nor grows.
+
+    Parameters
+    ----------
+    swing, oscillation, unit, stretch
+        As `growing`.
+    """
+    since = _since(swing, oscillation.frequency_hz)
+    message = (
+        f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
+        f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
+        f"{oscillation.amplitude:.3g} {unit}"
+    )
+    return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
+
+
+def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: Stretch) -> Finding:
+    """A remark on an oscillation that may decay, with the reason of the doubt.
+
+    Parameters
+    ----------
+    swing, oscillation, stretch
+        As `growing`.
+    why
+        The reason; see `confirmation.doubt`.
+    """
+    seems = "grow" if change(swing, oscillation.rate) > STEADY else "last"
+    message = (
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings at "
+        f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
+        f"but {why}; {_remedy(swing, oscillation, stretch)}"
+    )
+    return _finding(NOT_JUDGED, stretch.begin, swing, message, oscillation, stretch)
+
+
+def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> str:
+    end = needed_end(swing, oscillation)
+    return f"let the run go on to t = {end:.3g} s" if stretch.last else "give the events more distance"
+
+
+def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
+    """A swing at no single frequency.
+
+    Parameters
+    ----------
+    swing, unit, stretch
+        As `growing`.
+    """
+    amplitude, since = _irregular_amplitude(swing), _since(swing, None)
+    fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
+    grows = swing_rises(swing)
+    message = (
+        f"the response {'grows' if grows else 'does not settle'}: from t = {since:.4g} s to {_end(stretch)} "
+        f"{_shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
+    )
+    kind: Kind = "growing_oscillation" if grows else "sustained_oscillation"
+    figures = {"amplitude": amplitude}
+    return Finding(kind, since, *_place(swing.name), message, _until(stretch), figures)
+
+
+def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch) -> Finding:
+    """A remark on a swing at no single frequency that may decay, with the reason of the doubt.
+
+    Parameters
+    ----------
+    swing, unit, stretch
+        As `growing`.
+    why
+        The reason; see `confirmation.irregular_doubt`.
+    """
+    amplitude = _irregular_amplitude(swing)
+    message = (
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings by "
+        f"about {amplitude:.3g} {unit} at {_end(stretch)}, at no single frequency, but {why}; "
+        f"{_remedy(swing, None, stretch)}"
+    )
+    place = _place(swing.name)
+    return Finding(NOT_JUDGED, stretch.begin, *place, message, _until(stretch), {"amplitude": amplitude})
+
+
+def _irregular_amplitude(swing: Swing) -> float:
+    return float(np.sqrt(2)) * swing.size * swing.scale
+
+
+def _finding(
+    kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation, stretch: Stretch
+) -> Finding:
+    figures = {
+        "growth_rate": oscillation.rate,
+        "frequency_hz": oscillation.frequency_hz,
+        "amplitude": oscillation.amplitude,
+    }
+    return Finding(kind, time, *_place(swing.name), message, _until(stretch), figures)
+
+
+def _end(stretch: Stretch) -> str:
+    return "the end" if stretch.last else f"the next event at t = {stretch.end:.4g} s"
+
+
+def _until(stretch: Stretch) -> float | None:
+    return None if stretch.last else stretch.end
+
+
+def _place(name: str) -> tuple[str, str]:
+    component, _, variable = name.partition(".")
+    return component, variable
+
+
+def _shown(name: str) -> str:
+    """A pair of real and imaginary part is shown as its magnitude."""
+    return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name
