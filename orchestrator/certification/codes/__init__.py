@@ -1,0 +1,1 @@
+"""Grid codes for grid-forming converters as tables of stimuli and criteria, judged on an operator's test bench."""

@@ -1,0 +1,212 @@
+"""A converter on the test bench: all rows of a code, and the verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.cases.case import load_case
+from orchestrator.certification.acceptance import Acceptance
+from orchestrator.certification.codes.bench_case import lay_files, rated_frequency, write_row
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.certification.codes.row import CodeRow, GridCode, RowFinding
+from orchestrator.certification.details import Details
+from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
+from orchestrator.errors import CaseError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.points.executor import Executor
+from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
+from orchestrator.points.points import CountReport, kept_or_computed
+from orchestrator.points.store import POINTS, PointStore
+
+_GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
+"""Values of the converter that the rows give it."""
+
+
+@dataclass(frozen=True)
+class RowVerdict:
+    """A row's findings.
+
+    Attributes
+    ----------
+    unknown
+        Why the row is not judged; empty where it is.
+    """
+
+    row: CodeRow
+    findings: tuple[RowFinding, ...] = ()
+    unknown: str = ""
+
+    @property
+    def judged(self) -> bool:
+        """Whether it counts towards the verdict."""
+        return not self.unknown and not self.row.shown_only
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every criterion is met."""
+        return not self.unknown and all(finding.accepted for finding in self.findings)
+
+    @property
+    def failed(self) -> list[RowFinding]:
+        """The criteria that are not met."""
+        return [finding for finding in self.findings if not finding.accepted]
+
+
+@dataclass
+class CodeCertificate:
+    """A code's rows for one converter.
+
+    Attributes
+    ----------
+    f_n
+        Rated frequency of the bench [Hz].
+    results
+        Responses by the name of the row.
+    verdicts
+        In the order of the rows.
+    chosen
+        Names of the rows that were asked for; all of them where it is a whole certificate.
+    stored
+        Number of rows that were there already.
+    """
+
+    request: CertificationRequest
+    code: GridCode
+    description: FmuDescription
+    f_n: float
+    results: Mapping[str, BenchResult]
+    verdicts: Sequence[RowVerdict]
+    stored: int = 0
+    details: Details = field(default_factory=Details)
+    acceptance: Acceptance | None = None
+
+    @property
+    def departures(self) -> tuple[str, ...]:
+        """By what the test departs from the code's."""
+        set_too = tuple(f"converter.{n} = {shown(self.request.values[n])}" for n in _GIVEN if n in self.request.values)
+        if self.f_n != self.code.f_n:
+            set_too += (f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz",)
+        return set_too
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What keeps a test that nothing fails from being passed."""
+        done = {v.row.name for v in self.verdicts if v.judged}
+        rows = tuple(f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only)
+        return rows + self.code.left_out + self.departures
+
+    @property
+    def verdict(self) -> str:
+        """In one word: ``passes``, ``fails`` or ``incomplete``."""
+        return verdict_of([v.accepted for v in self.verdicts if v.judged], len(self.missing))
+
+    @property
+    def refused(self) -> bool:
+        """Whether an acceptance test failed."""
+        return self.acceptance is not None and not self.acceptance.trusted
+
+    def sentence(self) -> str:
+        """The result as a sentence."""
+        judged = [v for v in self.verdicts if v.judged]
+        bad = [v for v in judged if not v.accepted]
+        subject = f"The converter {self.description.model_name!r}"
+        rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
+        if bad:
+            names = "; ".join(f"{v.row.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
+            said = f"{subject} {FAILS} {self.code.title}: {rows} Not accepted: {names}."
+        elif self.verdict == INCOMPLETE:
+            said = f"The test is {INCOMPLETE}: {len(self.missing)} parts of {self.code.title} were not tested. "
+            said += f"{subject}: {rows}"
+        else:
+            said = f"{subject} {PASSES} {self.code.title}: {rows}"
+        if self.acceptance is not None and self.refused:
+            said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
+        return said
+
+
+def verdict_of(accepted: Sequence[bool], missing: int) -> str:
+    """The verdict from the judged rows and the number of parts that are missing."""
+    if not all(accepted):
+        return FAILS
+    return INCOMPLETE if missing or not accepted else PASSES
+
+
+def certify_code(
+    request: CertificationRequest,
+    code: GridCode,
+    executor: Executor,
+    folder: Path,
+    rows: Sequence[str] = (),
+    report: CountReport = lambda done, total: None,
+) -> CodeCertificate:
+    """Run a code's rows and judge them.
+
+    Parameters
+    ----------
+    request
+        The converter, its binding and its values.
+    code
+        The code.
+    executor
+        Where the rows are computed.
+    folder
+        For the rows' case files, the FMU, its binding, and every row as soon as it is computed. Rows that are there
+        are not computed again.
+    rows
+        Names of the rows to run; all of them where empty.
+    report
+        Called with the number of rows done and the total number.
+
+    Raises
+    ------
+    InputError
+        If the FMU or a value cannot be used.
+    """
+    request.check()
+    f_n = rated_frequency(request, code.f_n)
+    chosen = [row for row in code.rows if not rows or row.name in rows]
+    with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
+        _tasks(request, chosen[:1], f_n, Path(trial))  # a request that is refused leaves existing files as they are
+    tasks = _tasks(request, chosen, f_n, folder)
+    results: dict[str, BenchResult] = {}
+    stored, store = 0, PointStore(folder / POINTS)
+    for index, result, was_stored in kept_or_computed(BenchResult, compute_row, tasks, executor, store, report):
+        results[tasks[index].row] = result
+        stored += was_stored
+    verdicts = [judge_row(row, results[row.name], f_n) for row in chosen]
+    description = bound_fmu(request.fmu, request.binding)
+    return CodeCertificate(request, code, description, f_n, results, verdicts, stored)
+
+
+def _tasks(request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, folder: Path) -> list[BenchTask]:
+    lay_files(request, folder)
+    tasks = []
+    for row in rows:
+        path = write_row(request, row.name, row.title, row.programme(f_n), f_n, folder)
+        case = load_case(path)
+        try:
+            (prepared,) = case.prepare()
+        except CaseError as error:
+            raise CaseError(f"{request.fmu}, on the test bench of `gfor certify --code`", error.problems) from error
+        content = {"bench": row.name, "text": case.text, **scenario_content(prepared)}
+        tasks.append(BenchTask(row.name, reference_to(case), fingerprint(case), key_of(content)))
+    return tasks
+
+
+def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
+    """Apply a row's criteria to its response."""
+    if result.failure:
+        return RowVerdict(row, unknown=result.failure)
+    programme = row.programme(f_n)
+    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings))
+    short = len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3
+    if short:
+        ended = float(result.times[-1]) if len(result.times) else 0.0
+        text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
+        rule = "the converter runs to the end"
+        return RowVerdict(row, (RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text),))
+    return RowVerdict(row, tuple(judge(measured) for judge in row.criteria))

@@ -1,0 +1,319 @@
+"""Criteria of the codes: each reads a response and says whether what is asked is met.
+
+A number of a code stands in the code's table. A number that no code gives is one of this module's constants, and the
+finding says that it is this program's reading.
+"""
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.certification.codes.row import Judge, RowFinding
+
+CODE, READING = "code", "reading"
+
+SETTLED = 0.02
+"""Largest movement of a power or a voltage, peak to peak over the last half second of a hold, that counts as settled
+[pu]."""
+
+BACK = 0.05
+"""Largest distance from the power before an event at which it counts as returned [pu]."""
+
+MOVED = 0.01
+"""Least change of a settled power that counts as a response of the droop [pu]."""
+
+CALM = 0.05
+"""Largest movement of the frequency, peak to peak over the last half second of a hold, that counts as settled [Hz]."""
+
+OPPOSED = 0.2
+"""Least change of the power against a jump of 10° or more where the code gives no number [pu]: what MISO and ERCOT ask
+for 10°."""
+
+FIRST_SWING = 0.1
+"""Time after a jump in which its first response is looked for [s]."""
+
+SPIKE = 5e-3
+"""Width of the median by which the speed of a response is read [s]: what is shorter than half of it is the filter's."""
+
+SIDE = 0.01
+"""Largest deviation of a settled frequency to the wrong side of rated [Hz]."""
+
+LOOK = 0.5
+"""End of a hold in which it has to be settled [s]."""
+
+
+def _finding(
+    name: str, rule: str, origin: str, value: float, limit: float, text: str, *, at_most: bool = True
+) -> RowFinding:
+    """A comparison; a value that is no number is not accepted."""
+    good = bool(value <= limit) if at_most else bool(value >= limit)
+    scale = abs(limit) or 1.0
+    margin = (limit - value) / scale if at_most else (value - limit) / scale
+    return RowFinding(name, rule, origin, _number(value), limit, _number(margin), good, text)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def holds_together() -> Judge:
+    """Neither a loss of synchronism, nor growth, nor a lasting oscillation, as `gfor run` watches for them."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        faults = row.faults
+        if not all(np.isfinite(values).all() for values in row.signals.values()):
+            faults = ["the response is not finite", *faults]
+        text = "; ".join(faults) or "nothing was found"
+        return RowFinding("stable", "no loss of synchronism, growth or lasting oscillation", READING,
+                          float(len(faults)), 0.0, None, not faults, text)  # fmt: skip
+
+    return judge
+
+
+def settles(events: tuple[int, ...] = (), name: str = "settles") -> Judge:
+    """Power and voltage stand still at the end of the hold after each event.
+
+    Parameters
+    ----------
+    events
+        Numbers of the events; all of them where empty.
+    name
+        Of the criterion.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        worst, at = 0.0, row.times[0]
+        for time in _chosen(row, events):
+            end = row.until(time)
+            part = row.within(max(end - LOOK, time + LOOK), end)
+            for signal in (row.mean_p, row.mean_v):
+                moved = float(np.ptp(signal[part])) if part.stop > part.start else 0.0
+                if not moved <= worst:
+                    worst, at = moved, time
+        text = f"{worst:.3g} pu at the end of the hold after {at:g} s"
+        rule = f"P and v move by at most {SETTLED:g} pu in the last {LOOK:g} s of each hold"
+        return _finding(name, rule, READING, worst, SETTLED, text)
+
+    return judge
+
+
+def returns(name: str = "returns", within: float | None = None, tolerance: float = BACK, *,
+            of_code: bool = False, events: tuple[int, ...] = ()) -> Judge:  # fmt: skip
+    """The power comes back to what it was before the first event.
+
+    Parameters
+    ----------
+    name
+        Of the criterion.
+    within
+        Time after the event in which it has to be back for good [s]; None for the end of its hold.
+    tolerance
+        Largest distance [pu of the rating].
+    of_code
+        Whether the numbers are the code's.
+    events
+        Numbers of the events; all of them where empty.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        asked, worst, at = row.before(row.events[0]), 0.0, row.times[0]
+        for time in _chosen(row, events):
+            end = row.until(time)
+            begin = end - LOOK if within is None else time + within
+            part = row.mean_p[row.within(begin, end)]
+            away = float(np.abs(part - asked).max()) if len(part) else 0.0
+            if not away <= worst:
+                worst, at = away, time
+        when = "at the end of each hold" if within is None else f"{within:g} s after the event"
+        text = f"{worst:.3g} pu away after the event at {at:g} s"
+        rule = f"P is back within {tolerance:g} pu {when}"
+        return _finding(name, rule, CODE if of_code else READING, worst, tolerance, text)
+
+    return judge
+
+
+def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -> Judge:
+    """The power, averaged over a period, moves against the jump by at least so much.
+
+    Parameters
+    ----------
+    event
+        Number of the event.
+    sign
+        +1 where the power has to rise: the source's angle falls.
+    least
+        [pu]
+    of_code
+        Whether the number is the code's.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        time = row.events[event]
+        change = sign * (row.mean_p[row.within(time, time + FIRST_SWING)] - row.before(time))
+        peak = float(change.max(initial=-np.inf))
+        rule = f"the power {'rises' if sign > 0 else 'falls'} by at least {least:g} pu (mean over a period)"
+        origin = CODE if of_code else READING
+        return _finding(f"opposes the jump at {time:g} s", rule, origin, peak, least, f"{peak:.3f} pu", at_most=False)
+
+    return judge
+
+
+def opposes_jumps(signs: tuple[int, ...]) -> tuple[Judge, ...]:
+    """As `opposes_jump` for one jump after the other, where the code gives no number: `OPPOSED` is asked."""
+    return tuple(opposes_jump(event, sign, OPPOSED, of_code=False) for event, sign in enumerate(signs))
+
+
+def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -> Judge:
+    """The power reaches a share of its first change in a time. A median takes the filter's spikes away.
+
+    Parameters
+    ----------
+    event
+        Number of the event.
+    sign
+        +1 where the power has to rise.
+    longest
+        [s]
+    share
+        Of the largest change in the first swing.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        time = row.events[event]
+        part = row.within(time, time + FIRST_SWING)
+        change = sign * (_without_spikes(row)[part] - row.before(time))
+        peak = float(change.max(initial=-np.inf))
+        reached = np.flatnonzero(change >= share * peak)
+        taken = float(row.times[part][reached[0]] - time) if peak > 0 and len(reached) else float("nan")
+        text = f"{1e3 * taken:.1f} ms" if np.isfinite(taken) else "it does not respond against the jump"
+        rule = f"{share:.0%} of the first change within {1e3 * longest:g} ms"
+        return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text)
+
+    return judge
+
+
+def follows_droop(event: int, sign: int) -> Judge:
+    """The settled power after a ramp lies on the side that a droop asks for.
+
+    Parameters
+    ----------
+    event
+        Number of the event with which the hold begins.
+    sign
+        +1 where the power has to be higher than at the start: the frequency is lower.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        time = row.events[event]
+        end = row.until(time)
+        change = sign * (float(np.mean(row.mean_p[row.within(end - LOOK, end)])) - row.before(row.events[0]))
+        rule = f"the settled power is {'higher' if sign > 0 else 'lower'} than at the start by {MOVED:g} pu or more"
+        return _finding(f"droop after {time:g} s", rule, READING, change, MOVED, f"{change:.3f} pu", at_most=False)
+
+    return judge
+
+
+def stays_within(low: float, high: float, longest: float) -> Judge:
+    """The voltage is not outside of two bounds for longer than a time [pu, pu, s]."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        v = row.mean_v
+        outside = np.logical_not((v >= low) & (v <= high))
+        taken = _longest(outside) * float(row.times[1] - row.times[0])
+        text = f"{taken:.3f} s; {float(np.nanmin(v)):.3f} to {float(np.nanmax(v)):.3f} pu"
+        rule = f"v is outside of {low:g} to {high:g} pu for at most {longest:g} s"
+        return _finding("voltage", rule, CODE, taken, longest, text)
+
+    return judge
+
+
+def frequency_settles() -> Judge:
+    """The frequency stands still at the end of the run."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        end = float(row.times[-1])
+        part = row.frequency[row.within(end - LOOK, end - 0.05)]
+        moved = float(np.ptp(part))
+        rule = f"the frequency moves by at most {CALM:g} Hz in the last {LOOK:g} s"
+        return _finding("frequency settles", rule, READING, moved, CALM,
+                        f"{moved:.3g} Hz, at {float(np.mean(part)):.3f} Hz")  # fmt: skip
+
+    return judge
+
+
+def frequency_against_power() -> Judge:
+    """The final frequency is below rated where the plant gives more than before, above where it gives less."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        end = float(row.times[-1])
+        last = row.within(end - LOOK, end - 0.05)
+        more = float(np.mean(row.mean_p[last])) - row.before(row.events[0])
+        away = float(np.mean(row.frequency[last])) - row.f_n
+        rule = f"the final frequency lies by at most {SIDE:g} Hz on the side to which the power moved"
+        return _finding("frequency against power", rule, READING, float(np.sign(more)) * away, SIDE,
+                        f"{away:+.3f} Hz at {more:+.3f} pu")  # fmt: skip
+
+    return judge
+
+
+def meets_load() -> Judge:
+    """After the loss of the last machine both plants together feed what the source fed before them, in one second."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        time = row.events[0]
+        both = row.signals["p"] + row.signals["duplicate.p"]
+        wanted = float(np.mean((both + row.signals["source.p"])[row.within(time - 0.5, time)]))
+        part = row.within(float(row.times[-1]) - LOOK, float(row.times[-1]))
+        v_squared = float(np.mean(row.signals["v"][part] ** 2))
+        away = abs(float(np.mean(both[part])) - wanted * v_squared)
+        rule = f"the plants feed the load within {SETTLED:g} pu at the end, at the voltage of then"
+        return _finding("meets the load", rule, READING, away, SETTLED, f"{away:.3g} pu away")
+
+    return judge
+
+
+def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
+    """The inertia constant from the energy that the plant gives during a ramp of the frequency.
+
+    H = f_n·ΔE/(2·|rate|·lasts), where ΔE is the energy beyond that of the power before [pu·s].
+
+    Parameters
+    ----------
+    event
+        Number of the event with which the ramp begins.
+    rate, lasts
+        Of the ramp [Hz/s, s]; the power has to rise where the rate is negative.
+    least
+        Least inertia constant [s].
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        time = row.events[event]
+        part = row.within(time, time + lasts + 1e-6)
+        change = (row.p[part] - row.before(time)) * (-np.sign(rate))
+        energy = float(np.sum(0.5 * (change[1:] + change[:-1])) * (row.times[1] - row.times[0]))
+        H = energy * row.f_n / (2 * abs(rate) * lasts)
+        rule = f"H = f_n·ΔE/(2·{abs(rate):g} Hz/s·{lasts:g} s) is at least {least:g} s"
+        return _finding(f"inertia at {time:g} s", rule, CODE, H, least, f"{H:.2f} s", at_most=False)
+
+    return judge
+
+
+def _chosen(row: MeasuredRow, events: tuple[int, ...]) -> tuple[float, ...]:
+    return tuple(row.events[k] for k in events) if events else row.events
+
+
+def _without_spikes(row: MeasuredRow) -> Numbers:
+    """Active power of the plant, as its median over `SPIKE` around each instant [pu]."""
+    half = max(1, round(SPIKE / 2 / float(row.times[1] - row.times[0])))
+    padded = np.pad(row.p, half, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
+
+
+def _longest(mask: np.ndarray) -> int:
+    """Most values in a row that are true."""
+    best = count = 0
+    for value in mask.tolist():
+        count = count + 1 if value else 0
+        best = max(best, count)
+    return best

@@ -1,0 +1,113 @@
+"""The files of a code's certificate: figures, responses, a page, and the hashes that tie them together."""
+
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from orchestrator.acceptance.runner import file_hash
+from orchestrator.certification.acceptance import KEPT
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.certificate import CodeCertificate, RowVerdict
+from orchestrator.certification.codes.row import RowFinding
+from orchestrator.certification.environment import environment
+from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, write_sealed
+from orchestrator.report.html.document import document
+from orchestrator.report.html.elements import table
+from orchestrator.results.storage import save_netcdf
+from orchestrator.safe_files import write_text
+
+FORMAT = "code-1"
+"""Form of the JSON of a code's certificate."""
+
+
+def save_certificate(certificate: CodeCertificate, folder: Path) -> list[Path]:
+    """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``."""
+    made = datetime.now(UTC).replace(microsecond=0)
+    save_netcdf(responses_of(certificate), folder / RESPONSES)
+    c = certificate
+    names = [FMU, *([BINDING] if c.request.binding else []), RESPONSES, *([KEPT] if c.acceptance else [])]
+    names += [case_name(name) for name in c.results]
+    hashes = {name: file_hash(folder / name) for name in names}
+    content = {"made": made.isoformat(), **figures_of(c)}
+    write_text(folder / HTML, code_page(c, made, figures_hash(content)))
+    content["files"] = hashes | {HTML: file_hash(folder / HTML)}
+    write_sealed(content, folder / JSON)
+    return [folder / HTML, folder / JSON, folder / RESPONSES]
+
+
+def responses_of(certificate: CodeCertificate) -> xr.Dataset:
+    """Signals of every row over a time of its own: ``row.signal`` over ``time_row`` [s, pu]."""
+    data, coordinates = {}, {}
+    for name, result in certificate.results.items():
+        along = f"time_{name}"
+        coordinates[along] = (along, result.times, {"units": "s"})
+        for signal, values in result.signals.items():
+            data[f"{name}.{signal}"] = (along, values, {"units": "pu"})
+    return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})
+
+
+def figures_of(c: CodeCertificate) -> dict[str, Any]:
+    """All figures as JSON's types."""
+    return {
+        "format": FORMAT, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
+        "f_n": c.f_n, "verdict": c.verdict, "sentence": c.sentence(), "model": c.description.model_name,
+        "binding": c.request.binding.name if c.request.binding else None,
+        "values": dict(c.request.values),
+        "left_out": list(c.code.left_out), "readings": list(c.code.readings), "departures": list(c.departures),
+        "missing": list(c.missing), "rows": [_row(v, c) for v in c.verdicts],
+        "acceptance": c.acceptance.report if c.acceptance else None, "environment": environment(),
+    }  # fmt: skip
+
+
+def _row(v: RowVerdict, c: CodeCertificate) -> dict[str, Any]:
+    return {
+        "row": v.row.name, "title": v.row.title, "clause": v.row.clause, "judged": v.judged, "accepted": v.accepted,
+        "unknown": v.unknown, "criteria": [finding_json(f) for f in v.findings],
+        "findings": c.results[v.row.name].findings,
+    }  # fmt: skip
+
+
+def finding_json(finding: RowFinding) -> dict[str, Any]:
+    """A finding as JSON's types."""
+    return {name: getattr(finding, name) for name in RowFinding.__dataclass_fields__}
+
+
+def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
+    """The page of a certificate; ``mark`` is the hash of its figures."""
+    rows = [
+        [escape(v.row.name), escape(v.row.clause), escape(v.row.title), escape(f.criterion), escape(f.rule),
+         "the code's" if f.origin == "code" else "reading", escape(f.text), _margin(f), _word(f.accepted)]
+        for v in c.verdicts for f in v.findings
+    ]  # fmt: skip
+    rows += [[escape(v.row.name), escape(v.row.clause), escape(v.row.title), "", "", "", escape(v.unknown), "–",
+              "not judged"] for v in c.verdicts if v.unknown]  # fmt: skip
+    columns = ["Row", "Clause", "Stimulus", "Criterion", "Rule", "Number is", "Found", "Margin", "Verdict"]
+    shown_rows = [r.name for r in c.code.rows if r.shown_only]
+    source = f"<p>{escape(c.code.source)}, {escape(c.code.date)}. Figures: SHA-256 {mark}.</p>"
+    details = [[escape(label), escape(text)] for label, text in c.details.rows()]
+    sections = [
+        ("For whom and by whom", table("Details", ["", ""], details, left=2)),
+        ("Result", table("All criteria", columns, rows, left=9) + _list("Rows without a verdict", shown_rows)),
+        ("What was not tested", _list("", [*c.code.left_out, *c.departures])),
+        ("How the code was read", _list("", c.code.readings)),
+        ("Source", source),
+    ]
+    return document(f"{c.code.key.upper()}: {c.verdict}", c.code.title, f"<p><b>{escape(c.sentence())}</b></p>",
+                    sections, made)  # fmt: skip
+
+
+def _list(heading: str, texts: Any) -> str:
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return (f"<p>{escape(heading)}</p>" if heading and items else "") + (f"<ul>{items}</ul>" if items else "")
+
+
+def _margin(finding: RowFinding) -> str:
+    return "–" if finding.margin is None else f"{100 * finding.margin:+.0f} %".replace("-", "−")
+
+
+def _word(accepted: bool | None) -> str:
+    return "accepted" if accepted else '<span class="bad">not accepted</span>'

@@ -1,0 +1,102 @@
+"""What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.certification.codes.programme import BenchProgramme
+
+
+@dataclass(frozen=True, slots=True)
+class RowFinding:
+    """A criterion applied to a response.
+
+    Attributes
+    ----------
+    criterion
+        Its name.
+    rule
+        What is asked, with its number.
+    origin
+        ``code`` where the number is the code's, ``reading`` where the code gives none and this program's is taken.
+    value, limit
+        What was measured and what it is compared with; None where there is no such number.
+    margin
+        How far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
+    accepted
+        None where it cannot be judged.
+    text
+        The result in words.
+    """
+
+    criterion: str
+    rule: str
+    origin: str
+    value: float | None
+    limit: float | None
+    margin: float | None
+    accepted: bool | None
+    text: str
+
+
+Judge = Callable[[MeasuredRow], RowFinding]
+"""A criterion: the response of a row → whether it is met."""
+
+
+@dataclass(frozen=True)
+class CodeRow:
+    """One row of a code's table: a stimulus, and what is asked of the response.
+
+    Attributes
+    ----------
+    name
+        Short, for files: letters, digits and underscores.
+    title
+        What is done, in words.
+    clause
+        Where the code asks for it.
+    programme
+        What the bench does, for a rated frequency [Hz].
+    criteria
+        Each is applied to the response.
+    shown_only
+        Whether the code gives no verdict on it.
+    """
+
+    name: str
+    title: str
+    clause: str
+    programme: Callable[[float], BenchProgramme]
+    criteria: tuple[Judge, ...]
+    shown_only: bool = False
+
+
+@dataclass(frozen=True)
+class GridCode:
+    """A code as a table.
+
+    Attributes
+    ----------
+    key
+        As ``--code`` takes it.
+    title, source, date
+        What it is, where its numbers were read, and of when it is.
+    f_n
+        Rated frequency of the system [Hz].
+    left_out
+        What the code asks and this table does not test, with the reason.
+    readings
+        Where the code leaves something open, how it was read.
+    has_verdict
+        Whether the code gives numbers to judge by.
+    """
+
+    key: str
+    title: str
+    source: str
+    date: str
+    f_n: float
+    rows: tuple[CodeRow, ...]
+    left_out: tuple[str, ...] = ()
+    readings: tuple[str, ...] = ()
+    has_verdict: bool = True

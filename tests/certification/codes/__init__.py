@@ -1,0 +1,1 @@
+"""Grid codes on the test bench."""

@@ -1,0 +1,80 @@
+"""Converters on the test bench: ours, and one without damping, with a certificate that is verified and forged."""
+
+import json
+
+import pytest
+
+import orchestrator as gfor
+from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.certificate import certify_code
+from orchestrator.certification.codes.ercot import ERCOT
+from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
+from orchestrator.certification.codes.record import save_certificate
+from orchestrator.certification.request import CertificationRequest
+from orchestrator.points.serial import Serial
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def converter(tmp_path_factory):
+    return gfor.build("gfor", tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(name="gfor_command")
+def _gfor_command(request):
+    """The command of the same name as the module that is imported here."""
+    return request.getfixturevalue("gfor")
+
+
+def test_what_only_the_damping_test_has_is_refused(converter, gfor_command):
+    code, _, said = gfor_command("certify", converter, "--code", "ercot", "--reactances", "0.1")
+    assert code == 2
+    assert "--reactances: only --code nts631 has it" in " ".join(said.split())
+
+
+def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp_path, gfor_command):
+    def certified():
+        return certify_code(CertificationRequest(converter), ERCOT, Serial(), tmp_path, ("phase_jumps",))
+
+    found = certified()
+    assert [v.accepted for v in found.verdicts] == [True]
+    assert found.verdict == "incomplete"  # two rows were not asked for
+    assert certified().stored == 1
+    save_certificate(found, tmp_path)
+    folder, content = read_code_certificate(tmp_path)
+    assert verify_code(folder, content).holds
+    for option in ("--all", "--points=0.1"):
+        code, _, said = gfor_command("verify", tmp_path, option)
+        assert code == 2
+        assert "does not compute anew" in said
+    content["rows"][0]["criteria"][1]["value"] += 0.1
+    content["verdict"] = "passes"
+    (tmp_path / "certificate.json").write_text(json.dumps(content), encoding="utf-8")
+    faults = " ".join(verify_code(*read_code_certificate(tmp_path)).faults)
+    assert "gives other findings" in faults
+    assert "its rows come to 'incomplete'" in faults
+
+
+def test_a_converter_without_damping_does_not_settle(converter, tmp_path):
+    """A lag of 5 s in the droop's measurement leaves a swing of small damping."""
+    request = CertificationRequest(converter, None, {"droop.tau_P": 5.0})
+    (row,) = certify_code(request, ERCOT, Serial(), tmp_path, ("phase_jumps",)).verdicts
+    assert not row.accepted
+    assert "settles" in [finding.criterion for finding in row.failed]
+
+
+@pytest.mark.parametrize(("code", "row"), [("aemo", "jump_10"), ("fingrid", "jumps")])
+def test_a_grid_following_converter_does_not_oppose_jumps(tmp_path, code, row):
+    """It rides through them, settles and returns; nothing else tells it from a grid-forming one."""
+    follower = gfor.build("gfl", tmp_path / "fmu")
+    (verdict,) = certify_code(CertificationRequest(follower), CODES[code], Serial(), tmp_path, (row,)).verdicts
+    assert {finding.criterion.split(" at ")[0] for finding in verdict.failed} == {"opposes the jump"}
+
+
+def test_ours_and_its_duplicate_feed_the_load_without_the_source(converter, tmp_path):
+    """The source turns on behind its open breaker; nobody has to keep step with it."""
+    (row,) = certify_code(
+        CertificationRequest(converter), CODES["miso"], Serial(), tmp_path, ("llsm_charging",)
+    ).verdicts
+    assert not row.failed
