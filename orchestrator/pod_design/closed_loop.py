@@ -78,7 +78,7 @@ class PodLoop:
         self._kept = kept or KeptFigures()
         self._master, self._components, self._controller = master, tuple(components), controller
         for name in components:
-            _check_tunable(name, master.components[name].description, controller)
+            check_tunable(name, master.components[name].description, controller)
         off = PodSetting(0.0, NO_COMPENSATION)
         self._apply(off)
         self._blocks = Blocks(master)
@@ -193,7 +193,21 @@ def _digest_of(pair: Eigenpair) -> str:
     return digest(np.array(pair.eigenvalue), pair.left, pair.right)
 
 
-def _check_tunable(name: str, description: FmuDescription, controller: str) -> None:
+def check_tunable(name: str, description: FmuDescription, controller: str) -> None:
+    """A controller's gain and lead/lag must be tunable.
+
+    Parameters
+    ----------
+    name, description
+        Of the component.
+    controller
+        ``pod_p`` or ``pod_q``.
+
+    Raises
+    ------
+    InputError
+        If one of them cannot be changed while the FMU runs.
+    """
     fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
     if fixed:
         raise InputError(

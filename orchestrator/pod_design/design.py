@@ -228,7 +228,7 @@ def design_pod(
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.parameters)
 
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
-        return named_modes(case, model, modes).get(name)
+        return named_modes(case, model, modes).named.get(name)
 
     for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
         check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)

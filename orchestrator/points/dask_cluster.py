@@ -5,10 +5,13 @@ with certificates of one's own authority keeps strangers out; it does not protec
 another.
 """
 
+import asyncio
 import ipaddress
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -61,7 +64,7 @@ class DaskCluster:
         if not tasks:
             return
         distributed = _distributed()
-        with self._client(distributed) as client:
+        with _event_loop() as loop, self._client(distributed, loop) as client:
             futures = [client.submit(function, task, pure=False) for task in tasks]
             index_of = {future.key: index for index, future in enumerate(futures)}
             try:
@@ -74,7 +77,7 @@ class DaskCluster:
     def close(self) -> None:
         """See `Executor.close`; the workers are the cluster's own."""
 
-    def _client(self, distributed: Any) -> Any:
+    def _client(self, distributed: Any, loop: Any) -> Any:
         if not (self.address.startswith("tls://") or _on_this_machine(self.address)):
             _LOG.warning(
                 "--scheduler %s: the connection is not encrypted and nobody is checked; whoever can reach the "
@@ -82,9 +85,12 @@ class DaskCluster:
                 "network of your own",
                 self.address,
             )
+        security = self._security(distributed)
         try:
+            # A client that finds no scheduler is never closed, and waits for itself when it is collected.
+            asyncio.run_coroutine_threadsafe(self._call(distributed, security), loop.asyncio_loop).result()
             client = distributed.Client(
-                self.address, timeout=_PATIENCE, set_as_default=False, security=self._security(distributed)
+                self.address, timeout=_PATIENCE, set_as_default=False, security=security, loop=loop
             )
         except (OSError, ValueError, TypeError) as error:  # Dask's, in this order: no answer, address, certificates
             raise InputError(
@@ -101,10 +107,15 @@ class DaskCluster:
             ) from error
         return client
 
+    async def _call(self, distributed: Any, security: Any) -> None:
+        """Open a connection to the scheduler and close it."""
+        arguments = security.get_connection_args("client")
+        await (await distributed.comm.connect(self.address, timeout=_PATIENCE, **arguments)).close()
+
     def _security(self, distributed: Any) -> Any:
-        """Dask's description of the certificates; None leaves it to Dask's own configuration."""
+        """Dask's description of the certificates; where `tls` is None, of Dask's own configuration."""
         if self._tls is None:
-            return None
+            return distributed.Security()
         authority, certificate, key = (str(self._tls / name) for name in TLS_FILES)
         return distributed.Security(
             tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True
@@ -123,6 +134,29 @@ class DaskCluster:
                 "in this version, where the workers run"
             ) from error
         return future.result()
+
+
+@contextmanager
+def _event_loop() -> Iterator[Any]:
+    """Run the client's event loop in a thread, and end both.
+
+    Dask's own gives up where its thread does not run within 10 s, as on a busy machine, and goes on after an address
+    at which nothing answers.
+    """
+    from tornado.ioloop import IOLoop  # noqa: PLC0415 - of the extra `cluster`
+
+    async def running() -> IOLoop:
+        return IOLoop.current()
+
+    loop = asyncio.new_event_loop()
+    thread = Thread(target=loop.run_forever, name="gfor Dask client", daemon=True)
+    thread.start()
+    try:
+        yield asyncio.run_coroutine_threadsafe(running(), loop).result()
+    finally:
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+        loop.close()
 
 
 def _on_this_machine(address: str) -> bool:

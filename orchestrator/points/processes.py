@@ -32,11 +32,6 @@ _LONGEST = 60
 """Length of a folder's path in which sockets still have a name that is short enough: it may have about 100 bytes."""
 
 
-def number_of_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 class Processes:
     """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die.
 

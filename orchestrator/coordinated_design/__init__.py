@@ -1,0 +1,1 @@
+"""One setting of POD controllers for many operating points and outages."""

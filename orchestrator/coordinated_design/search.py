@@ -1,0 +1,228 @@
+"""The search for the setting with the best worst damping: a sequence of linear programs on real closed loops.
+
+Each step takes the eigenvalues of all operating points with their sensitivities to all settings, and asks a linear
+program for the change that raises the least damping ratio most, without other modes falling below their floors. The
+change counts only if the eigenvalues that it really gives are better.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import scipy.optimize
+import scipy.stats
+
+from orchestrator.arrays import Numbers
+from orchestrator.coordinated_design.objective import RatedPoint, Watched, Worth, together
+from orchestrator.coordinated_design.settings import SettingSpace
+from orchestrator.pod_design.lead_lag import angle_deg, compensation_deg
+from orchestrator.sensitivities.sensitivities import damping_change
+
+_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
+"""Of the region in which the sensitivities are trusted, as parts of the ranges."""
+_STEPS = 60
+_PRICE = 10.0
+"""What a breach costs, in damping ratio."""
+_NEAR, _NEAR_FLOOR = 0.3, 0.1
+"""Modes whose damping ratio is farther away than this are left out of a linear program."""
+_APART = 0.2
+_EDGE, _POLISHING = 0.1, 40
+_DIFFERENCE = 1e-6
+_WORTH = 1e-6
+_TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.05, 0.15, 0.4, 1.0)
+_STARTS, _STARTS_OF_SEVERAL = 3, 6
+_SPREAD, _MOST_SPREAD = 64, 256
+"""Vectors that are spread over all ranges for each of several groups, and at most."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A vector, its worth, and the number of linear programs that led there."""
+
+    x: Numbers
+    worth: Worth
+    steps: int = 0
+
+    @property
+    def merit(self) -> float:
+        """One number: larger is better."""
+        return self.worth.worst - _PRICE * max(0.0, self.worth.breach)
+
+
+class SettingSearch:
+    """The search over the operating points.
+
+    Parameters
+    ----------
+    space
+        The settings.
+    points
+        The operating points.
+    """
+
+    def __init__(self, space: SettingSpace, points: Sequence[RatedPoint]) -> None:
+        self._space, self._points = space, tuple(points)
+        self.evaluations = 0
+
+    def tried(self, x: Numbers, steps: int = 0) -> Tried:
+        """A vector with its worth over all points."""
+        self.evaluations += 1
+        setting = self._space.setting(x)
+        return Tried(x, together(point.worth(setting) for point in self._points), steps)
+
+    def best(self, starts: int | None = None, *, polish: bool = True) -> Tried:
+        """The best vector that the search finds; it harms no other mode, unless every vector does.
+
+        Parameters
+        ----------
+        starts
+            Number of vectors of the coarse scan that are improved; by default 3, for several groups 6.
+        polish
+            Whether the best is improved without sensitivities as well.
+        """
+        several = len(self._space.groups) > 1
+        scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)
+        chosen = self._alone() if several else []
+        most = len(chosen) + (starts or (_STARTS_OF_SEVERAL if several else _STARTS))
+        for one in scanned:
+            if len(chosen) < most and all(np.abs(one.x - other.x).max() > _APART for other in chosen):
+                chosen.append(one)
+        found = max([scanned[0], *map(self.improved, chosen)], key=lambda one: (one.worth.allowed, one.merit))
+        return self.improved(self._polished(found)) if polish else found
+
+    def _alone(self) -> list[Tried]:
+        """The best setting of each group alone, with the others at their smallest gain."""
+        found = []
+        for k, group in enumerate(self._space.groups):
+            space = self._space.of_group(group)
+            search = SettingSearch(space, self._points)
+            one, x = search.best(), self._space.clipped(np.zeros(len(self._space.lowest)))
+            x[3 * k : 3 * k + 3] = one.x
+            self.evaluations += search.evaluations
+            found.append(self.tried(x))
+        return found
+
+    def _coarse(self) -> Iterator[Numbers]:
+        """Vectors around the turns that the residues ask for, with common offsets, centres and gains."""
+        turns, count = self._wanted_turns(), len(self._space.groups)
+        yield self._space.clipped(np.zeros(3 * count))
+        for offset, centre, share in product(_TURNS, _CENTRES, _GAINS):
+            x = self._space.vector([turn + offset for turn in turns], [centre] * count, [0.0] * count)
+            x[2::3] = share
+            yield self._space.clipped(x)
+        if count > 1:
+            spread = scipy.stats.qmc.Sobol(3 * count, seed=0).random(min(_SPREAD * count, _MOST_SPREAD))
+            yield from self._space.lowest + spread * (self._space.highest - self._space.lowest)
+
+    def _wanted_turns(self) -> list[float]:
+        """For each group, the angle [°] that turns the residues of the worst modes of all points to 180° on average."""
+        sums = np.zeros(len(self._space.groups), dtype=complex)
+        for point in self._points:
+            shares = point.residues()
+            sums += [sum(shares.get(place, 0j) for place in group.places) for group in self._space.groups]
+        return [compensation_deg(angle_deg(complex(total))) if total else 0.0 for total in sums.tolist()]
+
+    def improved(self, start: Tried) -> Tried:
+        """The vector that linear programs lead to from a start."""
+        here, radius, steps = start, _RADIUS, 0
+        program = self._program(here.x)
+        while radius > _SMALLEST and steps < _STEPS:
+            steps += 1
+            change = program.change(radius)
+            there = None if change is None else self.tried(self._space.clipped(here.x + change), steps)
+            if there is not None and there.merit > here.merit + _WORTH:
+                here, radius = there, min(1.5 * radius, _LARGEST)
+                program = self._program(here.x)
+            else:
+                radius /= 3
+        return Tried(here.x, here.worth, start.steps + steps)
+
+    def _polished(self, start: Tried) -> Tried:
+        """A better vector nearby without sensitivities, which do not exist where two eigenvalues meet."""
+        size = len(start.x)
+        simplex = np.vstack([start.x, start.x + np.diag(np.where(start.x > 0.5 * self._space.highest, -_EDGE, _EDGE))])
+        best = start
+
+        def cost(x: Numbers) -> float:
+            nonlocal best
+            one = self.tried(self._space.clipped(x), start.steps)
+            best = max(best, one, key=lambda each: each.merit)
+            return -one.merit
+
+        ends = {"maxfev": _POLISHING * size, "xatol": 1e-4, "fatol": 1e-6}
+        options = {"initial_simplex": simplex, "adaptive": size > 3, **ends}
+        scipy.optimize.minimize(cost, start.x, method="Nelder-Mead", options=options)
+        return best
+
+    def _program(self, x: Numbers) -> "_Program":
+        rows = [row for point in self._points for row in self._rows(point, x)]
+        return _Program(rows, self._space.lowest - x, self._space.highest - x)
+
+    def _rows(self, point: RatedPoint, x: Numbers) -> Iterator[tuple[Watched, Numbers]]:
+        """The modes of one point that count, with the sensitivities of their damping ratios to all numbers of x."""
+        setting = self._space.setting(x, searching=True)
+        watched, left, right = point.watched(setting)
+        worst = min((mode.damping for mode in watched if mode.floor is None), default=1.0)
+        base = point.loops.closed(setting)
+        slopes = []
+        for k in range(len(x)):
+            step = _DIFFERENCE if x[k] + _DIFFERENCE <= self._space.highest[k] else -_DIFFERENCE
+            moved = x.copy()
+            moved[k] += step
+            slopes.append((point.loops.closed(self._space.setting(moved, searching=True)) - base) / step)
+        for mode in watched:
+            near = mode.damping < (worst + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR)
+            if near and mode.place < left.shape[1]:
+                row, column = left[:, mode.place].conj(), right[:, mode.place]
+                shifts = [complex(row @ slope @ column / (row @ column)) for slope in slopes]
+                yield mode, np.array([damping_change(mode.value, shift) for shift in shifts])
+
+    def with_least_gain(self, found: Tried, wanted: float) -> Tried:
+        """The smallest part of all gains that still gives a wanted damping ratio at every point.
+
+        Parameters
+        ----------
+        found
+            A vector that reaches it.
+        wanted
+            Damping ratio.
+        """
+        low, best = 0.0, found
+        high = 1.0
+        for _ in range(12):
+            middle = (low + high) / 2
+            x = found.x.copy()
+            x[2::3] *= middle
+            one = self.tried(self._space.clipped(x), found.steps)
+            if one.worth.worst >= wanted and one.worth.allowed:
+                high, best = middle, one
+            else:
+                low = middle
+        return best
+
+
+class _Program:
+    """A linear program: the change within a radius that raises the least damping ratio most."""
+
+    def __init__(self, rows: Sequence[tuple[Watched, Numbers]], lowest: Numbers, highest: Numbers) -> None:
+        self._lowest, self._highest = lowest, highest
+        matrix, right = [], []
+        for mode, slopes in rows:
+            if mode.floor is None:  # t − slopes·d ≤ ζ
+                matrix.append([*(-slopes), 1.0, 0.0])
+                right.append(mode.damping)
+            else:  # −slopes·d − s ≤ ζ − floor
+                matrix.append([*(-slopes), 0.0, -1.0])
+                right.append(mode.damping - mode.floor)
+        self._matrix, self._right = np.array(matrix).reshape(len(rows), len(lowest) + 2), np.array(right)
+
+    def change(self, radius: float) -> Numbers | None:
+        """The change of x; None where there is none."""
+        limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
+        cost = np.zeros(len(limits) + 2)
+        cost[-2:] = -1.0, _PRICE
+        solved = scipy.optimize.linprog(
+            cost, self._matrix, self._right, bounds=[*limits, (None, 1.0), (0.0, None)], method="highs"
+        )
+        return None if solved.x is None else np.asarray(solved.x[: len(limits)])

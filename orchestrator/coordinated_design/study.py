@@ -1,0 +1,397 @@
+"""A design over operating points and outages: open loops of all points, the search, and all modes computed anew."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.analysis.modes import Mode
+from orchestrator.cases.case import Case
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.coordinated_design.objective import Aim, RatedPoint, least_of_all
+from orchestrator.coordinated_design.open_loops import PodPlace
+from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
+from orchestrator.coordinated_design.ranking import RankedConverter, ranked
+from orchestrator.coordinated_design.search import SettingSearch, Tried
+from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
+from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged
+from orchestrator.errors import AnalysisError, InputError
+from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
+from orchestrator.pod_design.target import check_range, find_target, with_controller
+from orchestrator.points.executor import Executor
+from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
+from orchestrator.points.points import CountReport, kept_or_computed
+from orchestrator.points.store import PointStore
+from orchestrator.screening.outages import Outage
+from orchestrator.screening.points_file import OperatingCase
+from orchestrator.screening.record import Item
+from orchestrator.screening.study import plan_screening
+from orchestrator.study.modes import modes_named
+
+ALL = "all"
+"""Stands for all electromechanical modes."""
+
+_SPARE = 1e-4
+"""Damping ratio beyond the wanted one with which a search for the smallest gain is content."""
+
+TOGETHER = 4
+"""Operating points with outages that are computed together."""
+
+
+@dataclass(frozen=True)
+class PointsDesignRequest:
+    """What is asked of a design over operating points.
+
+    Attributes
+    ----------
+    controllers
+        ``pod_p``, ``pod_q``, or both.
+    components
+        Names or patterns of converters; each gets a setting of its own. All with the controller share one where empty.
+    scenario
+        Its name; the one in which all PODs are off where None.
+    modes
+        Names of the case's modes that are damped; all electromechanical ones where empty.
+    damping
+        Damping ratio that is wanted; None for the best that there is.
+    gain_bounds
+        Of every gain [pu of the converter's rating].
+    stages
+        N_S of the lead/lag; the components' own where None.
+    least_damping
+        No other mode may fall below this damping ratio, or, where it is below already, below what it has.
+    ranked
+        For how many converters a controller alone is designed to rank them.
+    overrides, parameters, step_size
+        As in `orchestrator.pod_design.design.DesignRequest`.
+    """
+
+    controllers: tuple[str, ...]
+    components: tuple[str, ...] = ()
+    scenario: str | None = None
+    modes: tuple[str, ...] = ()
+    damping: float | None = None
+    gain_bounds: tuple[float, float] = (0.0, 400.0)
+    stages: int | None = None
+    least_damping: float = 0.05
+    ranked: int = 3
+    overrides: Mapping[str, Value] = field(default_factory=dict)
+    parameters: Sequence[ParameterFile] = ()
+    step_size: float | None = None
+
+
+@dataclass(frozen=True)
+class PointsDesignPlan:
+    """What a design over operating points computes.
+
+    Attributes
+    ----------
+    request, case, prepared
+        What is asked for, the case, and its scenario without the values of any point and without the controllers.
+    groups
+        Controllers with one setting each.
+    candidates
+        Loops that are ranked; those of the groups are among them.
+    points, outages, items
+        As in a screening.
+    off
+        Values with which the loops are measured.
+    aim
+        Which modes are damped.
+    """
+
+    request: PointsDesignRequest
+    case: Case
+    prepared: PreparedScenario
+    groups: tuple[PodGroup, ...]
+    candidates: tuple[PodPlace, ...]
+    points: tuple[OperatingCase, ...]
+    outages: tuple[Outage, ...]
+    items: tuple[Item, ...]
+    off: Mapping[str, Value]
+    aim: Aim
+
+    @property
+    def layers(self) -> tuple[ParameterFile, ...]:
+        """Values that hold at every point, without those of the controllers."""
+        own = [OptionValues.of(self.request.overrides)] if self.request.overrides else []
+        return (*self.request.parameters, *own)
+
+
+def plan_points_design(
+    case: Case, request: PointsDesignRequest, points: Path, outages: str | None = None
+) -> PointsDesignPlan:
+    """Check a design over operating points, and build the FMUs that it needs.
+
+    Parameters
+    ----------
+    case, request
+        Of what, and what is asked for.
+    points
+        CSV file with the operating points, as `gfor screen` takes it.
+    outages
+        As `orchestrator.screening.outages.read_outages` takes them.
+
+    Raises
+    ------
+    InputError
+        If points, outages, scenario, components or modes cannot be used.
+    """
+    groups = _groups(case, request)
+    known = [table.name for table in case.table.analysis.modes]
+    for name in request.modes:
+        if name not in known:
+            raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join([*known, ALL])}")
+    scenario = _scenario(case, request)
+    candidates = _candidates(case, request, scenario, groups)
+    off: dict[str, Value] = {}
+    for place in candidates:
+        off |= {f"{place.name}.enabled": False, f"{place.name}.T_S1": 0.0, f"{place.name}.T_S2": 0.0}
+    off |= {f"{place.name}.N_S": float(group.stages) for group in groups for place in group.places}
+    overrides = {key: value for key, value in request.overrides.items() if key not in off} | off
+    screened = plan_screening(case, points, outages, scenario, overrides, request.step_size, None, request.parameters)
+    plans = screened.prepared.system.components
+    for group in groups:
+        for bound in request.gain_bounds:
+            check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
+    for place in candidates:
+        check_tunable(place.component, plans[place.component].description, place.controller)
+    items = tuple(item for task in screened.tasks for item in task.items)
+    clash = {key for item in items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
+    if clash:
+        raise InputError(f"{points}: the column for {min(clash)} sets what is to be designed; leave it out")
+    naming = partial(_naming, case) if request.modes else None
+    aim = Aim(request.modes, request.least_damping, naming)
+    return PointsDesignPlan(case=case, request=request, prepared=screened.prepared, groups=groups,
+                            candidates=candidates, points=screened.points, outages=screened.outages, items=items,
+                            off=off, aim=aim)  # fmt: skip
+
+
+def _naming(case: Case, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
+    return modes_named(case, names, modes).named
+
+
+def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
+    """The controllers with a setting of their own: each controller of each pattern."""
+    found: list[PodGroup] = []
+    for controller in dict.fromkeys(request.controllers):
+        for pattern in request.components or (None,):
+            target = find_target(
+                case, controller, scenario=request.scenario, pattern=pattern, stages=request.stages,
+                overrides=request.overrides, parameters=request.parameters,
+            )  # fmt: skip
+            group = PodGroup(controller, target.components, target.key, target.stages)
+            for other in found:
+                if shared := set(other.places) & set(group.places):
+                    raise InputError(
+                        f"--component: {min(shared).component} is in two of the patterns; a converter gets one "
+                        "setting: let each pattern have converters of its own"
+                    )
+            found.append(group)
+    return tuple(found)
+
+
+def _scenario(case: Case, request: PointsDesignRequest) -> str:
+    target = find_target(
+        case, request.controllers[0], scenario=request.scenario, pattern=None, stages=0,
+        overrides=request.overrides, parameters=request.parameters,
+    )  # fmt: skip
+    return target.scenario
+
+
+def _candidates(
+    case: Case, request: PointsDesignRequest, scenario: str, groups: Sequence[PodGroup]
+) -> tuple[PodPlace, ...]:
+    """Loops of the groups, and for the ranking those of other converters whose controller is off."""
+    own = [place for group in groups for place in group.places]
+    plan = case.components_of(scenario, request.overrides, request.parameters)
+    for controller in request.controllers if request.ranked else ():
+        own += [
+            PodPlace(name, controller)
+            for name in with_controller(plan, controller)
+            if not plan[name].value(f"{controller}.enabled")
+        ]
+    return tuple(dict.fromkeys(own))
+
+
+@dataclass(frozen=True)
+class PointsDesign:
+    """A design over operating points with what it comes to.
+
+    Attributes
+    ----------
+    plan
+        What was computed.
+    frequency
+        ω that the centres relate to [rad/s].
+    settings
+        Of each group.
+    found
+        The search's own figures, on the linear models; nothing of the verdict rests on them.
+    points
+        Every operating point with every outage, without the controllers and with them, all modes computed anew.
+    ranking
+        Converters by what a controller there alone would give, the best first.
+    evaluations
+        How often all points were computed in the search.
+    """
+
+    plan: PointsDesignPlan
+    frequency: float
+    settings: tuple[PodSetting, ...]
+    found: Tried
+    points: tuple[JudgedPoint, ...]
+    ranking: tuple[RankedConverter, ...]
+    evaluations: int
+
+    @property
+    def verdict(self) -> PointsVerdict:
+        """What it comes to over all points."""
+        return PointsVerdict(self.points, self.plan.request.damping)
+
+
+def design_over_points(
+    plan: PointsDesignPlan,
+    executor: Executor,
+    store: PointStore,
+    report: CountReport = lambda done, total: None,
+    stage: Callable[[str], None] = lambda text: None,
+) -> PointsDesign:
+    """Find the settings, and compute all modes anew with them.
+
+    Parameters
+    ----------
+    plan
+        As `plan_points_design` gives it.
+    executor
+        Where the points are computed.
+    store
+        Keeps points as soon as they are computed.
+    report
+        Called with the numbers of points done and in all, first without and then with the controllers.
+    stage
+        Called with the name of each stage when it begins.
+
+    Raises
+    ------
+    AnalysisError
+        If no point has modes, or none has an electromechanical one.
+    """
+    stage("operating points without the controllers")
+    before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))
+    usable = [k for k, point in enumerate(before) if point.loops is not None]
+    if not usable:
+        raise AnalysisError(f"no operating point has modes, so nothing can be designed; the first: {before[0].text}")
+    frequency = _frequency([before[k] for k in usable])
+    stage("search")
+    largest = plan.request.gain_bounds[1]
+    own = {place: largest for group in plan.groups for place in group.places}
+    rated = [RatedPoint(k, loops, plan.aim, own) for k in usable if (loops := before[k].loops) is not None]
+    space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
+    search = SettingSearch(space, rated)
+    found = search.best()
+    wanted = plan.request.damping
+    if wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE:
+        found = search.with_least_gain(found, wanted + _SPARE)
+    settings = tuple(space.group_settings(found.x))
+    stage("operating points with the controllers")
+    after = modes_at(plan, values_of(plan.groups, settings), (), executor, store, lambda n, of: report(of + n, 2 * of))
+    stage("ranking")
+    every = dict.fromkeys(plan.candidates, largest)
+    alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
+    ranking = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked)
+    predicted = {point.number: least_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
+    where = [(plan.points[item.point], plan.outages[item.outage]) for item in plan.items]
+    points = tuple(judged(where, before, after, plan.aim, predicted))
+    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations)
+
+
+def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
+    """N_S of every candidate."""
+    own = {place: group.stages for group in plan.groups for place in group.places}
+    plans = plan.prepared.system.components
+    return {
+        place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
+        for place in plan.candidates
+    }
+
+
+def _frequency(points: Sequence[PointModes]) -> float:
+    """The mean frequency of the least damped electromechanical modes [rad/s]."""
+    found = [point.values[point.swinging[0]].imag for point in points if point.swinging]
+    if not found:
+        raise AnalysisError("no operating point has a mode from 0.1 to 2 Hz, so there is nothing to damp")
+    return float(np.mean(found))
+
+
+def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dict[str, Value]:
+    """The settings by ``component.variable``, with eight significant digits, as a parameter file has them."""
+    values: dict[str, Value] = {}
+    for group, setting in zip(groups, settings, strict=True):
+        for component in group.key:
+            name = f"{component}.{group.controller}"
+            values |= {
+                f"{name}.enabled": setting.gain > 0,
+                f"{name}.K": float(f"{setting.gain:.8g}"),
+                f"{name}.T_S1": float(f"{setting.filters.T_S1:.8g}"),
+                f"{name}.T_S2": float(f"{setting.filters.T_S2:.8g}"),
+                f"{name}.N_S": group.stages,
+            }
+    return values
+
+
+def modes_at(
+    plan: PointsDesignPlan,
+    values: Mapping[str, Value],
+    places: Sequence[PodPlace],
+    executor: Executor,
+    store: PointStore,
+    report: CountReport = lambda done, total: None,
+) -> list[PointModes]:
+    """The modes of all operating points and outages with some values, from the power flow on.
+
+    Parameters
+    ----------
+    plan
+        Points and outages.
+    values
+        By ``component.variable``; they go before all layers.
+    places
+        Loops that are measured as well.
+    executor, store
+        Where the points are computed, and what keeps them.
+    report
+        Called with the numbers of points done and in all.
+    """
+    layers = (*plan.layers, OptionValues.of(values))
+    content = {
+        "design over points": plan.case.text,
+        **scenario_content(plan.prepared),
+        "layers": [list(layer.values.items()) for layer in layers],
+        "step": plan.request.step_size,
+        "places": [place.name for place in places],
+    }
+    common = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    reference, mark = reference_to(plan.case), fingerprint(plan.case)
+    tasks = []
+    for first in range(0, len(plan.items), TOGETHER):
+        part = plan.items[first : first + TOGETHER]
+        said = [[sorted(item.values.items()), list(item.out)] for item in part]
+        tasks.append(PointsTask(reference, mark, plan.prepared.name, layers, plan.request.step_size, part,
+                                tuple(places), key_of({"points": common, "items": said}),
+                                plan.case.trust_fmus))  # fmt: skip
+
+    def count(done: int, total: int) -> None:
+        report(round(len(plan.items) * done / max(1, total)), len(plan.items))
+
+    found: dict[int, PointsRecord] = {}
+    for index, record, _ in kept_or_computed(PointsRecord, compute_points, tasks, executor, store, count):
+        found[index] = record
+    return [point for index in range(len(tasks)) for point in found[index].points]

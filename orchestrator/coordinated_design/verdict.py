@@ -1,0 +1,237 @@
+"""The verdict on a design over operating points, from modes that were computed anew at every point."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.analysis.modes import damping_ratio
+from orchestrator.coordinated_design.objective import UNMOVED, Aim, Watched, Worth, floors_of, growth, split, worth_of
+from orchestrator.coordinated_design.point import PointModes
+from orchestrator.screening.outages import Outage
+from orchestrator.screening.points_file import OperatingCase
+
+ASTRAY = 1e-3
+"""From this difference of damping ratios on, the search's linear models and the modes computed anew disagree."""
+
+
+@dataclass(frozen=True)
+class PlacedMode:
+    """A mode [rad/s] with who takes part most; "" where that is not known."""
+
+    value: complex
+    who: str
+
+    @property
+    def damping_ratio(self) -> float:
+        """−Re λ/|λ|."""
+        return damping_ratio(self.value)
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ/2π."""
+        return self.value.imag / (2 * np.pi)
+
+    @property
+    def words(self) -> str:
+        """Frequency, damping and who."""
+        return f"{self.frequency_hz:.3f} Hz, {100 * self.damping_ratio:.2f} %" + (f" ({self.who})" if self.who else "")
+
+
+@dataclass(frozen=True)
+class JudgedPoint:
+    """One operating point with one outage, without and with the controllers.
+
+    Attributes
+    ----------
+    point, outage
+        Which.
+    before, after
+        The modes there.
+    target_before, target
+        The least damped of the modes that the design damps; None where there is none.
+    other
+        The other mode that is farthest below its floor, or nearest to it; None where there is none.
+    worth
+        Least damping and breach with the controllers; None where nothing is known.
+    predicted
+        Least damping ratio from the search's linear models.
+    unnamed
+        Whether a name that is asked for is borne by no mode here, so that all electromechanical ones count.
+    """
+
+    point: OperatingCase
+    outage: Outage
+    before: PointModes
+    after: PointModes
+    target_before: PlacedMode | None = None
+    target: PlacedMode | None = None
+    other: PlacedMode | None = None
+    worth: Worth | None = None
+    predicted: float | None = None
+    unnamed: bool = False
+
+    @property
+    def computed(self) -> bool:
+        """Whether the modes are known without and with the controllers."""
+        return self.before.computed and self.after.computed
+
+    @property
+    def grows(self) -> bool:
+        """Whether the system grows with the controllers."""
+        return growth(self.after.values) > 0
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether it is stable with the controllers; None where that is not known."""
+        if self.grows:
+            return False
+        return True if self.after.computed and not self.after.doubtful else None
+
+    @property
+    def where(self) -> str:
+        """The point and the outage in words."""
+        return f"{self.point.name}, {self.outage.name}"
+
+    @property
+    def unmoved(self) -> bool:
+        """Whether the controllers hardly move the least damped mode."""
+        before, after = self.target_before, self.target
+        return bool(before and after and abs(after.value - before.value) < UNMOVED * abs(before.value))
+
+    @property
+    def why_not(self) -> str:
+        """Why the modes are not known; "" where they are."""
+        failed = self.before if not self.before.computed else self.after
+        with_it = "" if not self.before.computed else " with the controllers"
+        return "" if self.computed else f"{failed.status}{with_it}: {failed.text}"
+
+    @property
+    def astray(self) -> float:
+        """By how much the search's models were wrong on the least damping ratio."""
+        if self.predicted is None or self.worth is None:
+            return 0.0
+        return abs(self.predicted - self.worth.worst)
+
+
+def judged(
+    where: Sequence[tuple[OperatingCase, Outage]],
+    before: Sequence[PointModes],
+    after: Sequence[PointModes],
+    aim: Aim,
+    predicted: Mapping[int, float],
+) -> Iterator[JudgedPoint]:
+    """Every point with what became of it.
+
+    Parameters
+    ----------
+    where
+        Operating point and outage of each.
+    before, after
+        The modes without and with the controllers.
+    aim
+        Which modes are damped.
+    predicted
+        What the search expected, by the number of the point.
+    """
+    for k, here in enumerate(where):
+        yield _judged(here, before[k], after[k], aim, predicted.get(k))
+
+
+def _judged(
+    where: tuple[OperatingCase, Outage], before: PointModes, after: PointModes, aim: Aim, predicted: float | None
+) -> JudgedPoint:
+    if not (before.computed and after.computed):
+        return JudgedPoint(*where, before, after, predicted=predicted)
+    first = split(before.values, _targets(before, aim), floors_of((), 0.0))
+    floors = floors_of((mode.value for mode in first if mode.floor is not None), aim.least)
+    second = split(after.values, _targets(after, aim), floors)
+    others = [mode for mode in second if mode.floor is not None]
+    nearest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
+    worth = worth_of(second, growth(after.values), growth(before.values))
+    unnamed = any(name not in point.named for point in (before, after) for name in aim.names)
+    return JudgedPoint(
+        *where, before, after, _least(first, before), _least(second, after),
+        None if nearest is None else _placed(nearest, after), worth, predicted, unnamed,
+    )  # fmt: skip
+
+
+def _targets(point: PointModes, aim: Aim) -> list[int] | None:
+    """Places of the named modes; None where all count."""
+    if not aim.names or any(name not in point.named for name in aim.names):
+        return None
+    return [point.named[name] for name in aim.names]
+
+
+def _least(watched: Sequence[Watched], point: PointModes) -> PlacedMode | None:
+    found = min((mode for mode in watched if mode.floor is None), key=lambda mode: mode.damping, default=None)
+    return None if found is None else _placed(found, point)
+
+
+def _placed(mode: Watched, point: PointModes) -> PlacedMode:
+    who = dict(zip(point.swinging, point.who, strict=True)).get(mode.place, "")
+    return PlacedMode(mode.value, who)
+
+
+class PointsVerdict:
+    """What a design comes to over all points.
+
+    Parameters
+    ----------
+    points
+        Every point with what became of it.
+    wanted
+        Damping ratio that is wanted everywhere; None for the best that there is.
+    """
+
+    def __init__(self, points: Sequence[JudgedPoint], wanted: float | None) -> None:
+        self.points, self.wanted = tuple(points), wanted
+        self.known = [point for point in points if point.computed]
+        self.failed = [point for point in points if not point.computed]
+        self.unstable = [point for point in self.known if point.grows]
+        self.harmed = [point for point in self.known if point.worth is not None and not point.worth.allowed]
+        self.doubtful = [point for point in self.known if point.after.doubtful]
+
+    @property
+    def limiting(self) -> JudgedPoint | None:
+        """The point with the least damping; None where no point has a mode to be damped."""
+        having = [point for point in self.known if point.target is not None]
+        return min(having, key=lambda point: _damping(point.target), default=None)
+
+    @property
+    def worst(self) -> float | None:
+        """Least damping ratio of all points with the controllers."""
+        limiting = self.limiting
+        return None if limiting is None else _damping(limiting.target)
+
+    @property
+    def worst_before(self) -> float | None:
+        """Least damping ratio of all points without the controllers."""
+        return min((_damping(point.target_before) for point in self.known if point.target_before), default=None)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether every point is stable with the controllers; None where that is not known of all and none grows."""
+        if self.unstable:
+            return False
+        return None if self.failed or self.doubtful else True
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the wanted damping is reached everywhere, or, where none is wanted, the least one is better than
+        before; None where points have no modes or a limit is near, and no other point says no.
+        """
+        wanted, worst, before = self.wanted, self.worst, self.worst_before
+        enough = worst is None or (worst >= wanted if wanted is not None else before is None or worst > before)
+        if self.unstable or self.harmed or not enough:
+            return False
+        return None if self.failed or self.doubtful else True
+
+    @property
+    def astray(self) -> list[JudgedPoint]:
+        """Points at which the search's models were wrong, the worst first."""
+        return sorted((p for p in self.known if p.astray > ASTRAY), key=lambda point: -point.astray)
+
+
+def _damping(mode: PlacedMode | None) -> float:
+    return 1.0 if mode is None else mode.damping_ratio

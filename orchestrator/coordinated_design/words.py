@@ -1,0 +1,153 @@
+"""A design over operating points in words and tables."""
+
+from collections import Counter
+
+from rich.table import Table
+
+from orchestrator.coordinated_design.ranking import RankedConverter
+from orchestrator.coordinated_design.study import PointsDesign
+from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict
+from orchestrator.pod_design.closed_loop import PodSetting
+from orchestrator.report.tables import make_table
+
+_ROWS, _SHOWN = 12, 4
+
+
+def verdict_sentence(verdict: PointsVerdict) -> str:
+    """The verdict on all points and outages in one sentence; the first word says it."""
+    total, wanted = len(verdict.points), verdict.wanted
+    limiting, worst = verdict.limiting, verdict.worst
+    if limiting is None or limiting.target is None or worst is None:
+        tail = "; no mode to be damped is left from 0.1 to 2 Hz" if verdict.known else ""
+    else:
+        unmoved = ", which these controllers hardly move" if limiting.unmoved else ""
+        tail = f"; least damped: {limiting.where}: {limiting.target.words}{unmoved}"
+    aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
+    if verdict.met:
+        return f"REACHED: {aim}{tail}" if wanted is not None else f"better: at all {total} points and outages{tail}"
+    reasons = _reasons(verdict)
+    if verdict.met is None:
+        return f"not known: {', '.join(reasons)}{tail}"
+    word = "NOT REACHED" if wanted is not None else "NO BETTER"
+    return f"{word}: {', '.join([aim] * bool(aim) + reasons)}{tail}"
+
+
+def _reasons(verdict: PointsVerdict) -> list[str]:
+    """What speaks against a design, or leaves it not known."""
+    total, reasons = len(verdict.points), []
+    if verdict.unstable:
+        first = verdict.unstable[0]
+        named = f"the first: {first.where} ({first.after.rightmost})"
+        reasons.append(f"UNSTABLE at {len(verdict.unstable)} of {total}, {named}")
+    if verdict.harmed:
+        worst = max(verdict.harmed, key=lambda point: point.worth.breach if point.worth else 0.0)
+        mode = f": {worst.other.words}" if worst.other is not None and not worst.grows else ""
+        reasons.append(f"other modes are harmed at {len(verdict.harmed)} of {total}, most at {worst.where}{mode}")
+    if verdict.failed:
+        counts = Counter(str((p.before if not p.before.computed else p.after).status) for p in verdict.failed)
+        said = ", ".join(f"{number} {status}" for status, number in counts.items())
+        reasons.append(f"{len(verdict.failed)} of {total} have no modes ({said})")
+    if verdict.doubtful:
+        reasons.append(f"{len(verdict.doubtful)} of {total} stand at the edge of a limit")
+    return reasons
+
+
+def what_it_rests_on(design: PointsDesign) -> str:
+    """How the setting was found, and what the verdict rests on."""
+    request, steps = design.plan.request, design.found.steps
+    modes = "all modes from 0.1 to 2 Hz" if not request.modes else "the modes " + ", ".join(request.modes)
+    return (
+        f"Damped: {modes}. No other mode may fall below {100 * request.least_damping:g} % or, where the least of its "
+        f"band of frequencies is there already, below that less 0.1 points. Gains from {request.gain_bounds[0]:g} to "
+        f"{request.gain_bounds[1]:g} pu. The search computed all points {design.evaluations} times on linear models; "
+        f"the best came from {steps} linear programs. The figures are those of power flow, steady state and "
+        "eigenvalues computed anew at every point, of the system without a communication step."
+    )
+
+
+def settings_table(design: PointsDesign) -> Table:
+    """The setting of each group."""
+    table = make_table("Settings", "Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
+    for group, setting in zip(design.plan.groups, design.settings, strict=True):
+        table.add_row(group.name, *_setting(setting), str(len(group.components)))
+    return table
+
+
+def _setting(setting: PodSetting) -> list[str]:
+    filters = setting.filters
+    angle = filters.N_S * filters.stage_angle_deg if filters.T_S1 else 0.0
+    return [f"{setting.gain:.5g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}", str(filters.N_S), f"{angle:+.1f}"]
+
+
+def points_table(verdict: PointsVerdict) -> Table:
+    """The points with the least damping, the worst first."""
+    having = [point for point in verdict.known if point.target is not None]
+    ordered = sorted(having, key=lambda point: point.target.damping_ratio if point.target else 1.0)
+    table = make_table(
+        f"The {min(_ROWS, len(ordered))} least damped of {len(verdict.points)} points and outages",
+        "Point", "Outage", "before [%]", "with it [%]", "f [Hz]", "Who", "Stable", left=2,
+    )  # fmt: skip
+    for point in ordered[:_ROWS]:
+        assert point.target is not None
+        before = "–" if point.target_before is None else f"{100 * point.target_before.damping_ratio:.2f}"
+        table.add_row(point.point.name, point.outage.name, before, f"{100 * point.target.damping_ratio:.2f}",
+                      f"{point.target.frequency_hz:.3f}", point.target.who, _stable(point))  # fmt: skip
+    return table
+
+
+def _stable(point: JudgedPoint) -> str:
+    return {True: "yes", False: "NO", None: "not known"}[point.stable]
+
+
+def ranking_table(design: PointsDesign) -> Table:
+    """Converters by what a controller there alone would give."""
+    table = make_table(
+        "Converters by what a controller there alone would give (linear models of all points)",
+        "Converter", "Controller", "least damping [%]", "K [pu]", "T_S1 [s]", "T_S2 [s]", "shift by 1 pu [rad/s]",
+        left=2,
+    )  # fmt: skip
+    for one in design.ranking[:_ROWS]:
+        table.add_row(one.place.component, one.place.controller, *ranked_cells(one), f"{one.shift:.3g}")
+    return table
+
+
+def ranked_cells(one: RankedConverter) -> list[str]:
+    """Least damping, gain and time constants of a ranked converter; dashes where no controller was searched."""
+    if one.worst is None or one.setting is None:
+        return ["–"] * 4
+    filters = one.setting.filters
+    return [f"{100 * one.worst:.2f}", f"{one.setting.gain:.4g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}"]
+
+
+def remarks(verdict: PointsVerdict) -> list[str]:
+    """What was not computed, and what is unusual, counted and named."""
+    total, texts = len(verdict.points), []
+    if verdict.failed:
+        texts.append(f"{len(verdict.failed)} of {total} have no modes:")
+        texts += [f"  {point.where}: {point.why_not}" for point in verdict.failed[:_SHOWN]]
+        texts += [f"  … and {len(verdict.failed) - _SHOWN} more, in the files"] * (len(verdict.failed) > _SHOWN)
+    if verdict.astray:
+        worst = verdict.astray[0]
+        assert worst.predicted is not None
+        assert worst.worth is not None
+        texts.append(
+            f"the search was led astray: at {len(verdict.astray)} of {total} its linear models were wrong, most at "
+            f"{worst.where}, where they expected {100 * worst.predicted:.2f} % and "
+            f"{100 * worst.worth.worst:.2f} % came out"
+        )
+    free = [point for point in verdict.known if point.after.zeros > 1]
+    if free:
+        texts.append(
+            f"at {len(free)} of {total}, first at {free[0].where}: {free[0].after.zeros} eigenvalues are zero, one of "
+            "them may be the free angle: nothing restores the others"
+        )
+    unnamed = [point for point in verdict.known if point.unnamed]
+    if unnamed:
+        texts.append(
+            f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
+            "so all modes from 0.1 to 2 Hz count there"
+        )
+    warned = [(text, point) for point in verdict.known for text in point.after.warnings]
+    kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))
+    texts += [f"at {n} of {total}, first at {first[text].where}: {text}" for text, n in kinds.most_common(_SHOWN)]
+    return texts

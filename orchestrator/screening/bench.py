@@ -1,0 +1,115 @@
+"""FMUs that serve one operating point after the other, and the linear models that were made of them."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.slope_linearization import covers, linearize_slopes
+from orchestrator.analysis.state_access import StateAccess
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.master import Master
+from orchestrator.coupling.step_awareness import other_step
+from orchestrator.fmi.component import RealBatch
+from orchestrator.fmi.instance import is_ours
+from orchestrator.study.modes import running
+
+DRIVEN, OBSERVED = ("droop.delta_P_ref", "droop.delta_Q_ref"), ("omega",)
+"""Of a converter: where damping controllers act, and what they measure."""
+
+_KEPT = 2000
+"""Linear models that are kept at once."""
+
+
+class ScreeningBench:
+    """Holds the FMUs of one operating point; the next one gets the same FMUs, reset, where it has the same."""
+
+    def __init__(self) -> None:
+        self._master: Master | None = None
+        self._models: dict[Any, ComponentLinearization] = {}
+        self._like: dict[Path, ComponentLinearization] = {}
+        self.perturbed = self.reused = 0
+
+    def master(self, prepared: PreparedScenario) -> Master:
+        """The scenario's FMUs, initialised."""
+        if self._master is not None and _same_fmus(self._master, prepared):
+            try:
+                self._master.restart(prepared.system)
+            except BaseException:
+                self.close()
+                raise
+            self._master.index, self._master.handed_over = 0, False
+            return self._master
+        self.close()
+        self._master = running(prepared)
+        return self._master
+
+    def linearized(self, name: str) -> ComponentLinearization:
+        """One component at the operating point; equal ones are perturbed once.
+
+        A linear model depends on the FMU, its parameters, its states and its inputs; where all these are equal to the
+        last digit, the model that is there is taken.
+        """
+        master = self._master
+        assert master is not None
+        component, plan, exchange = master.components[name], master.system.components[name], master.exchanges[name]
+        at = StateAccess(component).read().tobytes(), RealBatch(component, exchange.inputs.names).read().tobytes()
+        path, asked = plan.description.path, (exchange.inputs.names, exchange.outputs.names)
+        key = (path, tuple(sorted(plan.parameters.items())), tuple(plan.inputs.items()), *asked, *at)
+        if key not in self._models:
+            if len(self._models) >= _KEPT:
+                self._models.clear()
+            driven, observed = (DRIVEN, OBSERVED) if is_converter(plan.description.variables) else ((), ())
+            with other_step(master, name, 0.0):
+                found = linearize_slopes(
+                    exchange,
+                    master.time,
+                    master.clock.step_size,
+                    driven,
+                    observed,
+                    self._like.get(path),
+                )
+            self._models[key] = found
+            known = self._like.setdefault(path, found)
+            if covers(found, known):  # without a unit, the grid has fewer inputs: the model of all serves longer
+                self._like[path] = found
+            self.perturbed += 1
+        else:
+            self.reused += 1
+        return self._models[key]
+
+    def close(self) -> None:
+        """Free the FMUs; calling it again does nothing."""
+        master, self._master = self._master, None
+        if master is not None:
+            master.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def is_converter(variables: Any) -> bool:
+    """Whether a component has references that a damping controller acts on, and a frequency of its own."""
+    return all(name in variables for name in (*DRIVEN, *OBSERVED)) and not any(
+        name.startswith("machine.") for name in variables
+    )
+
+
+def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:
+    """Whether the running FMUs can serve the next point. Others' are opened anew: many cannot go on after a reset."""
+    system, other = master.system, prepared.system
+    return (
+        not (system.wires or other.wires)
+        and system.connections == other.connections
+        and list(system.components) == list(other.components)
+        and all(plan.description.path == other.components[n].description.path for n, plan in system.components.items())
+        and all(map(is_ours, {plan.description.path for plan in system.components.values()}))
+        and all(plan.isolated == other.components[n].isolated for n, plan in system.components.items())
+        and master.schedule == prepared.schedule
+        and master.clock.step_size == prepared.step_size
+    )

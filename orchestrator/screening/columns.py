@@ -1,0 +1,209 @@
+"""What the columns of a file of operating points mean, for one scenario."""
+
+import fnmatch
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from orchestrator.cases.names import close_names
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.cases.values import convert
+from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import InputError
+from orchestrator.units import read_value
+
+IN_SERVICE, ACTIVE, REACTIVE = "in_service", "P_mw", "Q_mvar"
+_SWITCHES = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Elements of a scenario's network that a column or an outage can name.
+
+    Attributes
+    ----------
+    grid
+        Name of the grid component.
+    units
+        Bus of every unit.
+    lines, loads, shunts
+        Those that can be switched or scaled.
+    slack
+        The bus that feeds what is left; "" where none is known.
+    """
+
+    grid: str
+    units: Mapping[str, str]
+    lines: tuple[str, ...]
+    loads: tuple[str, ...]
+    shunts: tuple[str, ...]
+    slack: str
+
+    @classmethod
+    def of(cls, prepared: PreparedScenario) -> "Elements":
+        """Those of a prepared scenario.
+
+        Raises
+        ------
+        InputError
+            If the case has no network that a power flow is computed of.
+        """
+        network, table = prepared.network, prepared.case.table.power_flow
+        if network is None or table is None:
+            raise InputError(
+                f"{prepared.case.path}: a screening needs a power flow of each operating point; give the case a "
+                "[power_flow] table and a network"
+            )
+        switches = prepared.system.components[table.grid].description.variables
+        units = {p.name: p.bus for p in network.ports if p.name in prepared.system.components}
+        branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
+        wanted = table.slack or prepared.source_slack or ""
+        return cls(
+            table.grid,
+            units,
+            tuple(name for name in branches if f"{name}.connected" in switches),
+            tuple(load.name for load in network.loads),
+            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
+            units.get(wanted, wanted),
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them."""
+        return (*self.units, *self.lines, *self.loads, *self.shunts)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What one cell sets.
+
+    Attributes
+    ----------
+    values
+        By ``component.variable``.
+    out
+        Elements that are out of service.
+    scale
+        Factor of all loads that the cell gives; None where it gives none.
+    fed
+        Units that together feed a power [MW].
+    drawn
+        Power that a load draws, by ``component.variable`` [MW, Mvar].
+    """
+
+    values: Mapping[str, Value] = field(default_factory=dict)
+    out: tuple[str, ...] = ()
+    scale: float | None = None
+    fed: tuple[tuple[str, ...], float] | None = None
+    drawn: Mapping[str, float] = field(default_factory=dict)
+
+
+Reading = Callable[[str], Setting]
+"""What the text of a cell sets.
+
+Raises `ValueError` where the text has no meaning in this column.
+"""
+
+
+def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
+    """How the cells of a column are read.
+
+    Raises
+    ------
+    InputError
+        If the column means nothing in this scenario; the message has no place.
+    """
+    if column == "load":
+        return lambda text: Setting(scale=_positive(column, text))
+    if column == "generation":
+        return lambda text: _generation(_positive(column, text), elements, prepared)
+    name, dot, quantity = column.partition(".")
+    if dot and quantity == IN_SERVICE:
+        return _service(column, name, elements, prepared)
+    if dot and quantity in (ACTIVE, REACTIVE):
+        return _power(column, name, quantity, elements, prepared)
+    return _variable(column, prepared)
+
+
+def _service(column: str, name: str, elements: Elements, prepared: PreparedScenario) -> Reading:
+    if name not in elements.names:
+        hint = close_names(name, elements.names, f"there are: {', '.join(elements.names[:8])} …")
+        raise InputError(f"there is no unit, line, load or shunt {name!r}; {hint}")
+
+    def read(text: str) -> Setting:
+        state = _SWITCHES.get(text.lower())
+        if state is None:
+            raise ValueError(f"{column} = {text!r}; it must be 1 or 0, true or false")
+        return Setting(_closing(column, name, elements, prepared)) if state else Setting(out=(name,))
+
+    return read
+
+
+def _closing(column: str, name: str, elements: Elements, prepared: PreparedScenario) -> dict[str, Value]:
+    """The switches that are to be closed for an element that the case has out of service; none for one in service."""
+    plans, grid = prepared.system.components, elements.grid
+    if name in elements.loads:
+        if not plans[grid].number(f"{name}.scale"):
+            raise ValueError(f"{column} = 1, but the case has {name} off by its scale of 0; give {grid}.{name}.scale")
+        return {}
+    switches = [(grid, f"{name}.connected"), *([(name, "connected")] if name in elements.units else [])]
+    found = [(owner, switch) for owner, switch in switches if switch in plans[owner].description.variables]
+    return {f"{owner}.{switch}": True for owner, switch in found if not plans[owner].value(switch)}
+
+
+def _power(column: str, name: str, quantity: str, elements: Elements, prepared: PreparedScenario) -> Reading:
+    if name in elements.loads:
+        variable = f"{name}.{'P' if quantity == ACTIVE else 'Q'}"
+        if variable not in prepared.system.components[elements.grid].description.variables:
+            raise InputError(f"the load {name} was built without reactive power, which cannot be given it here")
+        return lambda text: Setting(drawn={f"{elements.grid}.{variable}": _number(column, text)})
+    members = tuple(unit for unit, bus in elements.units.items() if name in (unit, bus))
+    if not members:
+        known = (*elements.units, *dict.fromkeys(elements.units.values()), *elements.loads)
+        raise InputError(f"there is no unit, bus with a unit, or load {name!r}; {close_names(name, known, '')}")
+    if quantity == REACTIVE:
+        raise InputError(f"the reactive power of {name} follows from its voltage in the power flow; set {name}.v_0")
+    return lambda text: Setting(fed=(members, _number(column, text)))
+
+
+def _generation(factor: float, elements: Elements, prepared: PreparedScenario) -> Setting:
+    plans = {unit: prepared.system.components[unit] for unit in elements.units}
+    return Setting({f"{unit}.P_0": factor * _dispatched(prepared, unit, plan) for unit, plan in plans.items()})
+
+
+def _dispatched(prepared: PreparedScenario, unit: str, plan: ComponentPlan) -> float:
+    flow = prepared.power_flow
+    return flow.powers[unit].real if flow is not None else plan.number("P_0")
+
+
+def _variable(column: str, prepared: PreparedScenario) -> Reading:
+    pattern, dot, variable = column.partition(".")
+    plans = {n: p for n, p in prepared.system.components.items() if fnmatch.fnmatchcase(n, pattern)}
+    if not dot or not plans:
+        raise InputError(
+            "it is none of time, name, hours, load, generation, ELEMENT.in_service, UNIT.P_mw, LOAD.P_mw, LOAD.Q_mvar, "
+            f"and no component.variable; components: {', '.join([*prepared.system.components][:6])} …"
+        )
+    infos = {n: found for n, p in plans.items() if (found := p.description.variables.get(variable)) is not None}
+    if not infos:
+        known = next(iter(plans.values())).description.parameters
+        raise InputError(f"{pattern} has no parameter {variable!r}; {close_names(variable, known, '`gfor info`')}")
+    # Each component by its own name: other columns look up what they share with this one.
+    return lambda text: Setting({f"{n}.{variable}": convert(info, read_value(text)) for n, info in infos.items()})
+
+
+def _number(column: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < float("inf"):
+        raise ValueError(f"{column} = {text!r} is not a number")
+    return value
+
+
+def _positive(column: str, text: str) -> float:
+    value = _number(column, text)
+    if not value > 0:
+        raise ValueError(f"{column} = {text}; it must exceed 0")
+    return value

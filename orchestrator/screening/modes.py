@@ -1,0 +1,226 @@
+"""Critical modes of one operating point, from scratch or from those of another, with a check that none is missed."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.analysis.critical_modes import DENSE, find_critical_modes, nearest_pairs
+from orchestrator.analysis.eigenvalue_count import GROWING, count_growing
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.missed_modes import missed
+from orchestrator.analysis.mode_refinement import RefinedModes, refine
+from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.analysis.modes import ZERO, damping_ratio, find_spectrum
+from orchestrator.analysis.shifted_equations import ShiftedEquations
+from orchestrator.analysis.stability import grows
+from orchestrator.arrays import Vector
+from orchestrator.errors import AnalysisError
+
+_BEYOND = 1.3
+"""Modes are followed a little beyond the range and the damping that are asked for, so that those which enter are known
+already."""
+
+_MOST_STATES = 4000
+"""Up to this number of states, all eigenvalues are computed where a search for some of them does not converge: they
+take some minutes and a gigabyte."""
+
+_BESIDE_ZERO, _NEAREST = 1e-2, 6
+"""Beside 0 [rad/s], where so many nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
+
+_MOST = 0.9
+UNSTABLE = 1e-6
+"""A real part above this [1/s] is growth and not rounding."""
+
+
+@dataclass(frozen=True)
+class CriticalRegion:
+    """Which modes are looked for: frequencies [Hz], and the damping ratio below which a mode is critical."""
+
+    lowest_hz: float
+    highest_hz: float
+    damping: float
+
+    def holds(self, value: complex) -> bool:
+        """Whether an eigenvalue [rad/s] is a critical mode."""
+        hertz = value.imag / (2 * np.pi)
+        return self.lowest_hz <= hertz <= self.highest_hz and damping_ratio(value) <= self.damping
+
+    @property
+    def wider(self) -> "CriticalRegion":
+        """The region in which modes are followed."""
+        damping = min(_MOST, _BEYOND * self.damping)
+        return CriticalRegion(self.lowest_hz / _BEYOND, self.highest_hz * _BEYOND, damping)
+
+
+@dataclass(frozen=True)
+class FoundModes:
+    """Modes of one operating point.
+
+    Attributes
+    ----------
+    modes
+        All that are followed, as rows.
+    searched
+        Whether they come from a search of their own rather than from a neighbour's.
+    growing_elsewhere
+        Number of growing eigenvalues that are none of these modes; None where they were not counted.
+    fastest
+        The one of them with the largest real part [rad/s]; None where there is none, or they were only counted.
+    zeros
+        Number of eigenvalues that are zero, where growth was counted: one may be the free angle.
+    """
+
+    modes: ModeSet
+    searched: bool
+    growing_elsewhere: int | None
+    fastest: complex | None = None
+    zeros: int = 0
+
+    def critical(self, wanted: CriticalRegion) -> list[int]:
+        """Places of the critical modes, least damped first."""
+        held = [k for k, value in enumerate(self.modes.eigenvalues.tolist()) if wanted.holds(value)]
+        return sorted(held, key=lambda k: damping_ratio(complex(self.modes.eigenvalues[k])))
+
+    @property
+    def grows(self) -> bool:
+        """Whether a mode is known to grow."""
+        return bool((self.modes.eigenvalues.real > UNSTABLE).any()) or bool(self.growing_elsewhere)
+
+
+def find_modes_here(
+    model: LinearModel, alone: Vector, wanted: CriticalRegion, neighbour: ModeSet | None, *, count: bool
+) -> FoundModes:
+    """The modes of an operating point.
+
+    Parameters
+    ----------
+    model
+        Continuous.
+    alone
+        Eigenvalues of the components alone [rad/s], as `count_growing` takes them.
+    wanted
+        What is looked for.
+    neighbour
+        Modes of a similar operating point; None searches from scratch.
+    count
+        Whether all growing eigenvalues are counted, at any frequency. Small systems always are.
+
+    Raises
+    ------
+    AnalysisError
+        If neither the search nor the growth that is counted comes to an end, and the system is too large for all of
+        its eigenvalues.
+    """
+    if len(model.names) <= DENSE:
+        return _whole(model, wanted)
+    equations = ShiftedEquations(model)
+    found = None if neighbour is None else _from_neighbour(model, equations, wanted, neighbour)
+    searched = found is None
+    if found is None:
+        try:
+            found = _from_search(model, equations, wanted)
+        except AnalysisError:
+            if len(model.names) > _MOST_STATES:
+                raise
+            return _whole(model, wanted)
+    if not count:
+        return FoundModes(found, searched, None)
+    zeros, slow = _near_zero(model, found)
+    return FoundModes(found, searched, _elsewhere(equations, alone, found) + slow, None, zeros)
+
+
+def _from_search(model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion) -> ModeSet:
+    """The modes from a search over the region, or from all eigenvalues where it has missed some."""
+    found = ModeSet.of(find_critical_modes(model, *_region(wanted.wider)), model.names)
+    if missed(equations, _columns(found), *_radians(wanted), wanted.damping):
+        return _whole(model, wanted).modes
+    return found
+
+
+def _from_neighbour(
+    model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion, neighbour: ModeSet
+) -> ModeSet | None:
+    """The neighbour's modes as they are here; None where these do not settle, or are not all."""
+    if not len(neighbour.eigenvalues):
+        return None
+    start = _columns(_with_names(neighbour, model.names))
+    try:
+        refined = refine(model, equations, start.values, start.left, start.right)
+        if not refined.settled or missed(equations, refined, *_radians(wanted), wanted.damping):
+            return None
+    except (AnalysisError, np.linalg.LinAlgError):
+        return None
+    return _kept(ModeSet(refined.values, refined.left.T, refined.right.T, model.names), wanted)
+
+
+def _with_names(modes: ModeSet, names: tuple[str, ...]) -> ModeSet:
+    """The same modes with the states of another model; a state that they lack is at rest."""
+    if modes.names == names:
+        return modes
+    place = {name: k for k, name in enumerate(modes.names)}
+    to = [k for k, name in enumerate(names) if name in place]
+    of = [place[names[k]] for k in to]
+    left, right = (np.zeros((len(modes.eigenvalues), len(names)), dtype=complex) for _ in range(2))
+    left[:, to], right[:, to] = modes.left[:, of], modes.right[:, of]
+    return ModeSet(modes.eigenvalues, left, right, names)
+
+
+def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
+    """Those modes that are followed, least damped first."""
+    wider = wanted.wider
+    held = [k for k, value in enumerate(modes.eigenvalues.tolist()) if wider.holds(value)]
+    held.sort(key=lambda k: damping_ratio(complex(modes.eigenvalues[k])))
+    return replace(modes, eigenvalues=modes.eigenvalues[held], left=modes.left[held], right=modes.right[held])
+
+
+def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
+    """From all eigenvalues."""
+    spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
+    modes = _kept(ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted)
+    growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
+    others = growing[(np.abs(growing) > ZERO) & ~np.isin(growing, modes.eigenvalues)]
+    fastest = complex(others[np.argmax(others.real)]) if len(others) else None
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum())
+    return FoundModes(modes, True, int((1 + (others.imag > 0)).sum()), fastest, zeros)
+
+
+def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> int:
+    known = 2 * int((found.eigenvalues.real > GROWING).sum())
+    return max(0, count_growing(equations, alone) - known)
+
+
+def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
+    """How many eigenvalues are zero, and how many others near 0 grow too slowly to be counted; a pair counts twice."""
+    values = np.array([value for value, _, _ in nearest_pairs(model, complex(_BESIDE_ZERO), _NEAREST)])
+    zeros = np.abs(values) <= ZERO
+    slow = values[~zeros & (values.real > UNSTABLE) & (values.real <= GROWING)]
+    known = [value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO]
+    upper = [value for value in slow.tolist() if value.imag >= 0 and value not in known]
+    return int(zeros.sum()), sum(1 + (value.imag > ZERO) for value in upper)
+
+
+def _columns(modes: ModeSet) -> RefinedModes:
+    return RefinedModes(modes.eigenvalues, modes.left.T, modes.right.T, settled=True)
+
+
+def _region(wanted: CriticalRegion) -> tuple[float, float, float]:
+    return wanted.lowest_hz, wanted.highest_hz, wanted.damping
+
+
+def _radians(wanted: CriticalRegion) -> tuple[float, float]:
+    return 2 * np.pi * wanted.lowest_hz, 2 * np.pi * wanted.highest_hz
+
+
+def residue(modes: ModeSet, entry: Vector, exit: Vector) -> NDArray[np.complex128]:
+    """Residue of each mode in the transfer from an entry to an exit, shape (m,) [rad/s, by the units of both].
+
+    Parameters
+    ----------
+    modes
+        The modes.
+    entry, exit
+        Column of B and row of C for the whole system, shape (n,).
+    """
+    norms = np.einsum("ij,ij->i", modes.left.conj(), modes.right)
+    return np.asarray((modes.left.conj() @ entry) * (modes.right @ exit) / norms, dtype=complex)

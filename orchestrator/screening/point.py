@@ -1,0 +1,276 @@
+"""A stretch of a screening: some operating points with their outages, computed one after the other.
+
+Everything here can be sent to another process or another machine. A stretch starts from scratch, so its result does not
+depend on where and when it is computed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.linearization import Blocks, continuous
+from orchestrator.analysis.mode_tracking import ModeSet, match
+from orchestrator.analysis.slope_linearization import gives_slopes
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.analysis.threads import alone as on_one_thread
+from orchestrator.cases.case import Case
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.points.key import same_case
+from orchestrator.screening.bench import DRIVEN, OBSERVED, ScreeningBench
+from orchestrator.screening.modes import CriticalRegion, FoundModes, find_modes_here, residue
+from orchestrator.screening.preparation import ACCEPT, ItemPreparation, failure
+from orchestrator.screening.record import Item, ItemRecord, Status, StretchRecord
+from orchestrator.study.modes import modes_from
+
+
+@dataclass(frozen=True)
+class StretchTask:
+    """Operating points with outages that are computed together.
+
+    Attributes
+    ----------
+    case, fingerprint, scenario, layers, step_size, trust_fmus
+        As in `orchestrator.sweep.point.SweepPointTask`.
+    wanted
+        Which modes are looked for.
+    anchor
+        The intact network at the first point, from which the rest is reached.
+    items
+        What is computed, in this order.
+    key
+        Name of the stretch's file.
+    whole
+        Whether growing eigenvalues are counted at all items, rather than at the ends.
+    """
+
+    case: str
+    fingerprint: str
+    scenario: str
+    layers: tuple[ParameterFile, ...]
+    step_size: float | None
+    wanted: CriticalRegion
+    anchor: Item
+    items: tuple[Item, ...]
+    key: str
+    trust_fmus: bool = False
+    whole: bool = False
+
+
+@dataclass
+class _Result:
+    record: ItemRecord
+    found: FoundModes | None = None
+
+
+def compute_stretch(task: StretchTask) -> StretchRecord:
+    """Compute all items of a stretch; failures become records as well.
+
+    Raises
+    ------
+    InputError
+        If this worker's case file or code differs from those that the screening was started with.
+    """
+    case = same_case(task.case, task.fingerprint, task.trust_fmus)
+    with on_one_thread(), ScreeningBench() as bench:
+        worker = _Worker(task, case, bench)
+        return worker.stretch()
+
+
+class _Worker:
+    def __init__(self, task: StretchTask, case: Case, bench: ScreeningBench) -> None:
+        self._task, self._bench = task, bench
+        self._preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size)
+        self._alone: dict[Any, Any] = {}
+
+    def stretch(self) -> StretchRecord:
+        """The stretch; where an end of it has growth that its items do not show, all of them are counted."""
+        found = self._pass(everywhere=self._task.whole)
+        ends = [r.found for r in found if r.found is not None and r.found.growing_elsewhere is not None]
+        if any(end.growing_elsewhere for end in ends) and not all(
+            r.found is None or r.found.growing_elsewhere is not None for r in found
+        ):
+            found = self._pass(everywhere=True)
+        return self._record(found)
+
+    def _pass(self, *, everywhere: bool) -> list[_Result]:
+        """The anchor and then all items, each from what is most alike of those before it."""
+        items = [self._task.anchor, *self._task.items]
+        results: list[_Result] = []
+        for k, item in enumerate(items):
+            if k == 1 and item == items[0]:
+                results.append(_Result(replace(results[0].record, reference=0, links=_same(results[0])),
+                                       results[0].found))  # fmt: skip
+                continue
+            reference = _reference(items, results, k)
+            neighbour = None if reference is None else results[reference].found
+            first = not any(other.found is not None for other in results)
+            result = self._item(item, neighbour, count=everywhere or first or k == len(items) - 1)
+            if reference is not None and neighbour is not None and result.found is not None:
+                links = dict.fromkeys(range(len(result.found.modes.eigenvalues)), -1)
+                links |= {link.target: link.source for link in match(neighbour.modes, result.found.modes)}
+                result.record = replace(result.record, reference=reference, links=tuple(links.values()))
+            results.append(result)
+        self._count_the_last(items, results)
+        return results
+
+    def _count_the_last(self, items: list[Item], results: list[_Result]) -> None:
+        """Count growth at the last item that has modes, where those behind it have none."""
+        last = max((k for k, result in enumerate(results) if result.found is not None), default=None)
+        if last is None:
+            return
+        found = results[last].found
+        if found is not None and found.growing_elsewhere is None:
+            counted = self._item(items[last], found, count=True)
+            before = results[last].record
+            if len(counted.record.eigenvalues) == len(before.eigenvalues):
+                counted.record = replace(counted.record, reference=before.reference, links=before.links)
+                results[last] = counted
+
+    def _record(self, results: list[_Result]) -> StretchRecord:
+        items = [self._task.anchor, *self._task.items]
+        intact = [k for k, item in enumerate(items) if item.intact and results[k].found is not None]
+        first = results[0].found
+        last = results[intact[-1]].found if intact else None
+        return StretchRecord(
+            tuple(result.record for result in results),
+            None if first is None else first.modes,
+            None if last is None else last.modes,
+            intact[-1] if intact else 0,
+            self._bench.perturbed,
+            self._bench.reused,
+        )
+
+    def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
+        """One operating point with an outage, or the reason why it has no modes."""
+        warnings: tuple[str, ...] = ()
+        try:
+            if text := self._preparation.cut_off(item):
+                return _Result(ItemRecord(Status.ISLANDING, text))
+            prepared = self._preparation.prepared(item)
+            warnings = self._preparation.warnings(prepared)
+            return self._modes(prepared, neighbour, warnings, count=count)
+        except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
+            kind, text, lasting = failure(error)
+            return _Result(ItemRecord(kind, text, warnings=warnings, lasting=lasting))
+
+    def _modes(
+        self, prepared: PreparedScenario, neighbour: FoundModes | None, warnings: tuple[str, ...], *, count: bool
+    ) -> _Result:
+        master = self._bench.master(prepared)
+        point = find_operating_point(master, accept=ACCEPT)
+        wanted = self._task.wanted
+        if not all(gives_slopes(exchange) for exchange in master.exchanges.values()):
+            blocks = Blocks(master, derivatives=True)
+            region = (wanted.wider.lowest_hz, wanted.wider.highest_hz)
+            result = modes_from(prepared, master, point, blocks, region, wanted.wider.damping)
+            modes = ModeSet.of(result.modes, result.model.names)
+            elsewhere = int(result.stability.stable is False and not (modes.eigenvalues.real > 0).any())
+            fastest = result.stability.mode if elsewhere else None
+            found = FoundModes(
+                modes,
+                True,
+                None if result.stability.stable is None else elsewhere,
+                None if fastest is None else fastest.eigenvalue,
+                result.stability.zeros,
+            )
+            warnings = (*warnings, *result.warnings)
+            return _Result(self._item_record(found, {}, point.residual, warnings, certain=True), found)
+        whole = {name: self._bench.linearized(name) for name in master.components}
+        narrow = {name: without_references(c) for name, c in whole.items()}
+        model = continuous(Blocks(master, known=narrow, without_step=True))
+        doubtful = [f"{n}: {', '.join(c.doubtful[:3])}" for n, c in whole.items() if c.doubtful]
+        if doubtful:
+            warnings = (*warnings, f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:3])}")
+        own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
+        found = find_modes_here(model, own, wanted, None if neighbour is None else neighbour.modes, count=count)
+        residues = _residues(found.modes, whole)
+        record = self._item_record(found, residues, point.residual, warnings, certain=not doubtful)
+        return _Result(record, found)
+
+    def _item_record(
+        self,
+        found: FoundModes,
+        residues: Mapping[str, Any],
+        residual: float,
+        warnings: tuple[str, ...],
+        *,
+        certain: bool,
+    ) -> ItemRecord:
+        critical, counted = found.critical(self._task.wanted), found.growing_elsewhere is not None
+        return ItemRecord(
+            Status.COMPUTED,
+            warnings=warnings,
+            residual=residual,
+            stable=False if found.grows else True if counted and certain else None,
+            counted=counted,
+            growing_elsewhere=found.growing_elsewhere or 0,
+            fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),
+            searched=found.searched,
+            zeros=found.zeros,
+            eigenvalues=found.modes.eigenvalues,
+            critical=tuple(critical),
+            shares=_shares(found.modes),
+            residues=dict(residues),
+            links=(-1,) * len(found.modes.eigenvalues),
+        )
+
+    def _own_eigenvalues(self, whole: Mapping[str, Any]) -> Any:
+        parts = []
+        for c in whole.values():
+            if id(c) not in self._alone:
+                self._alone[id(c)] = c, np.linalg.eigvals(c.A_c).astype(complex)
+            parts.append(self._alone[id(c)][1])
+        return np.concatenate(parts)
+
+
+def _same(result: _Result) -> tuple[int, ...]:
+    return tuple(range(len(result.record.eigenvalues)))
+
+
+def _reference(items: list[Item], results: list[_Result], k: int) -> int | None:
+    """The item before it that is most alike: the intact network at the same point, the last intact one, or the last."""
+    done = [i for i in range(k) if results[i].found is not None]
+    same = [i for i in done if items[i].intact and items[i].point == items[k].point]
+    intact = [i for i in done if items[i].intact]
+    choice = same or intact or done
+    return choice[-1] if choice else None
+
+
+def without_references(c: Any) -> Any:
+    """A converter's linear model without the references that damping controllers act on."""
+    m = len(c.inputs) - (len(DRIVEN) if c.observed else 0)
+    return replace(c, inputs=c.inputs[:m], B_c=c.B_c[:, :m], D=c.D[:, :m], observed=())
+
+
+def _shares(modes: ModeSet) -> dict[str, Any]:
+    """Participation of every component, shape (m,)."""
+    if not len(modes.eigenvalues):
+        return {}
+    factors, shares = modes.participation(), dict[str, Any]()
+    owners = [name.partition(".")[0] for name in modes.names]
+    order = {owner: k for k, owner in enumerate(dict.fromkeys(owners))}
+    sums = np.zeros((len(factors), len(order)))
+    for k, owner in enumerate(owners):
+        sums[:, order[owner]] += factors[:, k]
+    return {owner: sums[:, k].astype(np.float32) for owner, k in order.items()} | shares
+
+
+def _residues(modes: ModeSet, whole: Mapping[str, Any]) -> dict[str, Any]:
+    """Of every converter: from its power references to its frequency, shape (2, m) [rad/s per pu and pu]."""
+    found, first, n = {}, 0, len(modes.names)
+    for name, c in whole.items():
+        last = first + len(c.states)
+        if c.observed == OBSERVED and len(modes.eigenvalues):
+            row = np.zeros(n, dtype=complex)
+            row[first:last] = c.C_o[0]
+            pair = []
+            for k in range(len(DRIVEN)):
+                column = np.zeros(n, dtype=complex)
+                column[first:last] = c.B_c[:, len(c.inputs) - len(DRIVEN) + k]
+                pair.append(residue(modes, column, row))
+            found[name] = np.array(pair).astype(np.complex64)
+        first = last
+    return found

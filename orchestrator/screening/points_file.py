@@ -1,0 +1,205 @@
+"""Operating points from a CSV file: one row each."""
+
+import fnmatch
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+from orchestrator.screening.columns import IN_SERVICE, Elements, Reading, Setting, reading_of
+
+_LABELS = ("time", "name")
+
+
+@dataclass(frozen=True)
+class OperatingCase:
+    """One operating point.
+
+    Attributes
+    ----------
+    name
+        Time or name of the row.
+    hours
+        How long the point lasts [h]; the weight in duration curves.
+    values
+        By ``component.variable``.
+    out
+        Elements out of service.
+    place
+        File and line.
+    """
+
+    name: str
+    hours: float
+    values: dict[str, Value]
+    out: tuple[str, ...]
+    place: str
+
+
+def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> list[OperatingCase]:
+    """The operating points of a file, for one scenario.
+
+    Raises
+    ------
+    InputError
+        With file and line: if a column or a cell has no meaning, a name is missing or repeated, two columns set one
+        value or switch one element, or there is no row.
+    """
+    rows = rows_of(path, ())
+    if not rows:
+        raise InputError(f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'")
+    columns = [name for name in rows[0] if name and name != PLACE]
+    label = next((name for name in _LABELS if name in columns), None)
+    if label is None:
+        raise InputError(f"{path}: column 'time' or 'name' is missing; it names the operating points")
+    meant = [name for name in columns if name not in (label, "hours")]
+    readings = {name: _reading(path, name, elements, prepared) for name in meant}
+    seen: dict[str, str] = {}
+    found = []
+    for row in rows:
+        point = _point(row, label, readings, elements, prepared)
+        if point.name in seen:
+            raise InputError(f"{point.place}: {label} = {point.name!r} stands in {seen[point.name]} already")
+        seen[point.name] = point.place
+        found.append(point)
+    return found
+
+
+def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
+    try:
+        return reading_of(column, elements, prepared)
+    except InputError as error:
+        raise InputError(f"{path}, line 1: column {column!r}: {error}") from error
+
+
+def _point(
+    row: Row, label: str, readings: dict[str, Reading], elements: Elements, prepared: PreparedScenario
+) -> OperatingCase:
+    place = place_of(row)
+    if row.get(None):  # type: ignore[call-overload]
+        raise InputError(f"{place}: the row has more cells than the first line has columns")
+    name = (row[label] or "").strip()
+    if not name:
+        raise InputError(f"{place}: {label} is empty; it names the operating point")
+    settings: dict[str, Setting] = {}
+    for column, reading in readings.items():
+        text = (row[column] or "").strip()
+        if text:
+            try:
+                settings[column] = reading(text)
+            except ValueError as error:
+                raise InputError(f"{place}: {error}") from error
+    out = tuple(dict.fromkeys(element for setting in settings.values() for element in setting.out))
+    _check_slack(out, elements, place)
+    _check_switches(settings, elements, place)
+    values = _Values(place)
+    if "generation" in settings:
+        values.take("generation", settings["generation"].values)
+    for column, setting in settings.items():
+        values.take(column, setting.values if column != "generation" else {})
+    for column, setting in settings.items():
+        if setting.fed is not None:
+            values.take(column, _fed(column, *setting.fed, out, prepared, values.found, place))
+    scale = next((setting.scale for setting in settings.values() if setting.scale is not None), None)
+    scales = {load: _scale_of(load, scale, elements, prepared, values.found, place) for load in elements.loads}
+    if scale is not None:
+        values.take("load", {f"{elements.grid}.{load}.scale": number for load, number in scales.items()})
+    for column, setting in settings.items():
+        for key, power in setting.drawn.items():
+            values.take(column, {key: _unscaled(column, power, scales[key.split(".")[-2]], place)})
+    return OperatingCase(name, _hours(row, place), values.found, out, place)
+
+
+class _Values:
+    """The values of a row, each from one column."""
+
+    def __init__(self, place: str) -> None:
+        self.found: dict[str, Value] = {}
+        self._place, self._by = place, dict[str, str]()
+
+    def take(self, column: str, values: Mapping[str, Value]) -> None:
+        """Add a column's values; a unit's own power goes before the factor of all."""
+        for key, value in values.items():
+            if self._by.get(key, "generation") != "generation":
+                raise InputError(
+                    f"{self._place}: the columns {self._by[key]} and {column} both set {key}; leave one of them empty"
+                )
+            self.found[key], self._by[key] = value, column
+
+
+def _fed(
+    column: str,
+    members: tuple[str, ...],
+    power: float,
+    out: tuple[str, ...],
+    prepared: PreparedScenario,
+    values: Mapping[str, Value],
+    place: str,
+) -> dict[str, Value]:
+    """P_0 of the units in service that together feed a power [MW]."""
+    feeding = [unit for unit in members if unit not in out]
+    if not feeding:
+        if power:
+            raise InputError(f"{place}: {column} = {power:g}, but {', '.join(members)} is out of service; write 0")
+        return {}
+    ratings = (values.get(f"{unit}.S_n", prepared.system.components[unit].number("S_n")) for unit in feeding)
+    rating = sum(float(r) for r in ratings)
+    return {f"{unit}.P_0": power / rating for unit in feeding}
+
+
+def _scale_of(
+    load: str,
+    scale: float | None,
+    elements: Elements,
+    prepared: PreparedScenario,
+    values: Mapping[str, Value],
+    place: str,
+) -> float:
+    key = f"{elements.grid}.{load}.scale"
+    if scale is not None and key in values:
+        raise InputError(f"{place}: the columns load and {key} both scale {load}; leave one of them empty")
+    own = prepared.system.components[elements.grid].number(f"{load}.scale")
+    return float(values.get(key, own)) if scale is None else scale * own
+
+
+def _unscaled(column: str, power: float, scale: float, place: str) -> float:
+    if not scale:
+        raise InputError(f"{place}: {column} = {power:g}, but the load is switched off (its scale is 0)")
+    return power / scale
+
+
+def _hours(row: Row, place: str) -> float:
+    text = (row.get("hours") or "1").strip()
+    try:
+        hours = float(text)
+    except ValueError:
+        hours = float("nan")
+    if not 0 < hours < float("inf"):
+        raise InputError(f"{place}: hours = {text!r}; it must be a number above 0: how long the point lasts")
+    return hours
+
+
+def _check_switches(settings: Mapping[str, Setting], elements: Elements, place: str) -> None:
+    """An element has one switch in a row."""
+    switched = {column.partition(".")[0]: column for column in settings if column.endswith(f".{IN_SERVICE}")}
+    for column in settings:
+        component, _, variable = column.partition(".")
+        for name, other in switched.items():
+            if (variable == "connected" and fnmatch.fnmatchcase(name, component)) or (
+                variable == f"{name}.connected" and fnmatch.fnmatchcase(elements.grid, component)
+            ):
+                raise InputError(
+                    f"{place}: the columns {other} and {column} both switch {name}; leave one of them empty"
+                )
+
+
+def _check_slack(out: tuple[str, ...], elements: Elements, place: str) -> None:
+    left = {bus for unit, bus in elements.units.items() if unit not in out}
+    if elements.slack and elements.slack not in left:
+        raise InputError(
+            f"{place}: all units at the slack bus {elements.slack} are out of service, so nothing feeds what is left; "
+            "take another slack in [power_flow]"
+        )

@@ -1,0 +1,204 @@
+"""What is kept of a stretch of a screening."""
+
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.cases.schema import Value
+from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.store import Arrays
+
+
+class Status(StrEnum):
+    """What became of an operating point with an outage."""
+
+    COMPUTED = "computed"
+    ISLANDING = "islanding"
+    POWER_FLOW = "no power flow"
+    STEADY_STATE = "no steady state"
+    VALUES = "values refused"
+    MODES = "no modes"
+    FMU = "FMU failed"
+    LOST = "worker lost"
+    INTERNAL = "internal error"
+
+
+@dataclass(frozen=True)
+class Item:
+    """An operating point with an outage.
+
+    Attributes
+    ----------
+    point, outage
+        Places in the lists of both.
+    values
+        Of the operating point, by ``component.variable``.
+    out
+        Elements out of service: the point's own and the outage's.
+    """
+
+    point: int
+    outage: int
+    values: dict[str, Value]
+    out: tuple[str, ...]
+
+    @property
+    def intact(self) -> bool:
+        """Whether no outage adds to what the point itself has out of service."""
+        return self.outage == 0
+
+
+@dataclass(frozen=True)
+class ItemRecord:
+    """What was found at one operating point with one outage.
+
+    Attributes
+    ----------
+    status, text
+        What became of it, and why.
+    stable
+        Whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a
+        limit is so close that the linear model is doubtful.
+    counted
+        Whether growing eigenvalues were counted at all frequencies.
+    growing_elsewhere
+        Number of growing eigenvalues outside of what was searched; a pair counts twice.
+    fastest
+        Real and imaginary part [rad/s] of the one of them that grows fastest; None where they were only counted.
+    searched
+        Whether the modes come from a search of their own rather than from a neighbour's.
+    zeros
+        Number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency
+        or a voltage that nothing restores.
+    eigenvalues
+        Of the modes that are followed [rad/s].
+    critical
+        Places of those that are within the range and below the damping, least damped first.
+    shares
+        Participation of every component, by its name.
+    residues
+        Of every converter, by its name: from its active and its reactive power reference to its frequency, shape
+        (2, m) [rad/s, by pu and pu].
+    reference, links
+        Place in the stretch of the item from which the modes are followed, and of each mode's predecessor there; −1
+        where there is none.
+    lasting
+        Whether computing it again would give the same.
+    """
+
+    status: Status
+    text: str = ""
+    warnings: tuple[str, ...] = ()
+    residual: float = float("nan")
+    stable: bool | None = None
+    counted: bool = False
+    growing_elsewhere: int = 0
+    fastest: tuple[float, float] | None = None
+    searched: bool = False
+    zeros: int = 0
+    eigenvalues: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    critical: tuple[int, ...] = ()
+    shares: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    residues: dict[str, NDArray[np.complex64]] = field(default_factory=dict)
+    reference: int = -1
+    links: tuple[int, ...] = ()
+    lasting: bool = True
+
+
+_IN_ARRAYS = ("eigenvalues", "shares", "residues")
+
+
+@dataclass(frozen=True)
+class StretchRecord:
+    """A stretch: its anchor, and then its items.
+
+    Attributes
+    ----------
+    items
+        The anchor first, and then what was asked for.
+    first, last
+        Modes of the anchor and of the last intact item, by which neighbouring stretches are joined; None where these
+        have none.
+    last_place
+        Place of the last intact item.
+    perturbed, reused
+        Numbers of components that were perturbed, and of those whose linear model was there already.
+    """
+
+    items: tuple[ItemRecord, ...]
+    first: ModeSet | None = None
+    last: ModeSet | None = None
+    last_place: int = 0
+    perturbed: int = 0
+    reused: int = 0
+
+    @property
+    def lasting(self) -> bool:
+        """Whether computing the stretch again would give the same."""
+        return all(item.lasting for item in self.items)
+
+    @classmethod
+    def lost(cls, task: Any, error: WorkerLostError) -> Self:
+        """The record of a stretch whose worker died."""
+        return cls(tuple(ItemRecord(Status.LOST, str(error), lasting=False) for _ in range(1 + len(task.items))))
+
+    def stored(self) -> tuple[dict[str, Any], Arrays]:
+        """Header and arrays for a `PointStore`."""
+        names = [f.name for f in fields(ItemRecord) if f.name not in _IN_ARRAYS]
+        header: dict[str, Any] = {
+            "items": [{name: getattr(item, name) for name in names} for item in self.items],
+            "shares": [list(item.shares) for item in self.items],
+            "residues": [list(item.residues) for item in self.items],
+            "last_place": self.last_place,
+            "perturbed": self.perturbed,
+            "reused": self.reused,
+            "names": [list(ends.names) if ends is not None else None for ends in (self.first, self.last)],
+        }
+        arrays: Arrays = {}
+        for k, item in enumerate(self.items):
+            arrays[f"e{k}"] = item.eigenvalues
+            arrays[f"s{k}"] = np.array(list(item.shares.values()), dtype=np.float32)
+            arrays[f"r{k}"] = np.array(list(item.residues.values()), dtype=np.complex64)
+        for end, modes in (("first", self.first), ("last", self.last)):
+            if modes is not None:
+                arrays |= {f"{end}_values": modes.eigenvalues}
+                arrays |= {f"{end}_{side}": getattr(modes, side).astype(np.complex64) for side in ("left", "right")}
+        return header, arrays
+
+    @classmethod
+    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
+        """The record that was stored in this form; None if the file has another form."""
+        try:
+            items = []
+            for k, entry in enumerate(header["items"]):
+                shares = dict(zip(header["shares"][k], arrays[f"s{k}"], strict=True))
+                residues = dict(zip(header["residues"][k], arrays[f"r{k}"], strict=True))
+                tuples = {name: tuple(entry[name]) for name in ("warnings", "critical", "links")}
+                if entry["fastest"] is not None:
+                    tuples["fastest"] = tuple(entry["fastest"])
+                items.append(ItemRecord(**entry | tuples | {"status": Status(entry["status"])},
+                                        eigenvalues=arrays[f"e{k}"], shares=shares, residues=residues))  # fmt: skip
+            first, last = (
+                _end(end, names, arrays) for end, names in zip(("first", "last"), header["names"], strict=True)
+            )
+            return cls(tuple(items), first, last, header["last_place"], header["perturbed"], header["reused"])
+        except (KeyError, TypeError, ValueError):
+            return None
+
+    @property
+    def as_kept(self) -> Self:
+        """The same with the accuracy that a file keeps, so that a kept and a new stretch are joined in the same way."""
+        found = self.restored(*self.stored())
+        assert found is not None
+        return found
+
+
+def _end(end: str, names: list[str] | None, arrays: Arrays) -> ModeSet | None:
+    """The modes at an end of a stretch, from its file."""
+    if names is None:
+        return None
+    return ModeSet(arrays[f"{end}_values"], arrays[f"{end}_left"], arrays[f"{end}_right"], tuple(names))

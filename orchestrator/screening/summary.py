@@ -1,0 +1,210 @@
+"""What a screening comes to: its modes with their worst points, durations of damping, counts, and a verdict."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.analysis.modes import damping_percent
+from orchestrator.screening.record import Status
+from orchestrator.screening.study import ScreenedItem, ScreeningResult
+
+_LEADING = 2
+_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class ModeAt:
+    """A mode at one operating point with one outage: the item, and its place there."""
+
+    item: ScreenedItem
+    place: int
+
+    @property
+    def value(self) -> complex:
+        """λ [rad/s]."""
+        return complex(self.item.record.eigenvalues[self.place])
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio [%]."""
+        return damping_percent(self.value)
+
+    @property
+    def frequency(self) -> float:
+        """Frequency [Hz]."""
+        return self.value.imag / (2 * np.pi)
+
+    def participation(self, most: int = _SHOWN) -> list[tuple[str, float]]:
+        """Components that take part most, and their factors."""
+        shares = [(name, float(values[self.place])) for name, values in self.item.record.shares.items()]
+        return sorted(shares, key=lambda entry: -entry[1])[:most]
+
+    def ranking(self, most: int | None = _SHOWN) -> list[tuple[str, complex, complex]]:
+        """Converters by what a damping controller there would move the mode, the largest first.
+
+        Returns
+        -------
+        list of tuple
+            Name, and residues from its active and its reactive power reference to its frequency [rad/s by pu on its
+            rating]. Their size is the shift of the eigenvalue by unit gain of a controller whose phase is right, as
+            long as the gain is small.
+        """
+        found = [
+            (name, complex(values[0, self.place]), complex(values[1, self.place]))
+            for name, values in self.item.record.residues.items()
+        ]
+        return sorted(found, key=lambda entry: -max(abs(entry[1]), abs(entry[2])))[:most]
+
+
+@dataclass(frozen=True)
+class ScreenedMode:
+    """A mode that was followed over a screening.
+
+    Attributes
+    ----------
+    name
+        Its frequency and who takes part most, where it is damped least.
+    worst
+        Where that is.
+    at
+        Everywhere it was critical.
+    """
+
+    name: str
+    worst: ModeAt
+    at: tuple[ModeAt, ...]
+
+    @property
+    def hours(self) -> float:
+        """How long the intact network has it among the critical ones [h]."""
+        return sum(mode.item.point.hours for mode in self.at if not mode.item.outage.elements)
+
+
+class Summary:
+    """Figures of a screening.
+
+    Parameters
+    ----------
+    result
+        All items, or those of a part.
+    """
+
+    def __init__(self, result: ScreeningResult) -> None:
+        self.result = result
+        self.counts = Counter(item.record.status for item in result.items)
+        self.unstable = [item for item in result.items if item.record.stable is False]
+        self.free = [item for item in result.items if item.record.zeros > 1]
+        self.modes = self._modes()
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
+        if self.unstable:
+            return False
+        return True if self.result.complete and all(item.record.stable for item in self.result.items) else None
+
+    @property
+    def stable_here(self) -> bool | None:
+        """The same of the items that are there: of a part alone."""
+        if self.unstable:
+            return False
+        return True if all(item.record.stable for item in self.result.items) else None
+
+    @property
+    def counted(self) -> int:
+        """Items at which growth was counted at all frequencies."""
+        return sum(item.record.counted for item in self.result.items)
+
+    def failures(self) -> Iterator[ScreenedItem]:
+        """Items that have no modes."""
+        return (item for item in self.result.items if item.record.status is not Status.COMPUTED)
+
+    def least_damped(self) -> list[ModeAt]:
+        """The least damped critical mode of every item that has one, the worst first."""
+        found = [ModeAt(item, item.record.critical[0]) for item in self.result.items if item.record.critical]
+        return sorted(found, key=lambda mode: mode.damping)
+
+    def _modes(self) -> list[ScreenedMode]:
+        followed: dict[int, list[ModeAt]] = {}
+        for item in self.result.items:
+            for place in item.record.critical:
+                followed.setdefault(item.trajectories[place], []).append(ModeAt(item, place))
+        modes = []
+        for at in followed.values():
+            worst = min(at, key=lambda mode: mode.damping)
+            who = ", ".join(name for name, _ in worst.participation(_LEADING))
+            modes.append(ScreenedMode(f"{worst.frequency:.2f} Hz ({who})", worst, tuple(at)))
+        return sorted(modes, key=lambda mode: mode.worst.damping)
+
+
+def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A damping-duration curve: for how long the damping is at most so much.
+
+    Parameters
+    ----------
+    mode
+        The mode.
+    outages
+        Whether the worst outage of each point counts, instead of the intact network.
+
+    Returns
+    -------
+    tuple of ndarray
+        Hours and damping ratios [%], both rising.
+    """
+    least: dict[str, tuple[float, float]] = {}
+    for one in mode.at:
+        if outages or not one.item.outage.elements:
+            point = one.item.point
+            known = least.get(point.name, (point.hours, np.inf))
+            least[point.name] = point.hours, min(known[1], one.damping)
+    ordered = sorted(least.values(), key=lambda entry: entry[1])
+    return np.cumsum([hours for hours, _ in ordered]), np.array([damping for _, damping in ordered])
+
+
+def as_json(summary: Summary) -> dict[str, Any]:
+    """The summary as JSON's types."""
+    result = summary.result
+    return {
+        "case": result.plan.case.name,
+        "scenario": result.plan.prepared.name,
+        "points": len(result.plan.points),
+        "outages": len(result.plan.outages) - 1,
+        "items": len(result.items),
+        "complete": result.complete,
+        "stable": summary.stable,
+        "counted_at_all_frequencies": summary.counted,
+        "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
+        "counts": {str(status): number for status, number in summary.counts.items()},
+        "unstable": [_where(item) for item in summary.unstable],
+        "failures": [_where(item) | {"status": str(item.record.status), "why": item.record.text}
+                     for item in summary.failures()],
+        "modes": [
+            {
+                "name": mode.name,
+                "worst": _where(mode.worst.item)
+                | {
+                    "real": mode.worst.value.real,
+                    "imag": mode.worst.value.imag,
+                    "frequency_hz": mode.worst.frequency,
+                    "damping_percent": mode.worst.damping,
+                },
+                "participation": dict(mode.worst.participation()),
+                "converters": [
+                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+                    for name, p, q in mode.worst.ranking()
+                ],
+                "items": len(mode.at),
+                "hours": mode.hours,
+            }
+            for mode in summary.modes
+        ],
+    }  # fmt: skip
+
+
+def _where(item: ScreenedItem) -> dict[str, Any]:
+    return {"point": item.point.name, "outage": item.outage.name, "place": item.point.place}

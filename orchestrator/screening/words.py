@@ -1,0 +1,95 @@
+"""A screening in words: its verdict, and what it rests on."""
+
+import numpy as np
+
+from orchestrator.analysis.critical_modes import DENSE
+from orchestrator.analysis.eigenvalue_count import GROWING
+from orchestrator.screening.modes import UNSTABLE
+from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.screening.study import ScreenedItem
+from orchestrator.screening.summary import ModeAt, Summary
+
+
+def verdict_sentence(summary: Summary) -> str:
+    """The verdict on all points and outages in one sentence."""
+    total = len(summary.result.items)
+    if summary.unstable:
+        worst = summary.unstable[0]
+        for one in summary.least_damped():
+            if one.item.record.stable is False:
+                worst = one.item
+                break
+        return f"UNSTABLE: {_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}"
+    computed = summary.counts[Status.COMPUTED]
+    least = summary.least_damped()[:1]
+    tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
+    if summary.free:
+        first = summary.free[0]
+        tail += (
+            f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {first.record.zeros} eigenvalues are "
+            "zero, one of them may be the free angle: nothing restores the others"
+        )
+    if summary.stable:
+        return f"stable: nothing grows at any of {total} points and outages{tail}"
+    left = summary.result.plan.number_of_items - total
+    missing = [f"{number} {status}" for status, number in summary.counts.items() if status is not Status.COMPUTED]
+    missing += [f"{left} not computed yet"] if left else []
+    if uncounted := computed - summary.counted:
+        wanted = summary.result.plan.wanted
+        missing.append(
+            f"{uncounted} were searched only from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz above -30 % damping "
+            "(--whole counts all growth)"
+        )
+    doubtful = sum(item.record.stable is None and item.record.counted for item in summary.result.items)
+    missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
+    return f"not known: nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+
+
+def what_was_counted(summary: Summary) -> str:
+    """What the verdict rests on."""
+    wanted, computed = summary.result.plan.wanted, summary.counts[Status.COMPUTED]
+    searched = sum(item.record.searched for item in summary.result.items)
+    return (
+        f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
+        f"below {100 * wanted.damping:g} % damping, of the "
+        f"system without a communication step: {searched} of {computed} items were searched from scratch, the others "
+        f"from a neighbour with a check that no mode is missed there. Growth at other frequencies was counted at "
+        f"{summary.counted} of {computed} items, in systems of more than {DENSE} states where it is faster than "
+        f"{GROWING:g} 1/s, or near 0."
+    )
+
+
+def where(item: ScreenedItem) -> str:
+    """An item in words."""
+    return f"{item.point.name}, {item.outage.name}"
+
+
+def _least(item: ScreenedItem) -> str:
+    if outside := growth_outside(item.record):
+        return f": {outside}"
+    if not item.record.critical:
+        return ""
+    one = ModeAt(item, item.record.critical[0])
+    who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
+    return f": {one.frequency:.3f} Hz, {one.damping:.2f} % ({who})"
+
+
+def growth_outside(record: ItemRecord) -> str:
+    """What grows beside the critical modes, how fast if that is known, and at which frequency; "" if nothing does."""
+    followed = np.delete(record.eigenvalues, record.critical)
+    known = followed[followed.real > UNSTABLE].tolist()
+    number = record.growing_elsewhere + 2 * len(known)
+    if not number:
+        return ""
+    text = f"{number} eigenvalue{'s grow' if number > 1 else ' grows'} outside of the range"
+    if record.fastest is not None:
+        known.append(complex(*record.fastest))
+    elif record.growing_elsewhere:
+        return f"{text}; `gfor modes` shows how fast"
+    fastest = max(known, key=lambda value: value.real)
+    at = f"at {fastest.imag / (2 * np.pi):.3g} Hz" if fastest.imag else "without an oscillation"
+    return f"{text}, {'the fastest ' if number > 2 else ''}by {fastest.real:.3g} 1/s {at}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("s" if number != 1 else "")

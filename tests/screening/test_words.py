@@ -1,0 +1,86 @@
+"""What is said of growth beside the critical modes, of warnings, and of the scenario."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.points.serial import Serial
+from orchestrator.points.store import PointStore
+from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.screening.study import plan_screening, run_screening
+from orchestrator.screening.summary import Summary
+from orchestrator.screening.tables import remarks
+from orchestrator.screening.words import growth_outside, verdict_sentence, what_was_counted
+
+
+@pytest.mark.parametrize(
+    ("eigenvalues", "number", "fastest", "said"),
+    [
+        ([-1 + 5j], 0, None, ""),
+        ([-1 + 5j], 1, (0.25, 0.0), "1 eigenvalue grows outside of the range, by 0.25 1/s without an oscillation"),
+        ([-1 + 5j], 2, (0.5, 4 * np.pi), "2 eigenvalues grow outside of the range, by 0.5 1/s at 2 Hz"),
+        ([-1 + 5j], 2, None, "2 eigenvalues grow outside of the range; `gfor modes` shows how fast"),
+        ([-1 + 5j, 0.1 + 15j], 0, None, "2 eigenvalues grow outside of the range, by 0.1 1/s at 2.39 Hz"),
+        ([-1 + 5j, 0.1 + 15j], 2, (0.5, 4 * np.pi), "4 eigenvalues grow outside of the range, the fastest by 0.5 "
+         "1/s at 2 Hz"),
+    ],
+)  # fmt: skip
+def test_growth_outside_has_its_rate(eigenvalues, number, fastest, said):
+    record = ItemRecord(
+        Status.COMPUTED, eigenvalues=np.array(eigenvalues), critical=(0,), growing_elsewhere=number, fastest=fastest
+    )
+    assert growth_outside(record) == said
+
+
+@pytest.fixture(scope="module")
+def screened(tmp_path_factory):
+    """The growing mode at 0.57 Hz lies below the range."""
+    folder = tmp_path_factory.mktemp("words")
+    path = folder / "points.csv"
+    path.write_text("name,gfor.in_service,grid.load_2.P\nin,1,\nout,0,1250 MW\n")
+    wanted = replace(plan_screening(load_case("two_area"), path, None, "gfor").wanted, lowest_hz=1.0)
+    plan = plan_screening(load_case("two_area"), path, None, "gfor", wanted=wanted)
+    for _ in range(2):  # computed, and then kept
+        result = run_screening(plan, Serial(), PointStore(folder / "points"))
+    return result
+
+
+def test_the_verdict_says_how_fast_the_worst_point_grows(screened):
+    sentence = verdict_sentence(Summary(screened))
+    assert sentence.startswith(
+        "UNSTABLE: 1 item of 2; worst: out, intact: 2 eigenvalues grow outside of the range, by "
+    )
+    assert sentence.endswith(" 1/s at 0.572 Hz")
+
+
+def test_the_scenario_is_named(screened):
+    assert what_was_counted(Summary(screened)).startswith("Scenario gfor: modes from 1 to 2 Hz")
+
+
+def test_a_warning_names_its_first_point(screened):
+    items = [replace(item, record=replace(item.record, warnings=("a limit is close",))) for item in screened.items]
+    (text,) = remarks(Summary(replace(screened, items=items)))
+    assert text == "at 2 of 2, first at in, intact: a limit is close"
+
+
+def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
+    """In a large system growth elsewhere is counted at the ends of stretches only."""
+    calm = next(item for item in screened.items if item.record.stable)
+    uncounted = replace(calm, record=replace(calm.record, stable=None, counted=False))
+    summary = Summary(replace(screened, items=[calm, uncounted]))
+    assert summary.stable is None
+    assert "1 were searched only from 1 to 2 Hz above -30 % damping (--whole" in verdict_sentence(summary)
+
+
+@pytest.mark.parametrize(("counted", "stable"), [(True, True), (False, None)])
+def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_path, counted, stable):
+    monkeypatch.setattr("orchestrator.screening.modes.DENSE", 0)
+    if not counted:
+        monkeypatch.setattr("orchestrator.screening.modes._elsewhere", lambda *_: None)
+    path = tmp_path / "points.csv"
+    path.write_text("name,gfor.in_service\nin,1\n")
+    plan = plan_screening(load_case("two_area"), path, None, "gfor")
+    (item,) = run_screening(plan, Serial(), PointStore(tmp_path / "points")).items
+    assert (item.record.stable, item.record.counted) == (stable, counted)
