@@ -1,0 +1,1 @@
+"""How each parameter of each FMU moves a mode: ∂λ/∂p."""

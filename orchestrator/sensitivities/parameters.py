@@ -1,0 +1,110 @@
+"""Which parameters of a running system a mode can be differentiated by."""
+
+import fnmatch
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from orchestrator.cases.names import close_names
+from orchestrator.coupling.master import Master
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import VariableInfo
+
+SHARE = 0.01
+"""Part of a parameter for which effects "per percent" are given."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A Real parameter of a component.
+
+    Attributes
+    ----------
+    unit
+        As the FMU declares it; "1" for a plain number.
+    value
+        At the operating point, in ``unit``.
+    tunable
+        Whether the FMU takes a change while it runs; a fixed one is set before the start only.
+    minimum, maximum
+        Declared bounds; None without.
+    """
+
+    component: str
+    variable: str
+    unit: str
+    value: float
+    tunable: bool
+    minimum: float | None = None
+    maximum: float | None = None
+
+    @property
+    def name(self) -> str:
+        """``component.variable``."""
+        return f"{self.component}.{self.variable}"
+
+    @property
+    def scale(self) -> float:
+        """Size that steps and percents are related to: |value|, or 1 of its unit where it is 0."""
+        return abs(self.value) or 1.0
+
+    def allows(self, change: float) -> bool:
+        """Whether the declared bounds leave room for a change."""
+        changed = self.value + change
+        above = self.minimum is None or changed >= self.minimum
+        return above and (self.maximum is None or changed <= self.maximum)
+
+
+def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool = False) -> list[Parameter]:
+    """The Real parameters of all components that are asked for.
+
+    Parameters
+    ----------
+    master
+        Initialised: it gives the values.
+    patterns
+        Names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without patterns all
+        tunable ones are taken.
+    fixed
+        Without patterns, take the fixed ones as well.
+
+    Raises
+    ------
+    InputError
+        If a pattern fits nothing that a mode can be differentiated by.
+    """
+    everything = {
+        f"{component}.{info.name}": (component, info)
+        for component, running in master.components.items()
+        for info in running.description.variables.values()
+        if info.causality == "parameter"
+    }
+    real = {name: found for name, found in everything.items() if found[1].type == "Real"}
+    for pattern in patterns:
+        _check_fits(pattern, everything, real)
+    chosen = {
+        name: (component, info)
+        for name, (component, info) in real.items()
+        if (any(fnmatch.fnmatchcase(name, p) for p in patterns) if patterns else fixed or info.variability == "tunable")
+    }
+    return [_parameter(master, component, info) for component, info in chosen.values()]
+
+
+def _check_fits(
+    pattern: str, everything: dict[str, tuple[str, VariableInfo]], real: dict[str, tuple[str, VariableInfo]]
+) -> None:
+    if any(fnmatch.fnmatchcase(name, pattern) for name in real):
+        return
+    for name, (_, info) in everything.items():
+        if fnmatch.fnmatchcase(name, pattern):
+            raise InputError(
+                f"--parameter {pattern}: {name} is of type {info.type}, by which nothing can be differentiated; "
+                "name a Real parameter"
+            )
+    hint = close_names(pattern, real, "`gfor info` lists the parameters of an FMU")
+    raise InputError(f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}")
+
+
+def _parameter(master: Master, component: str, info: VariableInfo) -> Parameter:
+    value = master.components[component].get([info.name])[info.name]
+    tunable = info.variability == "tunable"
+    return Parameter(component, info.name, info.unit or "1", value, tunable, info.minimum, info.maximum)
