@@ -27,6 +27,7 @@ _SHOWN = 4
 def mark_of(prepared: PreparedScenario) -> dict[str, str]:
     """Everything that the values of a run depend on, by name."""
     groups = " | ".join(", ".join(group) for group in prepared.schedule.groups)
+    tolerance = "" if prepared.schedule.tolerance is None else f", tolerance {prepared.schedule.tolerance:g}"
     found = {
         "gfor-cosim": version("gfor-cosim"),
         **library_versions(),
@@ -36,7 +37,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         _CASE: _digest(prepared.case.text),
         "the communication step": f"{prepared.step_size!r} s",
         "the stop time": f"{prepared.stop_time!r} s",
-        "the schedule": f"{prepared.schedule.name}: {groups}",
+        "the schedule": f"{prepared.schedule.name}: {groups}{tolerance}",
         _EVENTS: "; ".join(map(str, prepared.events)),
         "what is recorded": f"every {prepared.record_every} steps, "
         f"{'filtered' if prepared.record_filtered else 'as it is'}: {', '.join(prepared.record)}",

@@ -36,7 +36,15 @@ _SHORT = 10.0
 
 
 def not_kept(prepared: PreparedScenario) -> dict[str, str]:
-    """Components whose state cannot be kept, each with the reason."""
+    """Components whose state cannot be kept, each with the reason; under ``newton`` and with a tolerance one stands for
+    all.
+    """
+    if prepared.schedule.tolerance is not None:
+        first = next(iter(prepared.system.components))
+        return {first: "with a tolerance nothing is kept, as the length of the next step is not"}
+    if prepared.schedule.coupling == "newton":
+        first = next(iter(prepared.system.components))
+        return {first: "under the schedule newton nothing is kept, as the derivatives of its steps are not"}
     reasons = {name: why_not_kept(plan.description) for name, plan in prepared.system.components.items()}
     return {name: reason for name, reason in reasons.items() if reason is not None}
 

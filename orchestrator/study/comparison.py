@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
+from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, interval_used
+from orchestrator.analysis.mode_doubts import COARSER, SHORTER, with_doubts, worth_showing
+from orchestrator.analysis.window_halves import WindowPart, part_of
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
@@ -145,15 +147,39 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
 def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None) -> list[IdentifiedMode]:
     """What a signal rings with between two times [s], strongest first; see `identify_modes`.
 
-    What has less than a thousandth of the strongest's amplitude is left out.
+    What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
+    on. Each mode has its doubts.
     """
     window = curve.sel(time=slice(start, stop))
+    found = _modes_of(window)
+    begin, end = float(window["time"][0]), float(window["time"][-1])
+    try:
+        others = _modes_of(window.sel(time=slice(begin + SHORTER * (end - begin), None)), COARSER)
+    except AnalysisError:
+        others = None
+    middle = (begin + end) / 2
+    halves = [_part(window.sel(time=side)) for side in (slice(None, middle), slice(middle, None))]
+    whole = part_of(window["time"].values, window.values, found)
+    kept = worth_showing(found, end - begin, _WEAKEST)
+    return with_doubts(kept, end - begin, others, halves, whole.noise_like)
+
+
+def _part(window: xr.DataArray) -> WindowPart:
+    """A part of a signal with its own modes, none where they cannot be identified."""
+    try:
+        modes = _modes_of(window)
+    except AnalysisError:
+        modes = []
+    return part_of(window["time"].values, window.values, modes)
+
+
+def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
+    """Modes of a part of a signal; ``coarser`` is a factor of what is taken for noise."""
     if is_measured(window):
-        found = measured_modes(window)
-        return [m for m in found if m.amplitude >= _WEAKEST * found[0].amplitude]
+        return measured_modes(window, coarser)
     # Oscillations are small beside the value that they are around, and would count as noise beside it.
-    found = identify_modes(window["time"].values, window.values - float(window.mean()))
-    return [m for m in found if m.amplitude >= _WEAKEST * found[0].amplitude]
+    deviation = window.values - float(window.mean())
+    return identify_modes(window["time"].values, deviation, tolerance=coarser * TOLERANCE)
 
 
 def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:

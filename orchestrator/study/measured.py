@@ -30,7 +30,7 @@ def is_measured(curve: xr.DataArray) -> bool:
     return LINE_FREQUENCY in curve.coords
 
 
-def measured_modes(window: xr.DataArray) -> list[IdentifiedMode]:
+def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
     """The modes of a measured signal.
 
     Where samples are dense they are averaged before they are thinned out, so that a faster oscillation does not appear
@@ -40,6 +40,8 @@ def measured_modes(window: xr.DataArray) -> list[IdentifiedMode]:
     ----------
     window
         The part of the signal that is a free response.
+    coarser
+        Factor of what is taken for noise.
 
     Raises
     ------
@@ -52,11 +54,11 @@ def measured_modes(window: xr.DataArray) -> list[IdentifiedMode]:
     thin = round(interval_used(times) / _interval(times))
     half = 2 * thin
     if thin <= 1 or len(values) <= 2 * half + 1:
-        return identify_modes(times, deviation, tolerance=_noise(deviation[::thin]))
+        return identify_modes(times, deviation, tolerance=coarser * _noise(deviation[::thin]))
     weights = np.asarray(np.hanning(2 * half + 3)[1:-1], dtype=float)
     weights = weights / weights.sum()
     smooth = np.convolve(deviation, weights, mode="valid")[::thin]
-    found = identify_modes(times[half : len(times) - half : thin], smooth, tolerance=_noise(smooth))
+    found = identify_modes(times[half : len(times) - half : thin], smooth, tolerance=coarser * _noise(smooth))
     lags: Numbers = np.asarray((np.arange(len(weights)) - half) * _interval(times), dtype=np.float64)
     passed = [
         IdentifiedMode(m.eigenvalue, m.amplitude / _gain(m.eigenvalue, weights, lags, half * _interval(times)))

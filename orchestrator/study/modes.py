@@ -3,8 +3,9 @@
 import fnmatch
 import math
 from cmath import phase
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,19 @@ import numpy as np
 from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.examination import examine
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
-from orchestrator.analysis.linearization import Blocks, compose, continuous_model
+from orchestrator.analysis.linearization import Blocks, continuous_model
+from orchestrator.analysis.mode_names import Measure, Naming, name_modes, opposition
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
     HIGHEST_SWING_HZ,
     Mode,
     Spectrum,
     find_spectrum,
-    most_associated,
-    most_opposed,
 )
-from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
+from orchestrator.analysis.periodic import model_of
+from orchestrator.analysis.stability import WHOLE, Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
+from orchestrator.analysis.threads import beside
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.fault_tables import component_faults
@@ -135,8 +137,17 @@ def compute_modes(
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
 
-def running(prepared: PreparedScenario, federation: Federation | None = None) -> Master:
+def running(prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1) -> Master:
     """The scenario's FMUs, initialised; those of a federation still in this process.
+
+    Parameters
+    ----------
+    prepared
+        The scenario.
+    federation
+        The federates that take part.
+    threads
+        As `orchestrator.coupling.master.Master`.
 
     Raises
     ------
@@ -145,7 +156,7 @@ def running(prepared: PreparedScenario, federation: Federation | None = None) ->
     """
     opener = open_plan if federation is None else federation.open
     try:
-        return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener)
+        return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener, threads)
     except ComponentError as error:
         raise start_error(prepared, error) or error from error
 
@@ -199,26 +210,29 @@ def modes_from(
     frequency_range, critical
         As for `modes_of`.
     """
-    model = compose(blocks, master.schedule)
+    model = model_of(master, blocks)
     system = continuous_model(master, blocks)
     low, high = frequency_range
-    if critical is None:
-        # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
-        first, last = min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
-        everything = find_spectrum(model, first, max(last, HIGHEST_SWING_HZ))
-        spectrum: Spectrum | None = everything
-        oscillating = [mode for mode in everything.modes if mode.is_oscillation]
-        swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
-        shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
-        candidates = named_modes(prepared.case, model, swinging)
-        named = {name: mode for name, mode in candidates.items() if low <= mode.frequency_hz <= high}
-    else:
-        spectrum = whole_spectrum(model)
-        swinging = shown = find_critical_modes(model, low, high, critical)
-        named, oscillating = {}, []
+    # Each of the two spectra takes seconds in a large system.
+    with beside(_spectrum_of(system)) as of_system:
+        if critical is None:
+            # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
+            first, last = min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
+            everything = find_spectrum(model, first, max(last, HIGHEST_SWING_HZ))
+            spectrum: Spectrum | None = everything
+            oscillating = [mode for mode in everything.modes if mode.is_oscillation]
+            swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
+            shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
+            naming = named_modes(prepared.case, model, swinging)
+            named = {name: mode for name, mode in naming.named.items() if low <= mode.frequency_hz <= high}
+        else:
+            spectrum = whole_spectrum(model)
+            swinging = shown = find_critical_modes(model, low, high, critical)
+            naming, named, oscillating = Naming({}, ()), {}, []
     examined = examine(
-        master, blocks, model, system, spectrum=spectrum, modes=swinging, shown=shown, frequency_range=frequency_range
-    )
+        master, blocks, model, system, spectrum=spectrum, of_system=of_system.result(), modes=swinging, shown=shown,
+        frequency_range=frequency_range,
+    )  # fmt: skip
     stability = examined.stability
     analysis = prepared.case.table.analysis
     own = prepared.case.scenarios[prepared.name].events
@@ -233,6 +247,7 @@ def modes_from(
         warnings=(
             *map(str, prepared.questions),
             *examined.warnings,
+            *naming.doubts,
             *(f"{fault}: the modes are those before it" for fault in failing),
         ),
         swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
@@ -251,6 +266,18 @@ def modes_from(
         system=system,
         fit_errors={name: c.disagreement for name, c in blocks.components.items() if c.source == IDENTIFIED},
     )
+
+
+def _spectrum_of(system: LinearModel | None) -> Callable[[], Spectrum | None]:
+    """What gives all eigenvalues of the continuous model.
+
+    The matrix is formed here: in a small system SciPy's `eig` lets no other thread of Python run, so that the other
+    spectrum must be on its way, in NumPy's `eigvals`, before that begins.
+    """
+    if system is None or len(system.names) > WHOLE:
+        return lambda: None
+    _ = system.A
+    return lambda: whole_spectrum(system)
 
 
 def _is_swing(mode: Mode, speeds: Sequence[str]) -> bool:
@@ -280,21 +307,26 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
     )
 
 
-def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> dict[str, Mode]:
-    """The modes whose shape the case describes."""
+def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> Naming:
+    """The modes whose shape the case describes, and what it describes without a clear answer."""
+    return modes_named(case, model.names, modes)
+
+
+def modes_named(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Naming:
+    """The same, from the names of the states alone."""
 
     def states(patterns: Sequence[str]) -> list[str]:
-        return [name for name in model.names if any(fnmatch.fnmatch(name, p) for p in patterns)]
+        return [name for name in names if any(fnmatch.fnmatch(name, p) for p in patterns)]
 
-    found = {}
+    measures: dict[str, Measure] = {}
     for table in case.table.analysis.modes:
         if table.against is not None:
-            mode = most_opposed(modes, *(states(side) for side in table.against))
+            side, other = (states(patterns) for patterns in table.against)
+            measures[table.name] = partial(opposition, side=side, other=other)
         else:
-            mode = most_associated(modes, states(table.states)) if states(table.states) else None
-        if mode is not None:
-            found[table.name] = mode
-    return found
+            measures[table.name] = partial(Mode.participation_of, states=states(table.states))
+    opposed = {table.name for table in case.table.analysis.modes if table.against is not None}
+    return name_modes(modes, measures, opposed)
 
 
 def modes_json(results: Sequence[ModesResult]) -> Mapping[str, Any]:

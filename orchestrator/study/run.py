@@ -117,6 +117,7 @@ def run_scenario(
     recording: RecordingFolder | None = None,
     checkpoints: Checkpoints | None = None,
     federates: Federates | None = None,
+    threads: int | None = 1,
 ) -> RunResult:
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
@@ -140,19 +141,21 @@ def run_scenario(
         Keep the run while it goes on, and go on from the newest where one was left; not with federates.
     federates
         Components that run as federates at HELICS.
+    threads
+        As `orchestrator.coupling.master.Master`.
     """
     if federates is not None:
         if federates.announce is not None:
             observers = [*observers, Pace(federates.announce)]
         with Federation(prepared, federates) as federation:
-            return _run(federation.prepared, frequency_range, observers, linear, recording, None, federation)
+            return _run(federation.prepared, frequency_range, observers, linear, recording, None, threads, federation)
     try:
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints)
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads)
     except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints)
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads)
 
 
 def _run(
@@ -162,13 +165,14 @@ def _run(
     linear: bool,
     recording: RecordingFolder | None,
     checkpoints: Checkpoints | None,
+    threads: int | None,
     federation: Federation | None = None,
 ) -> RunResult:
     """See `run_scenario`.
 
     Parameters
     ----------
-    prepared, frequency_range, observers, linear, recording, checkpoints
+    prepared, frequency_range, observers, linear, recording, checkpoints, threads
         As there.
     federation
         The federates that take part.
@@ -176,7 +180,7 @@ def _run(
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
-    with running(prepared, federation) as master:
+    with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
@@ -258,7 +262,9 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
         exact = nearest_eigenvalue(modes.system, modes.electromechanical.eigenvalue)
     except AnalysisError:
         return []
-    schedules = {"jacobi": jacobi(tuple(master.components)), master.schedule.name: master.schedule}
+    schedules = {master.schedule.name: master.schedule}
+    if not master.schedule.is_second_order:  # else components are not told the step, as they would be under jacobi
+        schedules["jacobi"] = jacobi(tuple(master.components))
     shifts = []
     for part in STEPS:
         step_size = part * master.clock.step_size

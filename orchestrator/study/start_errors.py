@@ -29,8 +29,8 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError 
         )
         if computed:
             text += (
-                f". Where that is too much for it, raise {_rating(prepared, name)}, or change the voltages or loads "
-                "around it; Q_0 is a result and cannot be set"
+                f". Where that is too much for it, raise {_rating(prepared, name)}, change the voltages or loads "
+                "around it, or give a component its Q_0 in place of v_0"
             )
     return CaseError(str(prepared.case.path), [Problem(prepared.places[name], text)])
 

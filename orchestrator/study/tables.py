@@ -146,7 +146,7 @@ def mode_shifts(results: Sequence[RunResult]) -> Table:
 
 def run_statistics(results: Sequence[RunResult]) -> Table:
     """Speed, and where the time went."""
-    table = make_table("Run", "Scenario", "Steps", "Steps/s", "Inside FMUs", "Of each FMU")
+    table = make_table("Run", "Scenario", "Steps", "Steps/s", "× real time", "Threads", "Inside FMUs", "Of each FMU")
     for r in results:
         if r.statistics:
             s = r.statistics
@@ -155,6 +155,8 @@ def run_statistics(results: Sequence[RunResult]) -> Table:
                 r.modes.prepared.title,
                 str(s.steps),
                 f"{s.steps_per_second:,.0f}",
+                f"{s.real_time_factor:.3g}",
+                str(s.threads),
                 f"{s.share_in_fmus:.0%}",
                 first_few(shares, share_text),
             )

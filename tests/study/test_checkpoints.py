@@ -59,7 +59,8 @@ def prepared_scenario(kind="python-backed", stop=STOP, values=None):
 def told(result):
     """All of a run but the figures of its speed."""
     summary = summary_of(result)
-    del summary["steps_per_second"], summary["share_in_fmus"]
+    for speed in ("steps_per_second", "share_in_fmus", "real_time_factor", "threads"):
+        del summary[speed]
     values = {str(name): result.dataset[name].values.tobytes() for name in result.dataset.variables}
     return summary, values, result.findings
 

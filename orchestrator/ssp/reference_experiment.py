@@ -1,0 +1,193 @@
+"""An FMU's own test inside the FMU: a smoke test with parameters, stimuli, reference results and the first state.
+
+The files stand in the folder of FMI's layered standard LS-REF (Modelica Association, fmi-ls-ref), which says what each
+is for. The experiment has the form of ma-hs-experiments, the parameters that of SSP. Both are drafts.
+"""
+
+import csv
+import hashlib
+import io
+import sys
+from pathlib import Path
+from platform import machine as machine_of
+from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
+
+from orchestrator.fmi.component import Component
+from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.fmi.instance import open_component
+from orchestrator.ssp.names import PARAMETER_SET_TYPE, SSP_VERSION, tag
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+"""Where LS-REF has its files."""
+
+VERSION = "1.0.0-beta.1"
+"""Of LS-REF."""
+
+TOLERANCE = 1e-9
+"""Relative to the largest value of an output: what another compiler's mathematics may change."""
+
+_LS = "http://fmi-standard.org/fmi-ls-manifest"
+_STEP, _STEPS, _JUMP_AT, _JUMP = 1e-4, 200, 50, 0.01
+
+register_namespace("fmi-ls", _LS)
+
+
+def reference_members(path: Path) -> dict[str, bytes]:
+    """Run a smoke test of an FMU for this machine, and return its files by their path in the archive.
+
+    Parameters
+    ----------
+    path
+        The FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at least)
+        higher.
+
+    Raises
+    ------
+    ComponentError
+        If the FMU does not run.
+    """
+    description = read_description(path)
+    stimuli, references, state = _run(description)
+    platform = platform_of(description.fmi_version)
+    files = {
+        "parameters.ssv": _parameters(description),
+        "stimuli.csv": stimuli,
+        "references.csv": references,
+        "smoke-test.exp": _experiment(),
+    } | ({f"steady-state.{platform}.bin": state} if state else {})
+    members = {"fmi-ls-manifest.xml": _manifest(files)} | files
+    return {f"{FOLDER}/{name}": content for name, content in members.items()}
+
+
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+_SYSTEMS = {"win32": "windows"}
+_PLATFORMS_2 = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
+
+
+def platform_of(fmi_version: str) -> str:
+    """Name of this machine in a version of FMI."""
+    if fmi_version == "2.0":
+        return _PLATFORMS_2.get(sys.platform, sys.platform)
+    machine = machine_of().lower()
+    return f"{_MACHINES.get(machine, machine)}-{_SYSTEMS.get(sys.platform, sys.platform)}"
+
+
+def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
+    """Stimuli and references as CSV, and the serialised state after initialisation."""
+    variables = description.variables.values()
+    inputs = {v.name: float(v.start or 0) for v in variables if v.causality == "input" and v.type == "Real"}
+    outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
+    given, seen = [["time", *inputs]], [["time", *outputs]]
+    with open_component("smoke_test", description) as component:
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        component.set(dict(inputs))
+        component.exit_initialization_mode()
+        state = _serialised(component) if description.can_serialize_state else b""
+        seen.append(_row(0.0, component, outputs))
+        for k in range(_STEPS):
+            time = k * _STEP
+            if k == _JUMP_AT and inputs:
+                first = next(iter(inputs))
+                inputs[first] += _JUMP * max(1.0, abs(inputs[first]))
+            given.append([repr(time), *map(repr, inputs.values())])
+            component.set(dict(inputs))
+            component.step(time, _STEP)
+            seen.append(_row((k + 1) * _STEP, component, outputs))
+    return _csv(given), _csv(seen), state
+
+
+def _serialised(component: Component) -> bytes:
+    state = component.save_state()
+    try:
+        return component.serialize_state(state)
+    finally:
+        component.free_state(state)
+
+
+def _row(time: float, component: Component, names: list[str]) -> list[str]:
+    values = component.values(names)
+    return [repr(time), *(repr(float(values[name])) for name in names)]
+
+
+def _csv(rows: list[list[str]]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()
+
+
+def _parameters(description: FmuDescription) -> bytes:
+    """Every parameter at its start value."""
+    root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name="smoke test")
+    listed = SubElement(root, tag("ssv:Parameters"))
+    for v in description.variables.values():
+        if v.causality == "parameter" and v.start is not None:
+            entry = SubElement(listed, tag("ssv:Parameter"), name=v.name)
+            value = str(v.start).lower() if v.type == "Boolean" else repr(v.start)
+            SubElement(entry, tag(f"ssv:{v.type}"), value=value)
+    return _text(root)
+
+
+def _experiment() -> bytes:
+    root = Element("Experiments", name="Smoke test")
+    experiment = SubElement(
+        root,
+        "Experiment",
+        name="smoke test",
+        description="From the start values; the first input rises. References are outputs read after each step, before "
+        "the next inputs are set. The tolerance is relative to an output's largest value.",
+        tolerance=repr(TOLERANCE),
+    )
+    times = {"startTime": "0.0", "stopTime": repr(_STEPS * _STEP), "stepSize": repr(_STEP)}
+    SubElement(experiment, "TransientSimulation", times)
+    for name, source in (
+        ("Parameters", "parameters.ssv"),
+        ("Stimuli", "stimuli.csv"),
+        ("References", "references.csv"),
+    ):
+        SubElement(experiment, name, source=source)
+    return _text(root)
+
+
+def _manifest(files: dict[str, bytes]) -> bytes:
+    root = Element(
+        "fmiReferences",
+        {
+            f"{{{_LS}}}fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+            f"{{{_LS}}}fmi-ls-version": VERSION,
+            f"{{{_LS}}}fmi-ls-description": "Layered Standard providing information on related files included in an "
+            "FMU.",
+        },
+    )
+    for name, content in files.items():
+        type_, role, text = _purpose(name)
+        digest = hashlib.sha3_256(content).hexdigest()
+        attributes = {"type": type_, "source": name, "role": role, "description": text, "checksum": digest}
+        SubElement(root, "Related", attributes)
+    return _text(root)
+
+
+def _purpose(name: str) -> tuple[str, str, str]:
+    """Type, role and description of a file."""
+    match name.rpartition(".")[2]:
+        case "ssv":
+            return PARAMETER_SET_TYPE, "parameter", "Parameters of the smoke test"
+        case "exp":
+            return (
+                "application/x-ma-hs-experiments",
+                "experiment/smoke-test",
+                "Short run that shows whether a tool works",
+            )
+        case "bin":
+            platform = name.split(".")[1]
+            return "application/octet-stream", f"serialized-state/{platform}", "State after initialisation"
+        case _:
+            if name.startswith("stimuli"):
+                return "text/csv", "other", "Inputs of the smoke test at each step"
+            return "text/csv", "result", "Reference results of the smoke test"
+
+
+def _text(root: Element) -> bytes:
+    indent(root)
+    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
