@@ -96,6 +96,10 @@ class NotFiniteError(ComponentError):
         super().__init__(component, "fmi2GetReal", "not a number", said, time)
 
 
+class CouplingError(CosimError):
+    """The components of a step do not come to an agreement."""
+
+
 class EndedError(CosimError):
     """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s].
 

@@ -46,6 +46,9 @@ from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection, missing
 
+CRASH, _LAST = "crash", 3
+"""Fault of a process that dies; how many checks before it are named."""
+
 _PATIENCE = 10
 """A check may take this many times the limit for one call."""
 
@@ -238,6 +241,7 @@ class _Runner:
     def __init__(self, report: AcceptanceReport, subject: Subject, limits: Limits) -> None:
         self._report, self._subject, self._limits = report, subject, limits
         self._process: FmuProcess | None = None
+        self._asked: list[str] = []
         self._deadline = 0.0
         subject.process = self.process
 
@@ -247,6 +251,7 @@ class _Runner:
             self.close()
             subject = self._subject
             self._process = FmuProcess(subject.description, subject.directory, self._limits)
+            self._asked = []
             self._report.protections = self._process.protections
         self._process.deadline = self._deadline
         return self._process
@@ -256,10 +261,25 @@ class _Runner:
         for place, name in enumerate(names):
             self._deadline = monotonic() + _PATIENCE * self._limits.seconds
             result = self._answer(CHECKS[name])
-            results.append(result)
+            results.append(self._with_whom(result))
+            self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):
                 results += [not_applicable(later, because) for later in names[place + 1 :]]
                 return
+
+    def _with_whom(self, result: CheckResult) -> CheckResult:
+        """A crash, with the checks before it where it does not come without them.
+
+        A call that damages the FMU's memory is often survived; the process then ends in a later one.
+        """
+        before = self._asked
+        if result.fault != CRASH or not before or self._process is None or self._process.alive:
+            return result
+        self._deadline = monotonic() + _PATIENCE * self._limits.seconds
+        if self._answer(CHECKS[result.check]).fault == CRASH:
+            return result
+        says = f"not so in a new process: what came before it, {', '.join(before[-_LAST:])}, damaged the FMU's memory"
+        return replace(result, evidence=f"{result.evidence}; {says}")
 
     def _too_bad(self, result: CheckResult) -> str:
         """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""

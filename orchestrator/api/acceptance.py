@@ -12,6 +12,7 @@ from orchestrator.api.values import path as path_of
 from orchestrator.cases.use import use_in_case
 from orchestrator.errors import InputError
 from orchestrator.fmi.limits import LEAST_MEMORY, Limits
+from orchestrator.fmi.vendor_files import as_fmu
 
 DataFrame = Any
 """``pandas.DataFrame``; importing the class takes 0.3 s, which ``gfor check`` saves."""
@@ -150,7 +151,7 @@ def check(
     elif component or scenario:
         kind, name = ("component", component) if component else ("scenario", scenario)
         raise InputError(f"{kind} = {name!r} names a {kind} of a case; give case as well")
-    return Acceptance(check_fmu(file, bound_by, limits, names(only, "only"), use=use))
+    return Acceptance(check_fmu(as_fmu(file), bound_by, limits, names(only, "only"), use=use))
 
 
 def _limits(time_limit: Time | None, memory_limit: float | str | None) -> Limits:

@@ -8,20 +8,41 @@ from typing import Any, Unpack
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.coordinated_design import WORKERS_IMPORT as COORDINATED_IMPORT
+from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
+from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.executors import choose_executor
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
+from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
+from orchestrator.api.screening import Screening
+from orchestrator.api.screening import compute as screened
 from orchestrator.api.show import page
 from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
-from orchestrator.api.values import Names, Paths, Time, case_values, flag, in_seconds, parameter_files, text_or_none
+from orchestrator.api.values import (
+    Names,
+    Paths,
+    Time,
+    case_values,
+    flag,
+    frequency_range,
+    in_seconds,
+    parameter_files,
+    text_or_none,
+)
+from orchestrator.api.values import names as names_given
 from orchestrator.api.values import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
+from orchestrator.coordinated_design.study import plan_points_design
+from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
+from orchestrator.screening.modes import CriticalRegion
+from orchestrator.screening.study import plan_screening
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -102,6 +123,8 @@ class Case:
         *,
         step: Time | None = None,
         parameters: Paths = (),
+        schedule: ScheduleName | None = None,
+        tolerance: float | None = None,
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
@@ -118,6 +141,11 @@ class Case:
             Communication step [s]; the case's by default.
         parameters
             Parameter files, as ``gfor design`` writes them; ``values`` go before them.
+        schedule
+            ``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default.
+        tolerance
+            Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
+            0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
 
         Raises
         ------
@@ -136,7 +164,10 @@ class Case:
             raise InputError(
                 f"{self.name}: the case has {len(self.scenarios)} scenarios; choose one of: {', '.join(self.scenarios)}"
             )
-        (chosen,) = choose(self.file, [name] if name else [], values, step=step, parameters=parameters)
+        names = [name] if name else []
+        (chosen,) = choose(
+            self.file, names, values, step=step, parameters=parameters, schedule=schedule, tolerance=tolerance
+        )
         question([chosen.prepared])
         return chosen
 
@@ -148,6 +179,8 @@ class Case:
         step: Time | None = None,
         stop: Time | None = None,
         parameters: Paths = (),
+        schedule: ScheduleName | None = None,
+        tolerance: float | None = None,
     ) -> list[Scenario]:
         """Several scenarios, or all; the mistakes of all are reported together.
 
@@ -155,7 +188,7 @@ class Case:
         ----------
         names
             Of the scenarios; all of them where empty.
-        values, step, parameters
+        values, step, parameters, schedule, tolerance
             As for `scenario`.
         stop
             Time at which runs end [s]; the case's by default.
@@ -171,7 +204,10 @@ class Case:
         >>> [scenario.title for scenario in gfor.load("two_area").choose(["gfor", "pod_p"])]
         ['SG + GFOR', 'SG + GFOR POD-P']
         """
-        chosen = choose(self.file, names, values, step=step, stop=stop, parameters=parameters)
+        chosen = choose(
+            self.file, names, values, step=step, stop=stop, parameters=parameters, schedule=schedule,
+            tolerance=tolerance,
+        )  # fmt: skip
         question(scenario.prepared for scenario in chosen)
         return chosen
 
@@ -239,6 +275,76 @@ class Case:
         with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
             return compute(planned, executor, kept, report)
 
+    def screen(
+        self,
+        points: str | Path,
+        outages: str | None = None,
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        parameters: Paths = (),
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        damping: float = 0.2,
+        whole: bool = False,
+        workers: int | None = 1,
+        scheduler: str | None = None,
+        tls: str | Path | None = None,
+        folder: str | Path | None = None,
+        progress: bool = False,
+    ) -> Screening:
+        """Critical modes of many operating points, each with its outages.
+
+        Parameters
+        ----------
+        points
+            CSV file, a row each: a column ``time`` or ``name``, and what differs from the case.
+        outages
+            ``"n-1"``, ``"lines"``, ``"units"``, or names with commas between them; none by default.
+        scenario
+            Its name; the first one where None.
+        values, step, parameters
+            As for `scenario`.
+        frequencies
+            Modes from the first to the second are critical [Hz] …
+        damping
+            … where their damping ratio is below this.
+        whole
+            Whether growing modes of all frequencies are counted at every point, rather than at one in 24.
+        workers, scheduler, tls, folder, progress
+            As for `sweep`.
+
+        Raises
+        ------
+        InputError
+            If points, outages, scenario or values cannot be used; with file and line of what is wrong in the points.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> from pathlib import Path
+        >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
+        >>> _ = Path("day.csv").write_text(chr(10).join(lines))
+        >>> screening = gfor.load("two_area").screen("day.csv", scenario="gfor")
+        >>> screening.stable
+        True
+        >>> screening.modes()[["point", "frequency_hz", "damping_percent"]].round(2)
+           point  frequency_hz  damping_percent
+        0  00:00          0.58            10.57
+        """
+        if scheduler is not None and workers not in (None, 1):
+            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
+        kept = None if folder is None else _folder(folder)
+        executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
+        wanted = CriticalRegion(*frequency_range(frequencies), damping)
+        planned = plan_screening(
+            self.file, path_of(points, "points", "file"), outages, scenario, case_values(values),
+            in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
+        )  # fmt: skip
+        question([planned.prepared])
+        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
+            return screened(planned, executor, kept, report)
+
     def design(
         self,
         controller: str,
@@ -289,6 +395,74 @@ class Case:
             )
         question([design.result.prepared])
         return design
+
+    def design_over_points(
+        self,
+        points: str | Path,
+        controllers: Names = "pod_p",
+        outages: str | None = None,
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        parameters: Paths = (),
+        workers: int | None = 1,
+        scheduler: str | None = None,
+        tls: str | Path | None = None,
+        folder: str | Path | None = None,
+        progress: bool = False,
+        **wanted: Unpack[WantedOverPoints],
+    ) -> CoordinatedDesign:
+        """Design POD controllers with one setting for many operating points, each with its outages.
+
+        Parameters
+        ----------
+        points, outages
+            As for `screen`.
+        controllers
+            ``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own.
+        scenario
+            Its name; by default the one without these controllers.
+        values, step, parameters
+            As for `scenario`.
+        workers, scheduler, tls, folder, progress
+            As for `sweep`.
+        wanted
+            Any of: ``damping`` (a ratio that is wanted everywhere; the best that there is by default), ``components``
+            (names or patterns, each with a setting of its own), ``modes`` (the case's; all from 0.1 to 2 Hz by
+            default), ``gain_bounds`` [pu], ``stages``, ``least_damping`` (of other modes), ``ranked`` (for how many
+            converters a controller alone is designed).
+
+        Raises
+        ------
+        InputError
+            If points, outages, scenario, components or modes cannot be used.
+        AnalysisError
+            If no point has modes.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> from pathlib import Path
+        >>> lines = "name,grid.X_L", "short,0.05", "long,0.3"
+        >>> _ = Path("two.csv").write_text(chr(10).join(lines))
+        >>> design = gfor.load("two_area").design_over_points("two.csv", damping=0.15)
+        >>> design.met
+        True
+        >>> bool(design.points()["damping_percent"].min() >= 15)
+        True
+        """
+        if scheduler is not None and workers not in (None, 1):
+            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
+        kept = None if folder is None else _folder(folder)
+        request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
+                             overrides=case_values(values), parameters=parameter_files(parameters),
+                             step_size=in_seconds(step, "step"))  # fmt: skip
+        executor = choose_executor(workers, scheduler, COORDINATED_IMPORT, tls)
+        planned = plan_points_design(self.file, request, path_of(points, "points", "file"), outages)
+        question([planned.prepared])
+        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
+            return designed(planned, executor, kept, report)
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from orchestrator.api.identification import identified_mode_json, opened
+from orchestrator.api.identification import doubt_text, identified_mode_json, opened
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, Time, moment, names
@@ -33,7 +33,8 @@ class RunComparison:
     signals
         One comparison a signal, those first that differ most.
     remarks
-        Sentences on different record intervals, and on runs too short for their oscillations to be read.
+        Sentences on different record intervals, on runs too short for their oscillations to be read, and on those in
+        doubt.
     """
 
     def __init__(self, labels: tuple[str, str], signals: Sequence[Comparison], remarks: Sequence[str] = ()) -> None:
@@ -121,6 +122,12 @@ def compare(
         raise InputError(f"{labels[0]} and {labels[1]} have no signal in common")
     times = common_times(first["time"].values, second["time"].values, labels)
     signals_compared = [compare_signal(first, second, one, begin, labels) for one in chosen]
+    remarks += [
+        f"? {label}: {c.expression} at {doubt_text(mode)}."
+        for c in signals_compared
+        for label, mode in zip(labels, c.modes, strict=True)
+        if mode is not None and mode.doubts
+    ]
     return RunComparison(labels, signals_compared, [*([times.remark] if times.remark else []), *remarks])
 
 

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from orchestrator.cores import number_of_cores
 from orchestrator.errors import InputError
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.executor import Executor
-from orchestrator.points.processes import Processes, number_of_cores
+from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 
 

@@ -15,7 +15,7 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
-from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
+from orchestrator.fmi.description import FmuDescription, VariableInfo, read_declared
 from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
 
@@ -37,8 +37,8 @@ class Fmu:
         start = self._converted(values)
         component: Component = open_component(description.model_name, description)
         try:
-            component.set(start)
             component.setup(0.0, stop)
+            component.set(start)
             component.enter_initialization_mode()
             component.exit_initialization_mode()
         except BaseException:
@@ -234,7 +234,9 @@ class FmuInfo:
 
 
 def info(path: str | Path) -> FmuInfo:
-    """Read what an FMU declares; nothing in the file is executed.
+    """Read what an FMU declares, for whatever platform.
+
+    Nothing in the file is executed, but for a vendor's DLL, in a process of its own.
 
     Raises
     ------
@@ -251,7 +253,8 @@ def info(path: str | Path) -> FmuInfo:
     ['output', 'pu']
     """
     file = path_of(path, "path")
-    return FmuInfo(read_description(file), read_embedded_model(file))
+    described = read_declared(file)
+    return FmuInfo(described, read_embedded_model(described.path))
 
 
 def _variables(description: FmuDescription) -> pd.DataFrame:

@@ -8,6 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.identification import IdentifiedMode, Sampling, sampling
+from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, straight_line
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment, text_or_none
@@ -34,7 +35,15 @@ class SignalModes:
         Time between the samples used [s].
     """
 
-    def __init__(self, signal: str, start: float, stop: float, modes: Sequence[IdentifiedMode], used: Sampling) -> None:
+    def __init__(
+        self,
+        signal: str,
+        start: float,
+        stop: float,
+        modes: Sequence[IdentifiedMode],
+        used: Sampling,
+        line: float = 0.0,
+    ) -> None:
         """Keep the result of an identification.
 
         Parameters
@@ -47,7 +56,10 @@ class SignalModes:
             The modes, the strongest first.
         used
             Which samples of the record were used.
+        line
+            By how much the straight line through the samples changes from start to stop [unit of the signal].
         """
+        self._line = line
         self.signal, self.start, self.stop, self.modes, self._used = signal, start, stop, list(modes), used
 
     def __iter__(self) -> Iterator[IdentifiedMode]:
@@ -61,9 +73,22 @@ class SignalModes:
         """Time between the samples used [s]."""
         return self._used.interval
 
+    def is_trend(self, mode: IdentifiedMode) -> bool:
+        """Whether a component is an offset or a slow trend, whose damping says nothing about growth.
+
+        Parameters
+        ----------
+        mode
+            One of `modes`. In the window, a trend changes by less than a factor e and turns by less than one radian.
+        """
+        return is_trend(mode, self.stop - self.start)
+
     @property
     def remarks(self) -> list[str]:
-        """Sentences on the highest frequency that the samples can show, and on the modes near it."""
+        """Sentences on the highest frequency that the samples can show, on the modes near it, on a window that is too
+        short, on a trend that may hide modes, on a window
+        without oscillations, and on each mode in doubt.
+        """
         highest = 0.5 / self.interval
         texts = [
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
@@ -75,7 +100,14 @@ class SignalModes:
                 f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
                 f"of the system: {', '.join(near)}. To be sure, {self._used.remedy}."
             )
-        return texts
+        length = self.stop - self.start
+        about = [
+            nothing_swings(self.modes, length),
+            short_window(self.modes, self.start, self.stop),
+            over_a_trend(self.modes, length, self._line),
+        ]
+        doubtful = [m for m in self.modes if m.doubts and not self.is_trend(m)]
+        return [*texts, *filter(None, about), *(f"? {doubt_text(m)}." for m in doubtful)]
 
     def table(self) -> pd.DataFrame:
         """One row for every mode: eigenvalue [1/s, rad/s], frequency, damping ratio, amplitude [unit of the signal]."""
@@ -95,7 +127,13 @@ class SignalModes:
 
 def identified_mode_json(mode: IdentifiedMode) -> dict[str, Any]:
     """A mode of a signal as JSON's types."""
-    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"amplitude": mode.amplitude}
+    figures = eigenvalue_json(mode.eigenvalue, mode.damping_percent)
+    return figures | {"amplitude": mode.amplitude, "doubts": list(mode.doubts)}
+
+
+def doubt_text(mode: IdentifiedMode) -> str:
+    """What is doubtful about a mode, as one clause."""
+    return f"{mode.frequency_hz:.4g} Hz is doubtful: {'; '.join(mode.doubts)}"
 
 
 def identify(
@@ -141,8 +179,10 @@ def identify(
         raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
     require_numbers(curve.sel(time=slice(begin, end)), signal, label)
     modes = strongest_modes(curve, begin, end)
-    times = curve["time"].sel(time=slice(begin, end)).values
-    return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times))
+    window = curve.sel(time=slice(begin, end))
+    times = window["time"].values
+    line = straight_line(times, window.values)
+    return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times), line)
 
 
 def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Dataset, str]:

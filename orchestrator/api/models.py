@@ -1,6 +1,7 @@
 """FMUs of the catalogue's models."""
 
 import os
+import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
@@ -54,6 +55,8 @@ def build(
     platforms: Sequence[str] | None = None,
     extra: Mapping[str, bytes] | None = None,
     parts: Mapping[str, str] | None = None,
+    reference: bool = False,
+    sources: bool = False,
 ) -> Path:
     """Build the FMU of a model; returns its path.
 
@@ -73,6 +76,11 @@ def build(
         Members for the FMU's ``extra/`` folder, by path, such as ``{"extra/notes.txt": b"..."}``.
     parts
         What a generator is made of, such as ``{"machine": "genrou", "exciter": "sexs"}``.
+    reference
+        Whether the FMU gets a smoke test with reference results and its state at the start, by FMI's layered standard
+        LS-REF. For that it is run here.
+    sources
+        Whether a native FMU gets its C source as well, for tools that compile.
 
     Raises
     ------
@@ -94,6 +102,10 @@ def build(
         raise InputError(f"fmi = {fmi!r}; choose from '2.0' and '3.0'")
     if fmi != "2.0" and not native:
         raise InputError("FMI 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; build a native one")
+    flag(reference, "reference")
+    flag(sources, "sources")
+    if sources and not native:
+        raise InputError("only native FMUs are made of C source that a tool can compile; build a native one")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
     from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
@@ -103,8 +115,26 @@ def build(
     made = catalogue_model(model, parts) if isinstance(model, str) else model
     chosen = None if platforms is None else _platforms(platforms, TARGETS)
     members, place = _members(extra), _folder(folder)
-    recipe = NativeFmu(made, fmi) if native else PythonFmu(made)
-    return export(recipe, place, chosen or None, members)
+    recipe = NativeFmu(made, fmi, sources=sources) if native else PythonFmu(made)
+    path = export(recipe, place, chosen or None, members)
+    return with_reference(path) if reference else path
+
+
+def with_reference(path: Path) -> Path:
+    """Add the smoke test of LS-REF to an FMU for this machine, and return its path.
+
+    Raises
+    ------
+    ComponentError
+        If the FMU does not run here.
+    """
+    from fmus.toolchain.archive import write_archive  # noqa: PLC0415 - with what builds FMUs
+    from orchestrator.ssp.reference_experiment import reference_members  # noqa: PLC0415 - needs a model to run
+
+    added = reference_members(path)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    return write_archive(path, members | added)
 
 
 def _platforms(given: Sequence[str], known: Collection[str]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
+from orchestrator.api.sensitivities import Sensitivities
 from orchestrator.api.show import page
 from orchestrator.api.values import (
     Names,
@@ -25,11 +26,14 @@ from orchestrator.api.values import (
 )
 from orchestrator.api.values import names as names_given
 from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
 from orchestrator.late import Late
@@ -38,9 +42,11 @@ from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
+from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 
 if TYPE_CHECKING:
     import pandas as pd
+
 else:
     pd = Late("pandas")
 
@@ -82,9 +88,12 @@ class Scenario:
         values: Mapping[str, Value],
         step_size: float | None,
         parameters: Sequence[ParameterFile],
+        schedule: ScheduleName | None = None,
+        tolerance: float | None = None,
     ) -> None:
         self.prepared = prepared
         self._file, self._values, self._step_size, self._parameters = file, values, step_size, parameters
+        self._schedule, self._tolerance = schedule, tolerance
 
     @property
     def name(self) -> str:
@@ -171,6 +180,7 @@ class Scenario:
         checkpoints: str | Path | Checkpoints | None = None,
         checkpoint_every: Time = EVERY,
         federates: Federates | None = None,
+        threads: int | None = None,
     ) -> Run:
         """Modes, and the response to the scenario's events.
 
@@ -201,12 +211,15 @@ class Scenario:
         federates
             Components that run as federates at HELICS, such as ``Federates(("gfor",))`` of
             `orchestrator.federation.choice`; by default everything runs here.
+        threads
+            How many step native FMUs, from 1 to 64. By default as many as make a step shortest, up to one for each
+            core, and only while they are seen to be faster than one. No value depends on it.
 
         Raises
         ------
         InputError
-            If both checkpoints and federates are asked for, if what was left in the folder is damaged, or if the run is
-            made of something else now: another case, FMU or library.
+            If ``threads`` is no such number, both checkpoints and federates are asked for, if what was left in the
+            folder is damaged, or if the run is made of something else now: another case, FMU or library.
 
         Examples
         --------
@@ -219,6 +232,7 @@ class Scenario:
 
         prepared = self._until(in_seconds(stop, "stop"))
         _check_observers(observers)
+        _check_threads(threads)
         if checkpoints is not None and federates is not None:
             raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
         with ExitStack() as stack:
@@ -238,6 +252,7 @@ class Scenario:
                     recording=recording,
                     checkpoints=kept,
                     federates=federates,
+                    threads=threads,
                 )
             if kept is not None and kept is not checkpoints and result.failure is None:
                 kept.clear()
@@ -250,12 +265,124 @@ class Scenario:
         if stop_time is None or stop_time == self.prepared.stop_time:
             return self.prepared
         (prepared,) = self._file.prepare([self.name], self._values, self._step_size, stop_time, self._parameters)
+        prepared = _as_asked(prepared, self._schedule, self._tolerance)
         if changed := _differences(self.prepared, prepared):
             raise InputError(
                 f"{self._file.path}: files of the case were changed since the scenario was made, which changes "
                 f"{', '.join(changed[:3])}; load the case again"
             )
         return prepared
+
+    def sensitivities(
+        self,
+        mode: str | None = None,
+        parameters: Names = (),
+        *,
+        fixed: bool = False,
+        held: bool = False,
+        directional: bool = False,
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        report: Callable[[int, int], None] = lambda done, total: None,
+    ) -> Sensitivities:
+        """How each parameter of each FMU moves a mode: ∂λ/∂p.
+
+        The derivative is total: the operating point moves with the parameter, as it does with ``--set``.
+
+        Parameters
+        ----------
+        mode
+            Name of one of the case's modes, or ``"critical"`` for the least damped one in the range; by default the
+            first named one.
+        parameters
+            Names ``component.variable``, also with ``*``; by default all tunable ones.
+        fixed
+            Fixed parameters as well, for each of which the case is started several times.
+        held
+            The partial derivative, at the held operating point, by tunable parameters alone.
+        directional
+            Linearise with the FMUs' own directional derivatives instead of by perturbation.
+        frequencies
+            The mode lies between the first and the second [Hz].
+        report
+            Called with how many parameters are done, of how many.
+
+        Raises
+        ------
+        InputError
+            If there is no such mode or parameter.
+        AnalysisError
+            If no steady state is found, or the system cannot be linearised.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> scenario = gfor.load("two_area").scenario("pod_p")
+        >>> found = scenario.sensitivities(parameters="gfor.pod_p.K")
+        >>> round(found.result.rows[0].damping_per_percent, 3)
+        -0.046
+        """
+        from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
+
+        layers = (*self._parameters, *([OptionValues.of(self._values)] if self._values else []))
+
+        def again(changed: Mapping[str, float]) -> PreparedScenario:
+            (prepared,) = self._file.prepare([self.name], dict(changed), self._step_size, None, layers)
+            return prepared
+
+        return Sensitivities(
+            find_sensitivities(
+                self.prepared, again, mode, names_given(parameters, "parameters"), fixed=fixed, held=held,
+                directional=directional, frequency_range=frequency_range(frequencies), report=report,
+            )
+        )  # fmt: skip
+
+    def steps(
+        self,
+        allowed: tuple[float, float] = (1e-3, 0.1),
+        steps: Sequence[Time] = (),
+        schedules: Sequence[ScheduleName] = (),
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    ) -> StepChoice:
+        """What communication steps and schedules do to the critical modes, as ``gfor steps`` says it.
+
+        Parameters
+        ----------
+        allowed
+            Accepted error of a critical mode's frequency [Hz] and damping [points].
+        steps
+            Communication steps [s] to try; by default 0.5 to 50 times the case's own.
+        schedules
+            To try; by default ``gauss-seidel``, ``midpoint`` and ``newton``.
+        frequencies
+            The critical modes lie between the first and the second [Hz].
+
+        Returns
+        -------
+        StepChoice
+            All trials; its ``largest(schedule)`` is the largest step within the error.
+
+        Raises
+        ------
+        InputError
+            If an error is not above 0, a schedule does not exist, or no step fits the case's events.
+        AnalysisError
+            If there is no continuous system to compare with, or no mode in range.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> choice = gfor.load("two_area").scenario("pod_pq").steps(steps=["100 us", "500 us"], schedules=["midpoint"])
+        >>> choice.largest("midpoint").step_size
+        0.0005
+        """
+        if len(allowed) != 2 or not all(0 < error < float("inf") for error in allowed):
+            raise InputError(f"allowed = {allowed!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)")
+        if wrong := [name for name in schedules if name not in SCHEDULES]:
+            raise InputError(f"schedules: {wrong[0]!r} is none; give some of {', '.join(SCHEDULES)}")
+        lengths = [length for step in steps if (length := in_seconds(step, "steps")) is not None]
+        if wrong_lengths := [length for length in lengths if not length > 0]:
+            raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
+        return choose_step(self.prepared, Allowed(*allowed), lengths, schedules, frequency_range(frequencies))
 
     def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
@@ -305,6 +432,11 @@ def _check_observers(given: Sequence[Observer]) -> None:
         raise InputError(f"observers = {given!r}; give a list of observers, or leave it out")
 
 
+def _check_threads(given: int | None) -> None:
+    if given is not None and (isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS):
+        raise InputError(f"threads = {given!r}; give a whole number from 1 to {MOST_THREADS}, or leave it out")
+
+
 def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:
     """Values and FMUs, by name, in which two preparations of a scenario differ."""
     names = [name for name in {**one.values, **other.values} if one.values.get(name) != other.values.get(name)]
@@ -330,6 +462,8 @@ def choose(
     step: Time | None = None,
     stop: Time | None = None,
     parameters: Paths = (),
+    schedule: ScheduleName | None = None,
+    tolerance: float | None = None,
 ) -> list[Scenario]:
     """Scenarios of a case, as `Case.choose` offers them.
 
@@ -345,16 +479,34 @@ def choose(
         Communication step, and time at which runs end [s]; the case's where None.
     parameters
         Paths of parameter files.
+    schedule
+        In which order components step, and what inputs do meanwhile; the case's where None.
+    tolerance
+        Largest error of a coupled output in a pair of steps, of 1 or of its value; None for fixed steps, or the case's.
 
     Raises
     ------
     CaseError
         With every problem of the case and of the values.
     """
+    if schedule is not None and schedule not in SCHEDULES:
+        raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
     files = parameter_files(parameters)
     chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
     prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
-    return [Scenario(one, file, chosen, step_size, files) for one in prepared]
+    prepared = [_as_asked(one, schedule, tolerance) for one in prepared]
+    return [Scenario(one, file, chosen, step_size, files, schedule, tolerance) for one in prepared]
+
+
+def _as_asked(prepared: PreparedScenario, schedule: ScheduleName | None, tolerance: float | None) -> PreparedScenario:
+    """A scenario with another schedule and steps within a tolerance, where they are given."""
+    if tolerance is not None and schedule is not None and schedule not in SECOND_ORDER:
+        raise InputError(
+            f"schedule {schedule!r} with tolerance = {tolerance!r}: a tolerance goes with midpoint or newton; choose "
+            "one of them, or leave the schedule out, which takes newton"
+        )
+    prepared = prepared.rescheduled(schedule) if schedule else prepared
+    return prepared if tolerance is None else prepared.with_tolerance(tolerance)
 
 
 def question(scenarios: Iterable[PreparedScenario]) -> None:

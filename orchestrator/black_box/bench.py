@@ -166,8 +166,8 @@ class Runs:
     def _start(self) -> None:
         bench = self._bench
         component = self._component = open_component("box", bench.description, isolated=bench.isolated)
-        component.set(bench.parameters)
         component.setup(0.0, None)
+        component.set(bench.parameters)
         component.enter_initialization_mode()
         component.set(dict(bench.held) | dict(zip(bench.inputs, bench.rest.tolist(), strict=True)))
         component.exit_initialization_mode()

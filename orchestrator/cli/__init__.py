@@ -22,7 +22,11 @@ COMMANDS = {
     "linearize": "write a scenario's linear model A, B, C, D for other tools",
     "export-ssp": "write a case's scenarios as SSP archives for other tools",
     "export-comtrade": "write a run's signals as a COMTRADE recording for other tools",
+    "export-dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
+    "steps": "the largest communication step within a given error, for each schedule",
     "sweep": "modes over a grid of parameters, followed from point to point",
+    "sensitivities": "how each parameter of each FMU moves a mode",
+    "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
     "identify": "the modes in a recorded signal (matrix pencil)",
     "report": "one self-contained HTML page from the folder of a run",
@@ -48,7 +52,10 @@ examples:
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
+  gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
+  gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
+  gfor steps two_area --error 0.001:0.1          the largest step for 1 mHz and 0.1 points of damping
   gfor compare results/two_area/gfor results/two_area/pod_p
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
   gfor identify recorder.cfg "F NORTH" --start 12     the modes in a measured recording
@@ -61,6 +68,7 @@ examples:
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor verify results/certify_vendor             whether a certificate still holds
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
+  gfor export-dll gfor --dest dlls                its control as IEEE/CIGRE DLL for EMT programs
   gfor info fmus/gfor.fmu                        what an FMU declares
   gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
   gfor check vendor.fmu --binding vendor.toml    whether it can be trusted in a co-simulation

@@ -3,6 +3,9 @@
 import argparse
 import math
 
+from orchestrator.cores import MOST_THREADS
+from orchestrator.coupling.schedule import check_tolerance
+from orchestrator.errors import InputError
 from orchestrator.units import read_value, to_unit
 
 
@@ -57,10 +60,34 @@ def positive(text: str) -> float:
     return number
 
 
+def tolerance(text: str) -> float:
+    """Of the error of a step, such as 1e-4."""
+    value = _number(text)
+    try:
+        check_tolerance(value)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return value
+
+
 def count(text: str) -> int:
     """A whole number from 1 to 1000."""
     if not text.isdigit() or not 1 <= int(text) <= 1000:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1000")
+    return int(text)
+
+
+def whole_from_zero(text: str) -> int:
+    """A whole number from 0 to 1000."""
+    if not text.isdigit() or not int(text) <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 1000")
+    return int(text)
+
+
+def threads(text: str) -> int:
+    """A whole number from 1 to the most threads that step."""
+    if not text.isdigit() or not 1 <= int(text) <= MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to {MOST_THREADS}")
     return int(text)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.extras import require
+from orchestrator.api.dll import build_from_dll
 from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cli import linear_model
@@ -31,13 +32,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
         )
+    parser.add_argument(
+        "--from-dll", type=Path, metavar="FILE", help="a vendor's controller, delivered as IEEE/CIGRE DLL, as an FMU"
+    )
+    parser.add_argument(
+        "--text", action="append", metavar="NAME=VALUE", default=[], help="text parameter of that DLL (repeatable)"
+    )
+    parser.add_argument(
+        "--reference", action="store_true", help="add a smoke test with reference results (layered standard LS-REF)"
+    )
+    parser.add_argument("--sources", action="store_true", help="add the C source, for tools that compile (native only)")
     linear_model.add_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Build every model and print the files' paths."""
+    if options.from_dll is not None:
+        return _from_dll(options)
     if options.fmi != "2.0" and not options.native:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
+    if options.sources and not options.native:
+        raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
     require("building FMUs", "casadi", "pythonfmu", "ziglang")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
@@ -50,7 +65,30 @@ def run(options: argparse.Namespace) -> int:
         for number, model in enumerate(models, start=1):
             report(f"{model.name}: compiling, {kind} ({number} of {len(models)}); minutes where it was never compiled")
             built = build(
-                model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra
+                model,
+                options.dest,
+                native=options.native,
+                fmi=options.fmi,
+                platforms=options.platform,
+                extra=extra,
+                reference=options.reference,
+                sources=options.sources,
             )
             print(built)
+    return 0
+
+
+def _from_dll(options: argparse.Namespace) -> int:
+    if options.names or options.native or options.platform or options.reference or options.fmi != "2.0":
+        raise InputError(
+            "--from-dll takes the DLL's own name, its platform and FMI 2.0: leave out names, --native, --platform, "
+            "--reference and --fmi"
+        )
+    pairs = [entry.partition("=") for entry in options.text]
+    if wrong := [name for name, sign, _ in pairs if not (name and sign)]:
+        raise InputError(f"--text {wrong[0]}: give NAME=VALUE")
+    built = build_from_dll(options.from_dll, options.dest, texts={name: value for name, _, value in pairs})
+    for line in built.told:
+        print(line)
+    print(built.path)
     return 0

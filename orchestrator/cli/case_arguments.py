@@ -10,10 +10,11 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cli.arguments import assignment, seconds
 from orchestrator.cli.terminal import print_questions
+from orchestrator.coupling.schedule import SCHEDULES
 
 
-def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """The case, which may be left out where ``optional``, and what is changed of it."""
+def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False) -> None:
+    """The case, which may be left out where ``optional``, and what is changed of it; its schedule where asked for."""
     parser.add_argument(
         "case",
         metavar="CASE",
@@ -41,12 +42,24 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
     )
     add_trust_argument(parser)
     parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    if schedule:
+        add_schedule_argument(parser)
     parser.add_argument(
         "--native",
         dest="set",
         action="append_const",
         const=("*.native", True),
         help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
+    )
+
+
+def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
+    """In which order components step."""
+    parser.add_argument(
+        "--schedule",
+        choices=SCHEDULES,
+        help="in which order components step, and what their inputs do meanwhile: midpoint and newton are of second "
+        "order in the step (default: the case's)",
     )
 
 
@@ -64,8 +77,9 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
     """The scenarios of a case, as the options have them."""
     file, stop = load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "stop", None)
     scenarios = choose(
-        file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters
-    )
+        file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
+        schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
+    )  # fmt: skip
     print_questions([scenario.prepared for scenario in scenarios])
     return scenarios
 

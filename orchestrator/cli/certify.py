@@ -15,11 +15,13 @@ from orchestrator.certification.request import PODS, REACTANCES, STUDY, Certific
 from orchestrator.certification.study import Certification, certify
 from orchestrator.certification.verdict import exit_code
 from orchestrator.cli.arguments import reactances, setting
+from orchestrator.cli.certify_codes import ALL, CODE_NAMES, NTS631, run_code
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import INTERRUPTED, InputError
+from orchestrator.fmi.vendor_files import as_fmu
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -32,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"fewer than 13 reactances; 4 it passes, and an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
     )
     parser.add_argument("fmu", type=Path, nargs="?", metavar="FILE.fmu", help="the converter")
+    parser.add_argument("--code", choices=CODE_NAMES, default=NTS631,
+                        help="whose test (default: nts631, the damping test)")  # fmt: skip
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument(
         "--pod", choices=PODS,
@@ -86,6 +90,24 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.fmu is None:
         raise InputError("the converter is missing: gfor certify FILE.fmu")
+    if options.code == ALL:
+        return _run_all(options)
+    return _run_nts631(options) if options.code == NTS631 else run_code(options, options.code)
+
+
+def _run_all(options: argparse.Namespace) -> int:
+    """Every code in a folder of its own; the worst of their exit codes."""
+    folder = options.out or Path("results") / f"certify_{options.fmu.stem}"
+    found = []
+    for key in CODE_NAMES:
+        if key != ALL:
+            own = argparse.Namespace(**{**vars(options), "code": key, "out": folder / key})
+            found.append(_run_nts631(own) if key == NTS631 else run_code(own, key))
+    return next((code for code in (1, 3, 4) if code in found), 0)
+
+
+def _run_nts631(options: argparse.Namespace) -> int:
+    """The damping test."""
     request = _request(options)
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
@@ -150,7 +172,7 @@ def _request(options: argparse.Namespace) -> CertificationRequest:
     study = {name: value for name, value in options.set if name.split(".")[0] in STUDY}
     own = {name: value for name, value in options.set if name not in study}
     request = CertificationRequest(
-        options.fmu, options.binding, own, options.pod, options.reactances, study, options.black_box
+        as_fmu(options.fmu), options.binding, own, options.pod, options.reactances, study, options.black_box
     )
     request.check()
     return request

@@ -48,4 +48,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _mode_text(mode: IdentifiedMode | None) -> str:
-    return f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.2f} %" if mode else "–"
+    if mode is None:
+        return "–"
+    return f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.2f} %{' ?' if mode.doubts else ''}"

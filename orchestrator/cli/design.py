@@ -14,6 +14,7 @@ from orchestrator.api.design import Wanted, design_controller, parameter_file_pa
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import percent, positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
+from orchestrator.cli.design_points import add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.terminal import make_console, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
@@ -28,13 +29,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor design``."""
     add_case_arguments(parser)
     defaults = DesignRequest(controller="")
-    parser.add_argument("--controller", required=True, choices=CONTROLLERS, help="the controller to design")
+    parser.add_argument(
+        "--controller",
+        action="append",
+        required=True,
+        choices=CONTROLLERS,
+        help="the controller to design (with --points repeatable)",
+    )
     parser.add_argument(
         "--component",
+        action="append",
+        default=[],
         metavar="NAME",
-        help="the converter, or a pattern such as 'gfor*' for several with one setting (default: all with this POD)",
+        help="the converter, or a pattern such as 'gfor*' for several with one setting (default: all with this POD); "
+        "with --points repeatable: each gets a setting of its own",
     )
-    parser.add_argument("--mode", metavar="NAME", help="the case's mode to damp (default: its first)")
+    parser.add_argument(
+        "--mode",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="the case's mode to damp (default: its first); with --points repeatable, all from 0.1 to 2 Hz by default",
+    )
     parser.add_argument("--damping", type=percent, metavar="PERCENT", help="required damping, such as 20")
     parser.add_argument(
         "--damping-increment",
@@ -52,9 +68,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gain-bounds",
         type=_bounds,
-        default=defaults.gain_bounds,
         metavar="MIN:MAX",
-        help="bounds of the gain [pu] (default: 200:400)",
+        help="bounds of the gain [pu] (default: 200:400; with --points 0:400)",
     )
     parser.add_argument(
         "--gain-from",
@@ -77,10 +92,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE.toml", help="parameter file (default: <case>_<controller>.toml, here)"
     )
+    add_points_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Design, print, and write the parameter file."""
+    if options.points is not None:
+        _check_over_points(options)
+        return run_over_points(options, None if options.out is None else _writable(_given(options.out)))
+    _check_for_one_point(options)
+    (controller_name,) = options.controller
     files, case, console = (
         parameters(options),
         load_case(options.case, trust_fmus=options.trust_fmus),
@@ -90,9 +111,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
     if options.damping is not None and options.damping_increment is not None:
         raise InputError("--damping and --damping-increment both say what is required; give one of them")
-    path = _writable(
-        parameter_file_path(options.out, "--out") if options.out else Path(f"{case.name}_{options.controller}.toml")
-    )
+    path = _writable(_given(options.out) if options.out else Path(f"{case.name}_{controller_name}.toml"))
     scenario = next(iter(options.scenario), None)
     folder = path.with_suffix(".points")
     with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
@@ -100,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
             with console.status("starting") as status:
                 controller = design_controller(
                     case,
-                    options.controller,
+                    controller_name,
                     scenario,
                     values_set(options),
                     options.step,
@@ -131,6 +150,43 @@ def run(options: argparse.Namespace) -> int:
     return exit_code(options, [design.stability])
 
 
+def _given(out: Path) -> Path:
+    return parameter_file_path(out, "--out")
+
+
+def _check_for_one_point(options: argparse.Namespace) -> None:
+    """Refuse what only a design over operating points takes.
+
+    Raises
+    ------
+    InputError
+        If one of these options is given.
+    """
+    for name in ("controller", "component", "mode"):
+        if len(getattr(options, name)) > 1:
+            times = len(getattr(options, name))
+            raise InputError(f"--{name} is given {times} times; only a design with --points takes several: give one")
+    for name in ("outages", "workers", "scheduler", "tls"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name} belongs to a design over operating points: give --points FILE as well")
+
+
+def _check_over_points(options: argparse.Namespace) -> None:
+    """Refuse what a design over operating points does not take.
+
+    Raises
+    ------
+    InputError
+        If one of these options is given.
+    """
+    defaults = DesignRequest(controller="")
+    given = {"--damping-increment": options.damping_increment is not None, "--refine": options.refine,
+             "--delta-gain": options.delta_gain != defaults.delta_gain, "--no-margins": options.no_margins,
+             "--gain-from": options.gain_from != "non-compensated"}  # fmt: skip
+    for name in (name for name, is_given in given.items() if is_given):
+        raise InputError(f"{name} belongs to a design for one operating point; with --points leave it out")
+
+
 def _how_it_goes_on(folder: Path) -> str:
     """What an interrupt leaves; "" where that is nothing, and no empty folder either."""
     if any_kept(folder):
@@ -144,16 +200,16 @@ def _wanted(options: argparse.Namespace) -> Wanted:
     """What the options ask of the design."""
     wanted = Wanted(
         delta_gain=options.delta_gain,
-        gain_bounds=options.gain_bounds,
+        gain_bounds=options.gain_bounds or DesignRequest(controller="").gain_bounds,
         compensated_gain=options.gain_from == "compensated",
         least_damping=options.min_damping,
         refine=options.refine,
         margins=not options.no_margins,
     )
-    if options.component is not None:
-        wanted["component"] = options.component
-    if options.mode is not None:
-        wanted["mode"] = options.mode
+    if options.component:
+        wanted["component"] = options.component[0]
+    if options.mode:
+        wanted["mode"] = options.mode[0]
     if options.damping is not None:
         wanted["damping"] = options.damping
     if options.damping_increment is not None:
@@ -165,12 +221,13 @@ def _wanted(options: argparse.Namespace) -> Wanted:
 
 def _command_line(options: argparse.Namespace) -> str:
     """The command that was given, with all that is not left to its default."""
-    words = ["gfor", "design", str(options.case), "--controller", options.controller]
-    single = {"--component": options.component, "--mode": options.mode, "--damping": _in_percent(options.damping),
+    words = ["gfor", "design", str(options.case), "--controller", *options.controller]
+    single = {"--component": next(iter(options.component), None), "--mode": next(iter(options.mode), None),
+              "--damping": _in_percent(options.damping),
               "--damping-increment": _in_percent(options.damping_increment), "--stages": options.stages,
               "--step": options.step}  # fmt: skip
     words += [word for key, value in single.items() if value is not None for word in (key, str(value))]
-    low, high = options.gain_bounds
+    low, high = options.gain_bounds or DesignRequest(controller="").gain_bounds
     words += ["--delta-gain", f"{options.delta_gain:g}", "--gain-bounds", f"{low:g}:{high:g}"]
     words += ["--gain-from", options.gain_from, "--min-damping", f"{100 * options.min_damping:g}%"]
     for name in options.scenario:

@@ -14,6 +14,10 @@ from orchestrator.report.tables import PlainTable
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor identify``."""
+    parser.epilog = (
+        "Amplitudes are those at the start; an oscillation's is half of its peak, as it is one of two conjugate "
+        "exponentials. '?' marks a mode in doubt, with the reasons below the table."
+    )
     parser.add_argument("run", type=Path, metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
@@ -39,7 +43,9 @@ def run(options: argparse.Namespace) -> int:
         table.add_column(column, justify="right")
     for m in found:
         value = f"{m.eigenvalue.real:+.4f} ± j{abs(m.eigenvalue.imag):.4f}"
-        table.add_row(value, f"{m.frequency_hz:.4f}", f"{m.damping_percent:.2f}", f"{m.amplitude:.3g}")
+        frequency, damping = f"{m.frequency_hz:.4f}{' ?' if m.doubts else ''}", f"{m.damping_percent:.2f}"
+        shown = ("trend", "-") if found.is_trend(m) else (frequency, damping)
+        table.add_row(value, *shown, f"{m.amplitude:.3g}")
     console = make_console()
     console.print(table)
     for text in found.remarks:

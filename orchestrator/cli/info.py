@@ -6,8 +6,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
 from orchestrator.cli.terminal import make_console
+from orchestrator.fmi.description import missing_binary
 from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.report.tables import fmu_variables
 
@@ -38,6 +40,10 @@ def run(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
+    if missing := missing_binary(description):
+        console.print(f"[bold]It cannot run here[/bold]: {escape(missing)}", highlight=False)
+    if description.kept_in:
+        console.print(f"a vendor's DLL: {KEPT_IN.get(description.kept_in, description.kept_in)}", highlight=False)
     if found.linear_model is not None:
         console.print(escape(_in_words(found.linear_model)), highlight=False)
     for table in fmu_variables(description):

@@ -31,6 +31,10 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
     """
     if options.order and not options.like:
         raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+    if options.like and options.threads is not None:
+        raise InputError("--like steps as another master does, on one thread; leave out --threads or --like")
+    if options.like and options.tolerance is not None:
+        raise InputError("--like steps as another master does, in fixed steps; leave out --tolerance or --like")
     return master_rules(options.like) if options.like else None
 
 

@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.cli import checkpoints, federates, like, run_request
-from orchestrator.cli.arguments import seconds
+from orchestrator.cli.arguments import seconds, threads, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
@@ -41,11 +41,25 @@ from orchestrator.study.run import RunResult
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor run``."""
-    add_case_arguments(parser, optional=True)
+    add_case_arguments(parser, optional=True, schedule=True)
     parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
+    parser.add_argument(
+        "--tolerance",
+        type=tolerance,
+        metavar="TOL",
+        help="take steps as long as this error of a coupled output allows, from 1e-8 to 0.1, such as 1e-4; needs FMUs "
+        "that save their state (default: fixed steps, or the case's tolerance)",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
     parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
+    parser.add_argument(
+        "--threads",
+        type=threads,
+        metavar="N",
+        help="threads that step native FMUs (default: as many as are faster than one, up to one for each core); "
+        "no value depends on it",
+    )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     add_verdict_argument(parser)
     run_request.add_arguments(parser)
@@ -192,6 +206,7 @@ def _run_into(
             recording=recording,
             checkpoints=kept.of(scenario.name, recording, place),
             federates=engine,
+            threads=options.threads,
         ).result
 
 

@@ -5,11 +5,49 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.terminal import print_named_modes, print_sources
 from orchestrator.cli.verdict import print_verdicts
+from orchestrator.coupling.statistics import StepCounts, StepStatistics
+from orchestrator.fmi.loaded import PYTHON_BACKED
 from orchestrator.study import tables
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.run import RunResult
+
+
+def on_one_thread(statistics: StepStatistics) -> str:
+    """Which components one thread alone may step, and why; "" where any thread may step all.
+
+    Parameters
+    ----------
+    statistics
+        Of a run.
+    """
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in statistics.one_thread.items():
+        by_reason.setdefault(reason, []).append(name)
+    parts = [f"{', '.join(names[:4])}{' …' if len(names) > 4 else ''} ({why})" for why, names in by_reason.items()]
+    hint = "; with --native several threads can" if PYTHON_BACKED in by_reason else ""
+    return f"One thread steps {'; '.join(parts)}{hint}." if parts else ""
+
+
+def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
+    """What a tolerance made of the communication steps.
+
+    Parameters
+    ----------
+    prepared
+        The scenario, with a tolerance.
+    counts
+        Of its run.
+    """
+    taken = f"{counts.accepted} steps" if counts.accepted else "no step"
+    if counts.accepted:
+        taken += f" of {1e3 * counts.shortest:.3g} to {1e3 * counts.longest:.3g} ms"
+    return (
+        f"{prepared.title}: tolerance {prepared.schedule.tolerance:g}: {taken}; {counts.rejected} pairs of steps were "
+        "taken back. The modes above are those of the fixed communication step."
+    )
 
 
 def print_run(console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None) -> None:
@@ -49,3 +87,9 @@ def print_run(console: Console, results: Sequence[RunResult], early_end: EarlyEn
     if any(r.linear is not None for r in results):
         console.print("", tables.linear_differences(results))
     console.print("", tables.run_statistics(results), "")
+    for r in results:
+        if r.statistics and r.statistics.adaptive:
+            words = on_adaptive_steps(r.modes.prepared, r.statistics.adaptive)
+            console.print(escape(words), soft_wrap=True, highlight=False)
+    for words in dict.fromkeys(text for r in results if r.statistics and (text := on_one_thread(r.statistics))):
+        console.print(escape(words), soft_wrap=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.markup import escape
 
+from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import (
     TOLERANCE,
@@ -21,7 +22,7 @@ from orchestrator.certification.verification import (
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console
-from orchestrator.errors import INTERRUPTED
+from orchestrator.errors import INTERRUPTED, InputError
 from orchestrator.report.progress import progress_bar
 
 
@@ -49,6 +50,8 @@ def run(options: argparse.Namespace) -> int:
     -------
     The exit code of the certificate's verdict where it holds, else 5.
     """
+    if (code := read_code_certificate(options.certificate)) is not None:
+        return _run_code(options, *code)
     folder, content = read_certificate(options.certificate)
     console = make_console(stderr=options.json)
     wanted = [p["X_L"] for p in content["points"]] if options.all else options.points or (least_damped(content),)
@@ -88,6 +91,29 @@ def run(options: argparse.Namespace) -> int:
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
+    return _exit_code(found, content)
+
+
+def _run_code(options: argparse.Namespace, folder: Path, content: dict[str, Any]) -> int:
+    """The certificate of a code on the test bench: its hashes, and its rows judged again."""
+    if options.all or options.points:
+        raise InputError(
+            f"{'--all' if options.all else '--points'}: {folder} is the certificate of a grid code; gfor verify "
+            "judges its rows again and does not compute anew: leave it out; `gfor run row_NAME.toml` in its folder does"
+        )
+    found = verify_code(folder, content)
+    if options.json:
+        print(json.dumps({"holds": found.holds, "verdict": content["verdict"], "faults": found.faults,
+                          "agreed": found.agreed, "computed": []}, indent=1, ensure_ascii=False))  # fmt: skip
+        return _exit_code(found, content)
+    console = make_console()
+    for text in found.agreed:
+        console.print(f"[green]agrees[/]        {escape(text)}")
+    for text in found.faults:
+        console.print(f"[bold red]does not agree[/] {escape(text)}")
+    console.print("No row was computed anew: `gfor run row_NAME.toml` in its folder does.")
+    holds = "The certificate holds" if found.holds else "[bold red]The certificate does not hold[/]"
+    console.print(f"{holds}; its verdict: {escape(content['verdict'])}.")
     return _exit_code(found, content)
 
 

@@ -76,7 +76,10 @@ def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequ
                 f"components: {', '.join(known)}"
             )
     if not prepared.schedule.is_plain:
-        raise InputError("--engine helics needs a schedule with held inputs and a plain clock; leave --like out")
+        raise InputError(
+            "--engine helics needs a schedule with held inputs and a plain clock, gauss-seidel or jacobi; "
+            "leave --like and --tolerance out"
+        )
     period = round(prepared.step_size * 1e9)
     wanted = {*names, *external}
     groups = [[n for n in group if n in wanted] for group in prepared.schedule.groups]

@@ -34,6 +34,7 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     """What a result was made from: case text, values, versions, FMU guids, step and schedule."""
     packages = ("gfor-cosim", "casadi", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
+    tolerance = prepared.schedule.tolerance
     return {
         "case": prepared.case.name,
         "scenario": prepared.name,
@@ -43,6 +44,7 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
         "events": "; ".join(map(str, prepared.events)),
         "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
+        **({} if tolerance is None else {"tolerance": tolerance}),
         "fmus": json.dumps(
             {n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool} for n, d in fmus.items()}
         ),

@@ -32,6 +32,9 @@ def some_of(texts: list[str], between: str = "; ") -> str:
 @check("fmi_validity", "Does the file keep to FMI 2.0?")
 def fmi_validity(subject: Subject) -> CheckResult:
     grave, harmless = validation_problems(subject.directory)
+    identifier = without_binding(subject.description).model_identifier
+    if not identifier.isidentifier():
+        harmless.append(f"modelIdentifier {identifier!r} is not a C identifier")
     if grave:
         return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
     if harmless:

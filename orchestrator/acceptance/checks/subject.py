@@ -154,12 +154,12 @@ class Subject:
         parameters
             Values of further parameters.
         """
+        component.setup(0.0, None)
         if self.starts:
             at = point or self.point
             start = {"P_0": at.P, "Q_0": at.Q, "v_0": at.v, "theta_0": at.theta}
             component.set({n: v for n, v in start.items() if n in self.description.variables})
         component.set({**self.use.values, **(parameters or {})})
-        component.setup(0.0, None)
 
     def memory_in_use(self) -> int:
         """Bytes in use in the FMU's process, as it says; 0 where it cannot."""

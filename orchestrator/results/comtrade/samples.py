@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from orchestrator.arrays import Matrix, Numbers
 from orchestrator.errors import InputError
 from orchestrator.late import Late
 from orchestrator.results.comtrade.configuration import Configuration
+from orchestrator.results.manifest import ResultsWarning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +27,7 @@ _MISSING_1991 = -1
 """FFFF stood for a missing sample of 16 bits in 1991."""
 
 _MISSING_TEXT = 99999.0
-"""Stands for a missing sample in text, from 1999 on."""
+"""Stands for a missing sample in text, from 1999 on; recorders of 1991's form, which leaves a blank, write it too."""
 
 _NO_FLOAT = 3.4e38
 """Beyond it a sample in single precision is none: its type ends there."""
@@ -80,8 +82,17 @@ def _text(content: bytes, configuration: Configuration, place: str) -> tuple[Num
     except (ValueError, OverflowError) as error:
         raise InputError(f"{place}{_first_bad(lines)}: a sample is no number ({error}); correct it") from error
     analog = table[:, 2 : 2 + len(configuration.analog)]
-    if configuration.revision != "1991":
-        analog[analog == _MISSING_TEXT] = np.nan
+    marked = analog == _MISSING_TEXT
+    if configuration.revision == "1991" and marked.any():
+        row, column = (int(k) for k in np.argwhere(marked)[0])
+        warnings.warn(
+            f"{place}, line {row + 1}: 99999 is taken as a missing sample ({configuration.analog[column].name}; "
+            f"{int(marked.sum())} in the file), as from 1999 on; the form of 1991 leaves a blank for one. Where it is "
+            "a value, write 99999.0001 there",
+            ResultsWarning,
+            stacklevel=5,
+        )
+    analog[marked] = np.nan
     return table[:, 0], table[:, 1], table[:, 2:]
 
 

@@ -1,0 +1,182 @@
+"""The design of POD controllers over operating points and outages."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, TypedDict
+
+import pandas as pd
+
+from orchestrator.api.design import parameter_file_path
+from orchestrator.api.design_wishes import check_wishes
+from orchestrator.api.show import page
+from orchestrator.api.values import Names, whole_number
+from orchestrator.api.values import names as names_given
+from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
+from orchestrator.coordinated_design.study import (
+    PointsDesign,
+    PointsDesignPlan,
+    PointsDesignRequest,
+    design_over_points,
+    values_of,
+)
+from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
+from orchestrator.errors import InputError
+from orchestrator.pod_design.design import StageReport
+from orchestrator.pod_design.target import CONTROLLERS
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport
+from orchestrator.points.store import POINTS, PointStore
+
+WORKERS_IMPORT = ("orchestrator.coordinated_design.worker",)
+"""Modules that a process of a design imports once, before its first point."""
+
+
+class WantedOverPoints(TypedDict, total=False):
+    """What may be asked of a design over operating points; `PointsDesignRequest` says what each means."""
+
+    components: Names
+    modes: Names
+    damping: float | None
+    gain_bounds: tuple[float, float]
+    stages: int | None
+    least_damping: float
+    ranked: int
+
+
+def request_of(controllers: Sequence[str], wanted: WantedOverPoints, **rest: Any) -> PointsDesignRequest:
+    """A request of checked wishes.
+
+    Parameters
+    ----------
+    controllers
+        ``pod_p``, ``pod_q``, or both.
+    wanted
+        What is asked for.
+    rest
+        Other fields of the request.
+
+    Raises
+    ------
+    InputError
+        If one of the wishes is unknown, not of its kind or outside of its range; it is named.
+    """
+    for controller in controllers:
+        if controller not in CONTROLLERS:
+            raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    if not controllers:
+        raise InputError(f"controllers is empty; name one or both of {', '.join(CONTROLLERS)}")
+    known = tuple(WantedOverPoints.__annotations__)
+    own: dict[str, Any] = dict(wanted)
+    if unknown := [name for name in own if name not in known]:
+        raise InputError(f"a design over points cannot be asked for {', '.join(map(repr, unknown))}; it can for "
+                         f"{', '.join(known)}")  # fmt: skip
+    several: dict[str, Any] = {
+        name: tuple(names_given(own.pop(name), name)) for name in ("components", "modes") if name in own
+    }
+    if "ranked" in own:
+        whole_number(own["ranked"], "ranked", 0, 1000)
+    alike = check_wishes({name: value for name, value in own.items() if name != "ranked"})
+    return PointsDesignRequest(tuple(controllers), **several, **own | alike, **rest)
+
+
+class CoordinatedDesign:
+    """POD controllers for many operating points and outages. `Case.design_over_points` makes it.
+
+    Attributes
+    ----------
+    result
+        Every figure on the way.
+    """
+
+    def __init__(self, result: PointsDesign) -> None:
+        self.result = result
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the wanted damping is reached at every point; where none is wanted, whether the least one is better.
+
+        None where points have no modes, and no other point says no.
+        """
+        return self.result.verdict.met
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence, with the point, the outage and the mode that limit."""
+        return verdict_sentence(self.result.verdict)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The settings by ``component.variable``: the values of a scenario with these controllers."""
+        return values_of(self.result.plan.groups, self.result.settings)
+
+    def points(self) -> pd.DataFrame:
+        """One row for each operating point with each outage: status, verdict, damping without and with it [%]."""
+        return pd.DataFrame(points_rows(self.result.verdict))
+
+    def ranking(self) -> pd.DataFrame:
+        """One row for each converter, the best first: what a controller there alone would give."""
+        return pd.DataFrame(ranking_rows(self.result))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor design --points --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, path: str | Path, command: str | None = None) -> list[Path]:
+        """Write the parameter file, and beside it JSON, a row for each point and a row for each converter.
+
+        Parameters
+        ----------
+        path
+            Path of the parameter file, which ``--parameters`` and `Case.scenario` take.
+        command
+            The command that the file names as its origin; by default the call in Python.
+
+        Raises
+        ------
+        InputError
+            If the path is none, or ends in ``.json``.
+        ResultsError
+            If a file cannot be written.
+        """
+        said = command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"
+        return save(self.result, parameter_file_path(path), said)
+
+    def __repr__(self) -> str:
+        return f"<CoordinatedDesign for {self.result.plan.case.name}: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        lines = [
+            self.verdict,
+            what_it_rests_on(self.result),
+            ", ".join(f"{k} = {v}" for k, v in self.parameters.items()),
+        ]
+        return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
+
+
+def compute(
+    planned: PointsDesignPlan,
+    executor: Executor,
+    folder: str | Path | None = None,
+    report: CountReport = lambda done, total: None,
+    stage: StageReport = lambda text: None,
+) -> CoordinatedDesign:
+    """Compute a planned design, as `Case.design_over_points` does; the executor is closed afterwards.
+
+    Parameters
+    ----------
+    planned
+        A checked design.
+    executor
+        Computes the points.
+    folder
+        Folder whose subfolder ``points`` keeps them. Without a folder they are forgotten.
+    report
+        Called with the number of points done and their total.
+    stage
+        Called with the name of each stage when it begins.
+    """
+    with TemporaryDirectory() as passing, closing(executor):
+        store = PointStore(Path(folder or passing) / POINTS)
+        return CoordinatedDesign(design_over_points(planned, executor, store, report, stage))

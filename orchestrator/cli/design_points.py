@@ -1,0 +1,118 @@
+"""``gfor design --points``: one setting for many operating points and outages."""
+
+import argparse
+import json
+import shlex
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.api.coordinated_design import WORKERS_IMPORT, compute
+from orchestrator.cases.case import load_case
+from orchestrator.cli.arguments import whole_from_zero
+from orchestrator.cli.case_arguments import parameters, values_set
+from orchestrator.cli.executors import add_executor_arguments, choose_executor
+from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.points import Progressing
+from orchestrator.cli.terminal import make_console, make_errors, print_questions
+from orchestrator.coordinated_design import words
+from orchestrator.coordinated_design.study import ALL, PointsDesignRequest, plan_points_design
+from orchestrator.coordinated_design.verdict import PointsVerdict
+from orchestrator.errors import InputError
+from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
+from orchestrator.screening.record import Status
+
+GAIN_BOUNDS = (0.0, 400.0)
+
+
+def add_points_arguments(parser: argparse.ArgumentParser) -> None:
+    """Options that a design over operating points has beside those of a design for one."""
+    group = parser.add_argument_group("over operating points")
+    group.add_argument(
+        "--points", type=Path, metavar="FILE", help="operating points: a CSV file, as gfor screen has it"
+    )
+    group.add_argument("--outages", metavar="WHICH", help="n-1, lines, units, or names, each at every point")
+    group.add_argument(
+        "--rank", type=whole_from_zero, default=3, metavar="N",
+        help="converters for which a controller alone is designed to rank them (default: 3)",
+    )  # fmt: skip
+    add_executor_arguments(group)
+
+
+def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
+    """Design, write the files and print.
+
+    Returns
+    -------
+    0; 1 where no point has modes, gfor-cosim itself failed somewhere, or ``--fail-unstable`` asks for it.
+    """
+    if len(options.scenario) > 1:
+        raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
+    modes = tuple(name for name in options.mode if name != ALL)
+    request = PointsDesignRequest(
+        controllers=tuple(options.controller),
+        components=tuple(options.component),
+        scenario=next(iter(options.scenario), None),
+        modes=() if ALL in options.mode else modes,
+        damping=options.damping,
+        gain_bounds=options.gain_bounds or GAIN_BOUNDS,
+        stages=options.stages,
+        least_damping=options.min_damping,
+        ranked=options.rank,
+        overrides=values_set(options),
+        parameters=parameters(options),
+        step_size=options.step,
+    )
+    executor = choose_executor(options, WORKERS_IMPORT)
+    case, console = load_case(options.case, trust_fmus=options.trust_fmus), make_console(stderr=options.json)
+    path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
+    planned = plan_points_design(case, request, options.points, options.outages)
+    print_questions([planned.prepared])
+    folder = made_folder(path.with_suffix(".points"), "--out")
+    progress = Progressing(folder)
+    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
+        design = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
+        written = design.save(path, _command_line(options))
+    verdict = design.result.verdict
+    if options.json:
+        print(json.dumps(design.as_json(), indent=1, ensure_ascii=False))
+    else:
+        colour = {True: "green", False: "red", None: "yellow"}[verdict.met]
+        word, _, rest = design.verdict.partition(":")
+        console.print(f"[bold {colour}]{word}[/]:{escape(rest)}", soft_wrap=True, highlight=False)
+        console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
+        for table in (words.settings_table(design.result), words.points_table(verdict)):
+            console.print("", table)
+        if options.rank:
+            console.print("", words.ranking_table(design.result))
+        console.print("")
+    for text in words.remarks(verdict):
+        make_errors().print(escape(text), soft_wrap=True)
+    if not options.json:
+        files = ", ".join(one.name for one in written[1:])
+        text = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
+        console.print(escape(text), soft_wrap=True, highlight=False)
+    return _exit_code(verdict, fail_unstable=options.fail_unstable)
+
+
+def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:
+    internal = any(point.before.status is Status.INTERNAL or point.after.status is Status.INTERNAL
+                   for point in verdict.points)  # fmt: skip
+    return int(internal or not verdict.known or (fail_unstable and not verdict.stable))
+
+
+def _command_line(options: argparse.Namespace) -> str:
+    """The command that was given, with all that is not left to its default."""
+    chosen = ["gfor", "design", str(options.case), "--points", str(options.points)]
+    several = {"--controller": options.controller, "--component": options.component, "--mode": options.mode,
+               "--scenario": options.scenario, "--parameters": options.parameters}  # fmt: skip
+    chosen += [word for option, values in several.items() for value in values for word in (option, str(value))]
+    low, high = options.gain_bounds or GAIN_BOUNDS
+    single = {"--outages": options.outages, "--stages": options.stages, "--step": options.step,
+              "--damping": None if options.damping is None else f"{100 * options.damping:g}%",
+              "--gain-bounds": f"{low:g}:{high:g}", "--min-damping": f"{100 * options.min_damping:g}%"}  # fmt: skip
+    chosen += [word for option, value in single.items() if value is not None for word in (option, str(value))]
+    for key, value in options.set:
+        chosen += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    return " ".join(shlex.quote(word) for word in chosen)

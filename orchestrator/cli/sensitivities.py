@@ -1,0 +1,100 @@
+"""``gfor sensitivities``: how each parameter of each FMU moves a mode."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.progress import shown_progress
+from orchestrator.api.scenario import Scenario
+from orchestrator.cli.arguments import frequency_range
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.cli.terminal import make_console, print_warnings, warn
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
+from orchestrator.errors import InputError
+from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
+from orchestrator.sensitivities.tables import left_out, sensitivity_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``gfor sensitivities``."""
+    add_case_arguments(parser)
+    parser.add_argument(
+        "--mode",
+        metavar="NAME",
+        help="a mode that the case names, or 'critical' for the least damped one (default: the first named one)",
+    )
+    parser.add_argument(
+        "--parameter",
+        action="append",
+        default=[],
+        metavar="COMPONENT.PARAMETER",
+        help="only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
+    )
+    parser.add_argument(
+        "--fixed", action="store_true", help="fixed parameters too: the case is started several times for each"
+    )
+    parser.add_argument(
+        "--held",
+        action="store_true",
+        help="partial derivatives at the held operating point, instead of the total ones; tunable parameters only",
+    )
+    parser.add_argument(
+        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
+    )
+    parser.add_argument(
+        "--directional",
+        action="store_true",
+        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write sensitivities.csv and sensitivities.json there")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_verdict_argument(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute, print, and write what is asked for; returns 1 if no parameter has a derivative."""
+    if options.held and options.fixed:
+        raise InputError("--held holds the operating point, which a fixed parameter moves; give one of them")
+    scenarios = chosen(options)
+    folder = made_folder(options.out, "--out") if options.out else None
+    with held(folder) if folder else nullcontext():
+        return _compute(scenarios, options, folder)
+
+
+def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
+    """See `run`."""
+    found = []
+    for scenario in scenarios:
+        with shown_progress("Parameters", shown=not options.json) as report:
+            found.append(
+                scenario.sensitivities(
+                    options.mode, options.parameter, fixed=options.fixed, held=options.held,
+                    directional=options.directional, frequencies=options.range, report=report,
+                )
+            )  # fmt: skip
+    written = []
+    if folder:
+        for scenario, one in zip(scenarios, found, strict=True):
+            written += one.save(folder / scenario.name)
+    results = [one.result.modes for one in found]
+    if options.json:
+        print(json.dumps([one.as_json() for one in found], indent=1, ensure_ascii=False))
+    else:
+        console = make_console()
+        print_verdicts(console, results)
+        print_warnings(results)
+        for one in found:
+            warn(one.result.modes.prepared.name, one.result.warnings)
+            console.print(sensitivity_table(one.result), "")
+            if missing := left_out(one.result):
+                console.print(f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", "")
+        if written:
+            console.print(escape(f"Written: {', '.join(map(str, written))}"), soft_wrap=True)
+    failed = int(all(row.derivative is None for one in found for row in one.result.rows))
+    return failed or exit_code(options, [r.stability for r in results])
