@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
-    ("orchestrator.arrays", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
+    ("orchestrator.arrays", "orchestrator.cores", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
     ("orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
@@ -25,7 +25,8 @@ FLOORS = (
     ("orchestrator.report",),
     ("orchestrator.study",),
     ("orchestrator.black_box", "orchestrator.pod_design", "orchestrator.sweep"),
-    ("orchestrator.certification",),
+    ("orchestrator.screening", "orchestrator.sensitivities"),
+    ("orchestrator.certification", "orchestrator.coordinated_design"),
     ("orchestrator.api",),
     ("orchestrator.cli",),
 )
@@ -140,7 +141,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
     """
     borrowers = {
         "orchestrator.black_box.bench",
-        "orchestrator.coupling.loop",
+        "orchestrator.coupling.compiled_loop",
         "orchestrator.coupling.wire_bank",
         "orchestrator.fmi.bound",
         "orchestrator.fmi.fmi3",
@@ -157,6 +158,8 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return True  # the first says which library is missing
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
+        if a in ("orchestrator.fmi.vendor_files", "orchestrator.fmi.dll_reading"):
+            return within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive") or b == "fmus"
         if a in ("orchestrator.fmi.instance", "orchestrator.ssp.archive"):
             return b == "fmus.toolchain.cache"  # what was built or unpacked here, and is intact, is trusted
         return within(a, *importers) and not within(b, "gfor_fmu")
@@ -254,6 +257,7 @@ ON_THE_FACE = {
     "linearize": {"cli.case_arguments.chosen"},
     "modes": {"cli.case_arguments.chosen"},
     "run": {"cli.case_arguments.chosen"},
+    "screen": {"api.screening.compute"},
     "sweep": {"api.sweep.plan", "api.sweep.compute"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
@@ -261,7 +265,7 @@ ON_THE_FACE = {
 COMPUTING = {
     *("acceptance.runner.check_fmu", "pod_design.design.design_pod", "study.comparison.compare"),
     *("study.comparison.strongest_modes", "study.linear.linear_model", "study.modes.compute_modes"),
-    *("study.run.run_scenario", "sweep.sweep.plan_sweep", "sweep.sweep.run_sweep"),
+    *("screening.study.run_screening", "study.run.run_scenario", "sweep.sweep.plan_sweep", "sweep.sweep.run_sweep"),
 }
 """Functions that the face wraps: a command that called one itself would hold a copy of the face's logic."""
 

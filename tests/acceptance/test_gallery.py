@@ -11,7 +11,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
-from tests.acceptance.gallery.build import check_macros
+from tests.acceptance.gallery.build import build, check_macros
 from tests.acceptance.gallery.hostile import HOSTILE
 from tests.acceptance.gallery.members import converter, faulty, good
 
@@ -73,6 +73,26 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
 def test_the_verdict_says_what_happened(name, only, words, gallery):
     found = check_fmu(*gallery(name), LIMITS, (only,), run_for=0.3)
     assert words in found.failures[0].evidence
+
+
+def test_a_crash_is_told_with_the_checks_that_led_to_it(tmp_path):
+    """As an export whose heap is damaged by an earlier call, and which dies in a later instance."""
+    path = build(converter("damaged_by_reset", FAULT_DAMAGED_BY_RESET=1), tmp_path)
+    found = check_fmu(path, None, LIMITS, ("repeatability", "reset", "sample_time"), run_for=0.3)
+    (failure,) = found.failures
+    assert (failure.check, failure.fault) == ("sample_time", "crash")
+    assert "not so in a new process: what came before it, repeatability, reset, damaged" in failure.evidence
+    alone = check_fmu(path, None, LIMITS, ("sample_time",), run_for=0.3)
+    assert alone.faults == []
+
+
+@pytest.mark.slow
+def test_a_slight_leak_of_each_instance_is_a_remark(tmp_path):
+    """As most FMUs of a well-known tool have it; no study would notice."""
+    path = build(converter("leaking_slightly", FAULT_LEAK_INSTANCE=300), tmp_path)
+    (_, found) = check_fmu(path, None, LIMITS, ("memory",), run_for=0.3).results
+    assert found.verdict == "remark"
+    assert 200 < found.figures["instance"] < 500
 
 
 @pytest.mark.slow

@@ -9,8 +9,20 @@ import pytest
 import orchestrator
 
 MODULES = (
-    *("acceptance", "case", "comparison", "comtrade", "design", "fmu", "identification", "linear", "models", "results"),
-    *("scenario", "sweep"),
+    *(
+        "acceptance",
+        "case",
+        "comparison",
+        "comtrade",
+        "coordinated_design",
+        "design",
+        "fmu",
+        "identification",
+        "linear",
+        "models",
+        "results",
+    ),
+    *("scenario", "screening", "sensitivities", "sweep"),
 )
 
 

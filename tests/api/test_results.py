@@ -64,6 +64,8 @@ def test_a_run_is_that_of_the_command(gfor, tmp_path, run):
     for one in (printed, summary):
         assert one.pop("steps_per_second")
         assert one.pop("share_in_fmus")
+        assert one.pop("real_time_factor")
+        assert one.pop("threads") == 1
     assert printed == summary
     same = face.compare(run, tmp_path / "dip", ["grid.v", "gfor.p"]).table()
     assert same["largest_difference"].tolist() == [0, 0]

@@ -94,7 +94,7 @@ class Latency:
         """The case's named modes [rad/s]."""
         model = self.model(delay)
         modes = [mode for mode in find_spectrum(model, *_EM_HZ).modes if mode.is_oscillation]
-        return {name: mode.eigenvalue for name, mode in named_modes(self.case, model, modes).items()}
+        return {name: mode.eigenvalue for name, mode in named_modes(self.case, model, modes).named.items()}
 
     def mode(self, delay: float) -> complex:
         """The first of them."""

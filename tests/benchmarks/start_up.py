@@ -19,9 +19,9 @@ ROOT = Path(__file__).parents[2]
 COMMANDS = {
     "two_area": ("modes", "two_area"),
     "ieee39": ("modes", "ieee39", "--scenario", "base"),
-    "ieee118": ("modes", "ieee118", "--scenario", "base"),
+    "ieee118": ("modes", "ieee118", "--scenario", "pod_pq"),
     "ieee118_all": ("modes", "ieee118"),
-    "wscc9_run": ("run", "wscc9", "--native", "--stop", "10", "--out", "{folder}/wscc9"),
+    "wscc9_run": ("run", "wscc9", "--scenario", "pod_p", "--native", "--stop", "10", "--out", "{folder}/wscc9"),
 }
 """Name → words of the command ``gfor``."""
 

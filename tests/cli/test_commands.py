@@ -257,9 +257,13 @@ def test_info_on_model_exchange_only(refused, damaged):
     )
 
 
-def test_info_on_an_fmu_for_other_platforms(refused, damaged):
+def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged):
+    """A vendor's FMU for Windows alone can be looked at, and not run."""
     path = damaged(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
-    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused("info", path)
+    code, out, _ = gfor("info", path)
+    assert code == 0
+    assert f"It cannot run here: it has no binary for this platform ({fmpy.platform})" in " ".join(out.split())
+    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused("bind", path)
 
 
 # -- run -------------------------------------------------------------------------------------------
@@ -322,6 +326,20 @@ def test_plots_tables_and_the_case_itself_are_left_in_the_folder(results):
         assert {row["schedule"] for row in csv.DictReader(file)} == {"gauss-seidel", "jacobi"}
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--threads", "0"), "'0' is not a whole number from 1 to 64"),
+        (("--threads", "65"), "'65' is not a whole number from 1 to 64"),
+        (("--threads", "2", "--like", "libcosim"), "--like steps as another master does, on one thread"),
+    ],
+)
+def test_threads_that_cannot_be_had_are_refused(gfor, words, said):
+    code, _, error = gfor("run", "two_area", *words)
+    assert code == 2
+    assert said in " ".join(error.split())
+
+
 def test_summary_and_tables_show_the_same_mode(results):
     folder, printed = results
     (scenario,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["scenarios"]
@@ -329,6 +347,10 @@ def test_summary_and_tables_show_the_same_mode(results):
     assert scenario["residual"] <= 1e-9
     assert 0 < scenario["share_in_fmus"] <= 1
     assert scenario["steps_per_second"] > 100
+    assert scenario["real_time_factor"] == pytest.approx(scenario["steps_per_second"] * scenario["step_size_s"])
+    assert scenario["threads"] == 1
+    assert "× real time" in printed
+    assert "(Python-backed); with --native several threads can." in " ".join(printed.split())
     mode = scenario["modes"]["electromechanical"]
     assert f"{mode['real']:+.4f} ± j{mode['imag']:.4f}" in printed
     with (folder / "modes.csv").open(encoding="utf-8") as file:

@@ -77,7 +77,8 @@ def values_of(folder):
         elif path.name == "summary.json":
             found[name] = json.loads(path.read_text(encoding="utf-8"))
             for scenario in found[name]["scenarios"]:
-                del scenario["steps_per_second"], scenario["share_in_fmus"]
+                for speed in ("steps_per_second", "share_in_fmus", "real_time_factor", "threads"):
+                    del scenario[speed]
         else:
             found[name] = path.read_bytes()
     return found
@@ -130,6 +131,18 @@ def test_sigterm_leaves_nothing_behind_and_the_run_goes_on(case, undisturbed, tm
         assert "ended by SIGTERM" in error
         finished(tmp_path / "tmp", "--resume", out)
     assert values_of(out) == undisturbed[0]
+
+
+@pytest.mark.slow
+def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(case, tmp_path):
+    words = (case, "--native", "--scenario", "pod_pq", "--threads")
+    finished(tmp_path / "tmp", *words, 1, "--out", tmp_path / "whole")
+    out = tmp_path / "out"
+    process = started(tmp_path / "tmp", *words, 3, "--out", out, "--checkpoint", "0.01")
+    stopped_at_random(process, out, 0.1, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out, "--threads", 2)
+    assert values_of(out) == values_of(tmp_path / "whole")
 
 
 @pytest.mark.slow

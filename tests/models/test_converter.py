@@ -95,7 +95,7 @@ def by_hand(p, x, v):
     rates["droop.theta"] = omega_b * (w - 1)
     u_ref = p["droop.U_ref"] + p["droop.delta_U_ref"]
     u_ref += p["droop.R_V"] * (p["droop.Q_ref"] + p["droop.delta_Q_ref"] + delta_q - x["droop.Q_f"])
-    v_c = _inner_loops(p, x, qd, rates, u, u_ref, w)
+    v_c, demand = _inner_loops(p, x, qd, rates, u, u_ref, w)
     into_grid = u - v * exp(-1j * x["droop.theta"]) - (p["transformer.R_t"] + 1j * w * p["transformer.X_t"]) * i_g
     X_c, B_c = p["filter.X_c"], p["filter.B_c"]
     for name, rate in {
@@ -108,6 +108,7 @@ def by_hand(p, x, v):
     at_bus, scale = v * injected.conjugate(), p["S_n"] / p["S_base"]
     outputs = {"i_re": injected.real * scale, "i_im": injected.imag * scale, "p": at_bus.real, "q": at_bus.imag}
     outputs |= {"omega": w, "delta_p_pod": delta_p, "delta_q_pod": delta_q, "u": abs(u), "i_s": abs(i_s)}
+    outputs["current_demand"] = demand
     return rates, outputs
 
 
@@ -116,7 +117,7 @@ def _put(rates, name, rate):
 
 
 def _inner_loops(p, x, qd, rates, u, u_ref, w):
-    """Voltage PI, limits, current PI; returns the converter's voltage."""
+    """Voltage PI, limits, current PI; returns the converter's voltage, and the demand in parts of the limits."""
     omega_b = 2 * np.pi * p["f_n"]
     i_s, i_g = qd("filter.i_s"), qd("transformer.i_g")
     tau, xi, C = p["voltage_control.tau"], p["voltage_control.xi"], p["filter.B_c"] / omega_b
@@ -132,7 +133,9 @@ def _inner_loops(p, x, qd, rates, u, u_ref, w):
     _put(rates, "current_control.x", p["filter.R_c"] / tau * (i_ref - i_s))
     _put(rates, "feed_forward.u", (u - qd("feed_forward.u")) / p["feed_forward.tau"])
     _put(rates, "feed_forward.i_g", (i_g - qd("feed_forward.i_g")) / p["feed_forward.tau"])
-    return L / tau * (i_ref - i_s) + qd("current_control.x") + 1j * w * p["filter.X_c"] * i_s + qd("feed_forward.u")
+    demand = max(abs(demanded.real) / i_q_max, abs(demanded.imag) / i_d_max)
+    v_c = L / tau * (i_ref - i_s) + qd("current_control.x") + 1j * w * p["filter.X_c"] * i_s + qd("feed_forward.u")
+    return v_c, demand
 
 
 def _stages(p, x, pod):

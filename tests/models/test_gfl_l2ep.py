@@ -17,7 +17,8 @@ OTHERWISE = {
     "measurement.tau": 0.005, "active_power.K_p": 0.05, "active_power.K_i": 12.0, "active_power.delta_P_ref": 0.03,
     "reactive_power.K_p": 0.12, "reactive_power.K_i": 40.0, "reactive_power.delta_ref": -0.02,
     "reactive_power.support.V_1": 0.93, "reactive_power.support.V_2": 0.6, "current_limit.I_max": 0.9,
-    "current_limit.tau": 0.003, "current_limit.recovery": 2.0, "current_control.K_p": 0.5, "current_control.K_i": 7.0,
+    "pll.freezing.V_low": 0.75, "pll.freezing.V_high": 0.9, "current_limit.tau": 0.003,
+    "current_limit.recovery": 2.0, "current_control.K_p": 0.5, "current_control.K_i": 7.0,
 }  # fmt: skip
 
 
@@ -30,8 +31,15 @@ def by_hand(p, x, v):
     bus = v * exp(-1j * theta)
     v_d, v_q = bus.real / r, bus.imag / r
     w_0 = 2 * np.pi * p["pll.f_0"]
-    w = 1 + 2 * p["pll.xi"] * w_0 / w_N * bus.imag + x["pll.x"]
-    rates = {"pll.x": w_0**2 / w_N * bus.imag, "pll.theta": w_N * (w - 1)}
+    awake = x["pll.freezing.awake"]
+    runs = float(awake > 0.5)
+    held = 0.0 if abs(v) < p["pll.freezing.V_low"] else 1.0 if abs(v) > p["pll.freezing.V_high"] else runs
+    w = 1 + runs * 2 * p["pll.xi"] * w_0 / w_N * bus.imag + x["pll.x"]
+    rates = {
+        "pll.x": runs * w_0**2 / w_N * bus.imag,
+        "pll.theta": runs * w_N * (w - 1),
+        "pll.freezing.awake": (held - awake) / 1e-3,
+    }
     s = v * (complex(i_d, i_q) / r * exp(1j * theta)).conjugate()
     inside = abs(complex(v_d + R * i_d - L * i_q, v_q + R * i_q + L * i_d))
     I_active = np.clip(x["current_limit.I_active"], 0, I_max)
@@ -80,8 +88,8 @@ def by_hand(p, x, v):
 @pytest.mark.parametrize("mode", [0, 1])
 def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(mode, size, connected):
     device = Evaluated(build_model("gfl_l2ep"), OTHERWISE | {"reactive_power.mode": mode, "connected": connected})
-    limited = set()
-    for seed in range(20):
+    limited, held = set(), set()
+    for seed in range(60):
         rng = np.random.default_rng(seed)
         x = {name: value + size * rng.standard_normal() for name, value in device.states.items()}
         v = 1.03 * exp(0.6j) * (1 + size * exp(1j * seed))
@@ -89,7 +97,9 @@ def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(mode, si
         assert device.rates([v.real, v.imag], device.vector(x)) == pytest.approx(rates, rel=1e-9, abs=1e-9)
         assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(outputs, rel=1e-9, abs=1e-9)
         limited.add(outputs["current_demand"] > 1)
+        held.add((x["pll.freezing.awake"] > 0.5, abs(v) < 0.75, abs(v) > 0.9))
     assert limited == ({False} if size < 0.1 else {False, True})
+    assert len(held) == (1 if size < 0.1 else 6)  # running and standing, below, between and above the thresholds
 
 
 @pytest.mark.parametrize("mode", [0, 1])
@@ -154,3 +164,44 @@ def test_in_a_dip_reactive_current_goes_first_and_active_current_comes_back_at_t
     assert (p[1990], q[1990], i[1990]) == pytest.approx((0.0, 0.4, 1.0), abs=0.02)
     assert (p[4500] - p[3000]) / 0.15 == pytest.approx(0.5, rel=0.02)
     assert p[3000] == pytest.approx(0.5 * 0.1 + 0.03, abs=0.03)
+
+
+def test_the_pll_stands_in_a_deep_dip_and_until_the_voltage_is_clearly_back(fmu_path):
+    """The bus voltage jumps by 30 degrees: in between the thresholds the angle follows only if it did before."""
+    turned, step = exp(1j * np.pi / 6), 1e-3
+    followed = {}
+    for way in ((0.45,), (0.3,), (0.3, 0.45), (0.3, 0.45, 0.55)):
+        with LoadedComponent("wp", read_description(fmu_path("gfl_l2ep"))) as device:
+            started(device, {"P_0": 0.8})
+            for part, size in enumerate(way):
+                v = size * turned
+                device.set({"v_re": v.real, "v_im": v.imag})
+                for k in range(300):
+                    device.step((300 * part + k) * step, step)
+            followed[way] = device.get(["pll.theta"])["pll.theta"]
+    assert followed[0.45,] == pytest.approx(np.pi / 6, abs=0.05)
+    assert followed[0.3, 0.45, 0.55] == pytest.approx(np.pi / 6, abs=0.05)
+    assert 0 <= followed[0.3,] < 0.1
+    assert followed[0.3, 0.45] == followed[0.3,]
+
+
+def test_thresholds_of_the_pll_the_wrong_way_round_are_refused(fmu_path):
+    refusal = pytest.raises(ComponentError, match=r"pll\.freezing\.V_high must be above pll\.freezing\.V_low")
+    with LoadedComponent("wp", read_description(fmu_path("gfl_l2ep"))) as device, refusal:
+        started(device, {"pll.freezing.V_low": 0.6})
+
+
+def test_native_and_python_backed_fmus_give_the_same_bits_through_a_dip(fmu_path):
+    """The PLL stands and runs again in it."""
+    found = []
+    for native in (False, True):
+        with LoadedComponent("wp", read_description(fmu_path("gfl_l2ep", native))) as device:
+            started(device, {"P_0": 0.8})
+            rows = []
+            for k in range(400):
+                device.set({"v_re": 0.3 if 100 <= k < 200 else 0.98, "v_im": 0.2 if k >= 200 else 0.0})
+                device.step(k * 1e-3, 1e-3)
+                rows.append(list(device.get(["i_re", "i_im", "omega", "pll.theta", "pll.freezing.awake"]).values()))
+        found.append(np.array(rows))
+    assert found[0][:, 4].min() < 0.5 < found[0][-1, 4]
+    assert (found[0] == found[1]).all()

@@ -24,7 +24,10 @@ LOAD, REACTORS = 11.687 - 1.776j, {"E": 3.0, "F": 2.0}
 
 @dataclass(frozen=True)
 class Converter:
-    """One converter; P [MW], and V [pu] or Q [Mvar] of its bus in the power flow."""
+    """One converter; P [MW], and V [pu] or Q [Mvar] of its bus in the power flow.
+
+    ``pll_integral`` multiplies the PLL's integral gain of 25/T².
+    """
 
     bus: str
     S: float
@@ -43,6 +46,7 @@ class Converter:
     K_pp: float = 0.0333
     K_ip: float = 10.0
     T_pll: float = 0.1
+    pll_integral: float = 1.0
 
 
 WP1 = Converter("E", 2400.0, 1991.9, 0.12, 1.04, 0.4584, Q=-146.6, by_voltage=False, K_pv=0.0333, K_iv=10.0)
@@ -61,8 +65,12 @@ class FourVsc:
         Short-circuit power of the equivalent [MVA].
     dynamic
         Whether the network has its own differential equations (EMT), or is one of admittances (phasors).
+    circuits_AB, circuits_AC, circuits_BC
+        That are closed; the power flow is that of two each.
     load
         ``"parallel"``: conductance beside an inductor; ``"series"``; ``"none"``: the equivalent takes its power.
+    load_share
+        Of the load; the equivalent takes the rest.
     fed_forward, actuated
         Lags of the voltage that is fed forward, and of the converter's voltage [s]; 0 in the benchmark's equations.
     """
@@ -72,20 +80,29 @@ class FourVsc:
     converters: tuple[Converter, ...] = (WP1, WP2, HVDC1, HVDC2)
     tap_B: float = 1.05
     circuits_AB: int = 2
+    circuits_AC: int = 2
+    circuits_BC: int = 2
     R_X: float = 0.0
     load: str = "parallel"
+    load_share: float = 1.0
     fed_forward: float = 0.0
     actuated: float = 0.0
     branches: tuple = field(init=False)
 
     def __post_init__(self):
         rows = [("A", "B", 0.51, 10.24, 48e-6)] * self.circuits_AB
-        rows += [("A", "C", 1.04, 20.80, 98e-6)] * 2 + [("B", "C", 1.12, 22.40, 105e-6)] * 2
+        rows += [("A", "C", 1.04, 20.80, 98e-6)] * self.circuits_AC
+        rows += [("B", "C", 1.12, 22.40, 105e-6)] * self.circuits_BC
         found = [(a, b, R / Z_400, X / Z_400, Y * Z_400, 1.0) for a, b, R, X, Y in rows]
         found += [(a, b, 0.42 / Z_225, 0.83 / Z_225, 9e-3 * Z_225, 1.0) for a, b in (("A2", "E"), ("B2", "F"))]
         found += [("A2", "A", 0.005 / 24, 0.15 / 24, 0.0, 1.0), ("B2", "B", 0.005 / 24, 0.15 / 24, 0.0, self.tap_B)]
         at = BUSES.index
         object.__setattr__(self, "branches", tuple((at(a), at(b), *rest) for a, b, *rest in found))
+
+    @property
+    def admittance(self):
+        """Of the load [pu]."""
+        return 0.0 if self.load == "none" else self.load_share * LOAD
 
     @property
     def Z_eq(self):
@@ -103,12 +120,12 @@ class FourVsc:
         for bus, b in REACTORS.items():
             Y[BUSES.index(bus), BUSES.index(bus)] -= 1j * b
         if with_load:
-            Y[C, C] += LOAD
+            Y[C, C] += self.admittance
         return Y
 
     def power_flow(self):
         """Voltages, and powers into the network [pu]; the benchmark's flow has both circuits."""
-        Y = replace(self, circuits_AB=2).admittances(with_load=False)
+        Y = replace(self, circuits_AB=2, circuits_AC=2, circuits_BC=2).admittances(with_load=False)
         free = [k for k in range(7) if k != C]
         by_bus = {BUSES.index(u.bus): u for u in self.converters}
 
@@ -144,7 +161,7 @@ class FourVsc:
             units.append((u, k, P, controlled))
             x += [d.real, d.imag, np.angle(v[k]), 0.0, u.R * d.real, u.R * d.imag, P, d.real, controlled, d.imag]
             x += [V, inside.real, inside.imag]
-        into = np.conj(s[C] / v[C]) + (LOAD * v[C] if self.load != "none" else 0.0)
+        into = np.conj(s[C] / v[C]) + self.admittance * v[C]
         E = v[C] + self.Z_eq * into
         if self.dynamic:
             z = [*v, *((v[i] - v[j] / n) / (R + 1j * X) for i, j, R, X, _, n in self.branches)]
@@ -156,9 +173,9 @@ class FourVsc:
         """Inductors to earth: bus, resistance and reactance [pu]."""
         found = [(BUSES.index(bus), 0.0, 1 / b) for bus, b in REACTORS.items()]
         if self.load == "parallel":
-            found.append((C, 0.0, -1 / LOAD.imag))
+            found.append((C, 0.0, -1 / self.admittance.imag))
         if self.load == "series":
-            found.append((C, (1 / LOAD).real, (1 / LOAD).imag))
+            found.append((C, (1 / self.admittance).real, (1 / self.admittance).imag))
         return found
 
     def rates(self):
@@ -169,7 +186,7 @@ class FourVsc:
         for i, j, _, _, b, _ in self.branches:
             B[i] += b
             B[j] += b
-        Y = self.admittances(with_load=self.load != "none")
+        Y = self.admittances(with_load=True)
         Y[C, C] += 1 / self.Z_eq
         impedances = np.linalg.inv(Y)
 
@@ -183,7 +200,7 @@ class FourVsc:
         def network(x, I):  # noqa: E741
             z = x[size * len(units) :: 2] + 1j * x[size * len(units) + 1 :: 2]
             v, lines, rest = np.split(z, [7, 7 + len(self.branches)])
-            I = I - B * 1j * v - (LOAD.real * v * (np.arange(7) == C) if self.load == "parallel" else 0.0)  # noqa: E741
+            I = I - B * 1j * v - (self.admittance.real * v * (np.arange(7) == C) if self.load == "parallel" else 0.0)  # noqa: E741
             rates = []
             for (i, j, R, X, _, n), now in zip(self.branches, lines, strict=True):
                 I[i] -= now
@@ -228,7 +245,7 @@ class FourVsc:
             W / u.L * (v_d - e.real - u.R * d + w * u.L * q),
             W / u.L * (v_q - e.imag - u.R * q - w * u.L * d),
             W * (w - 1),
-            25 / (W * u.T_pll**2) * bus.imag,
+            u.pll_integral * 25 / (W * u.T_pll**2) * bus.imag,
             u.K_ic * e_d,
             u.K_ic * e_q,
             (s.real - P_f) / u.T,
@@ -249,6 +266,12 @@ class FourVsc:
             if np.abs(change).max() < 1e-10:
                 break
         return np.linalg.eigvals(_jacobian(f, x))
+
+    def oscillation(self):
+        """The least stable eigenvalue from 6 to 40 Hz; None where there is none."""
+        found = self.eigenvalues()
+        found = found[(found.imag > 12 * np.pi) & (found.imag < 80 * np.pi)]
+        return found[np.argmax(found.real)] if len(found) else None
 
     def critical(self):
         """The least stable eigenvalue but the direct components of loops of inductors, at ±j·ω_b."""

@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,8 @@ from orchestrator.study.run import run_scenario
 pytestmark = pytest.mark.reproduction
 
 SCENARIOS = ("base", "gfor", "pod_p", "pod_q", "pod_pq")
+NATIVE = {"sg*.native": True, "gfor*.native": True}
+"""What is simulated for long: 56 of the FMUs. They give the numbers of those with Python, in a quarter of the time."""
 # An independent monolithic linearisation of the same data: (Hz, damping %) of the least damped modes.
 INDEPENDENT = {
     "base": [(0.6669, 5.775), (0.8907, 6.832), (0.8287, 6.917), (1.1092, 8.359), (1.0482, 8.438), (0.9846, 8.98)],
@@ -30,10 +33,16 @@ def prepare(scenario, overrides=None, **arguments):
     return ready
 
 
+@cache
+def modes(scenario):
+    """Of the scenario as it stands, from 0.1 to 2 Hz; several tests look at them."""
+    return compute_modes(prepare(scenario))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_three_critical_modes_are_the_papers(scenario):
-    result = compute_modes(prepare(scenario), (0.3, 1.3))
+    result = modes(scenario)
     assert set(result.references) == {"1-2", "3-4", "5-6"}
     for name, reference in result.references.items():
         assert result.named[name].frequency_hz == pytest.approx(reference.frequency_hz, abs=0.02), name
@@ -61,10 +70,8 @@ def test_the_power_flow_gives_the_published_reactive_powers():
 
 @pytest.mark.slow
 def test_another_share_of_converters_moves_every_mode():
-    quarter, half = (
-        compute_modes(prepare("gfor", {"units.alpha": alpha}), (0.3, 1.3)).named["1-2"] for alpha in (0.25, 0.5)
-    )
-    assert half.damping_percent > quarter.damping_percent + 1
+    half = compute_modes(prepare("gfor", {"units.alpha": 0.5})).named["1-2"]
+    assert half.damping_percent > modes("gfor").named["1-2"].damping_percent + 1  # a quarter
     assert len(prepare("gfor", {"units.alpha": 1.0}).system.components) == 29
 
 
@@ -72,23 +79,19 @@ def test_another_share_of_converters_moves_every_mode():
 def test_which_coupling_is_stable_is_known_before_any_run():
     ready = prepare("gfor")
     with Master(ready.system, ready.schedule, ready.step_size) as master:
-        blocks = Blocks(master)
-        growth = {
-            "gauss-seidel 100 us": eigenvalues(compose(blocks, ready.schedule)).real.max(),
-            "jacobi 100 us": eigenvalues(compose(blocks, jacobi(tuple(master.components)))).real.max(),
-            "gauss-seidel 500 us": eigenvalues(compose(Blocks(master, 5e-4), ready.schedule)).real.max(),
-        }
-    assert growth["gauss-seidel 100 us"] < 1e-2
-    assert growth["jacobi 100 us"] > 100
-    assert growth["gauss-seidel 500 us"] > 100
-    warning, advice = compute_modes(prepare("gfor", step_size=5e-4)).warnings
+        side_by_side = compose(Blocks(master), jacobi(tuple(master.components)))
+    slower = compute_modes(prepare("gfor", step_size=5e-4))
+    assert eigenvalues(modes("gfor").model).real.max() < 1e-2
+    assert eigenvalues(side_by_side).real.max() > 100
+    assert eigenvalues(slower.model).real.max() > 100
+    warning, advice = slower.warnings
     assert "numerically unstable" in warning
     assert "against the unstable coupling, take a step of 0.0002 s" in advice
 
 
 @pytest.mark.slow
 def test_twenty_undisturbed_seconds_stay_where_they_began():
-    ready = prepare("pod_pq")
+    ready = prepare("pod_pq", NATIVE)
     dataset = run_scenario(replace(ready, events=())).dataset
     drift = {n: float(abs(dataset[n] - dataset[n][0]).max()) for n in dataset.data_vars}
     assert dataset["time"][-1] == 20.0
@@ -96,14 +99,14 @@ def test_twenty_undisturbed_seconds_stay_where_they_began():
 
 
 @pytest.mark.slow
-def test_sixty_seconds_after_a_load_step_ring_down_with_the_mode():
-    ready = prepare("pod_pq", {"*.native": True}, stop_time=60.0)
+def test_thirty_seconds_after_a_load_step_ring_down_with_the_mode():
+    ready = prepare("pod_pq", NATIVE, stop_time=30.0)
     result = run_scenario(ready)
     mode, seen = result.modes.named["1-2"], result.ring_down
     assert seen.frequency_hz == pytest.approx(mode.frequency_hz, abs=0.005)
     assert seen.damping_percent == pytest.approx(mode.damping_percent, abs=0.5)
     difference = abs(result.dataset["sg12.omega"] - result.dataset["sg92.omega"])
-    assert float(difference.sel(time=slice(50, 60)).max()) < 0.01 * float(difference.max())
+    assert float(difference.sel(time=slice(25, 30)).max()) < 0.01 * float(difference.max())
 
 
 PAPER_GOVERNOR = {
@@ -130,8 +133,7 @@ def test_the_papers_own_governor_table_does_not_give_its_frequencies(scenario, f
 
 @pytest.mark.slow
 def test_the_sparse_search_finds_what_the_full_spectrum_has():
-    ready = prepare("pod_pq")
-    full, found = compute_modes(ready), compute_modes(ready, critical=0.15)
+    full, found = modes("pod_pq"), compute_modes(prepare("pod_pq"), critical=0.15)
     wanted = [m for m in full.modes if m.damping_ratio <= 0.15]
     assert len(wanted) == len(found.modes) > 20
     for one, other in zip(found.modes, wanted, strict=True):
@@ -141,7 +143,7 @@ def test_the_sparse_search_finds_what_the_full_spectrum_has():
 
 @pytest.mark.slow
 def test_who_swings_against_whom():
-    result = compute_modes(prepare("base"), (0.3, 1.3))
+    result = modes("base")
     together, against = result.swing_of(result.named["1-2"])
     assert together[0] == "sg12"
     assert "sg92" in against

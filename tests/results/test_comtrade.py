@@ -90,6 +90,9 @@ def test_the_form_of_1991(recording):
     assert dataset["UL1"].values == pytest.approx([11, 12, 7])
     assert np.isnan(dataset["F (A2)"].values[1])
     assert dataset["CB"].values.tolist() == [0, 1, 1]
+    with pytest.warns(ResultsWarning, match=r"rec.dat, line 2: 99999 is taken as a missing sample \(F \(A2\); 1 in"):
+        marked = read_comtrade(recording(cfg))
+    assert np.isnan(marked["F (A2)"].values[1])
 
 
 def test_times_from_several_rates_and_from_stamps(recording):

@@ -261,10 +261,10 @@ def test_whole_numbers_have_only_whole_numbers_in_between(case, tmp_path, monkey
 
 def test_a_mode_beyond_the_range_is_not_followed_there(case, tmp_path):
     result = sweep(case, tmp_path / "p", "a1.gain=6:60:19", scenarios=["two"], frequency_range=(0.5, 2.0))
-    frequencies = curve(result.scenarios[0], "first 1")
+    frequencies = curve(result.scenarios[0], "first")
     inside = [g for g in np.linspace(6, 60, 19) if np.sqrt(g * FULL_TURN) / FULL_TURN <= 2.0]
     assert [place for (place,) in frequencies] == list(range(len(inside)))
-    assert len(curve(result.scenarios[0], "first 2")) == 19  # the only one that is left to have the name
+    assert len(curve(result.scenarios[0], "mode 2")) == 19  # the only one that is left, and not the one that is meant
 
 
 # -- keeping -----------------------------------------------------------------------------------------

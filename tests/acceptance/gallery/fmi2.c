@@ -80,6 +80,9 @@ static void defaults(state_t *s) {
 EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                              const callbacks_t *callbacks, int visible, int logging) {
     if (strcmp(guid, GUID)) return NULL;
+#ifdef FAULT_DAMAGED_BY_RESET
+    if (getenv("DAMAGED") && instances_made == 0) abort(); /* once the library is loaded again */
+#endif
 #ifdef FAULT_CRASH_AGAIN
     if (instances_freed) *(volatile int *)8 = 1;
 #endif
@@ -119,14 +122,19 @@ EXPORT void fmi2FreeInstance(void *c) {
 #ifdef FAULT_HANG_ON_FREE
     for (static volatile int spin; instance->calls > FAULT_HANG_ON_FREE;) ++spin;
 #endif
-#ifndef FAULT_LEAK_INSTANCE
     free(instance->name);
     free(instance);
+#ifdef FAULT_LEAK_INSTANCE
+    char *volatile kept = malloc(FAULT_LEAK_INSTANCE);
+    if (kept) memset(kept, 1, FAULT_LEAK_INSTANCE);
 #endif
 }
 
 EXPORT int fmi2SetupExperiment(void *c, int defined, double tolerance, double start, int stop_defined, double stop) {
     instance_t *instance = c;
+#ifdef FORGETS_AT_SETUP
+    defaults(S);
+#endif
 #ifndef FAULT_RESET_TIME
     S->time = start;
 #endif
@@ -134,6 +142,9 @@ EXPORT int fmi2SetupExperiment(void *c, int defined, double tolerance, double st
 }
 EXPORT int fmi2EnterInitializationMode(void *c) {
     instance_t *instance = c;
+#ifdef FAULT_FORGETS_AT_ENTRY
+    memcpy(S->z, START, sizeof START);
+#endif
     S->phase = INITIALISING, S->dirty = 1;
 #if defined INITIALISED_AT_ENTRY || defined FAULT_OUTPUTS_AT_ENTRY
     initialise(S->z, S->memory);
@@ -180,6 +191,9 @@ EXPORT int fmi2Terminate(void *c) {
     return OK;
 }
 EXPORT int fmi2Reset(void *c) {
+#ifdef FAULT_DAMAGED_BY_RESET
+    setenv("DAMAGED", "1", 1);
+#endif
     instance_t *instance = c;
     instance->was_reset = 1;
     instance->at_exit = 0;

@@ -255,7 +255,7 @@ def faulty():
         wrong("reading", "reading changes it", FAULT_READING="1e-4"),
         wrong("leaking", "memory leak", FAULT_LEAK=64),
         wrong("leaking_little", "memory leak", FAULT_LEAK=8),
-        wrong("leaking_instances", "memory leak", FAULT_LEAK_INSTANCE=1),
+        wrong("leaking_instances", "memory leak", FAULT_LEAK_INSTANCE=16384),
         wrong("leaking_states", "memory leak", FAULT_LEAK_STATE=1),
         wrong("crash", "crash", FAULT_CRASH_AT=0.05),
         wrong("crash_late", "crash", FAULT_CRASH_AT=1.7),

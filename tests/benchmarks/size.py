@@ -1,0 +1,183 @@
+"""How cost grows with the size of a network: ``python -m tests.benchmarks.size [CASE ...]``.
+
+pandapower's networks of 39 to 9241 buses with a machine and a converter at every bus with generators, as phasor models
+at 5 ms. A row for each: seconds of processor time of each part, peak memory, steps per second; then the exponents with
+which all that grows with the number of buses. Each network has a process of its own, with nothing kept from others.
+``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.linearization import Blocks, compose
+from orchestrator.analysis.modes import eigenvalues
+from orchestrator.analysis.stability import WHOLE
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.case import load_case
+from orchestrator.cases.network_data import network_data
+from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowShunt, FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.schema import NetworkTable
+from orchestrator.coupling.master import Master
+
+CASES = ("case39", "case118", "case300", "case1354pegase", "case2869pegase", "case9241pegase")
+
+STRAY = 0.001
+"""pu: only there because every bus must have something to earth; phasor models need none of it."""
+
+BELOW, HIGHEST_HZ, LOWEST_HZ = 0.1, 2.0, 0.1
+"""Critical modes: damping ratio and range of frequencies."""
+
+STEPS = 200
+_LOADING, _LEAST_MVA = 0.6, 20.0
+
+
+def write_case(name: str, folder: Path) -> Path:
+    """A case file, with ratings by which no unit is loaded by more than `_LOADING` of its rating."""
+    data = network_data(NetworkTable(pandapower=name, stray_B=STRAY), folder)
+    units = [FlowUnit(g.label, bus, 100.0, g.p_mw / 100, g.v_pu) for bus, g in data.generation.items()]
+    begun = time.process_time()
+    flow = _flow(data, units)
+    print(json.dumps({"flow": time.process_time() - begun, "buses": len(data.buses)}), file=sys.stderr)
+    ratings = {u.name: max(abs(flow.powers[u.name]) * u.S_n / _LOADING, _LEAST_MVA) for u in units}
+    rows = ["bus,rating_mva", *(f"{label},{rating:.1f}" for label, rating in ratings.items())]
+    (folder / "units.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    path = folder / "case.toml"
+    path.write_text(
+        f"""
+name = "{name}"
+title = "{name}: a machine and a converter at every bus with generators"
+source = "pandapower"
+[solver]
+step_size = "5 ms"
+stop_time = "10 s"
+record_interval = "10 ms"
+[power_flow]
+grid = "grid"
+reactive_limits = false
+[components.grid]
+model = "phasor_grid"
+[network]
+pandapower = "{name}"
+stray_B = {STRAY}
+[units]
+file = "units.csv"
+alpha = 0.25
+generator = "synchronous_generator_ac4a_phasor"
+converter = "gfor_phasor"
+generator_parameters = {{ transformer.X_t = 0.0, transformer.R_t = 0.0, machine.exact_conversion = true }}
+[scenarios.base]
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+def _flow(data: Any, units: list[FlowUnit]) -> PowerFlow:
+    lines = [FlowLine(x.name, x.from_bus, x.to_bus, R=x.R, X=x.X, B=x.B, tap=x.tap, shift=x.shift) for x in data.lines]
+    loads = [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in data.loads]
+    shunts = [FlowShunt(x.bus, x.g_mw / 100, x.b_mvar / 100) for x in data.shunts]
+    return solve_power_flow(data.buses, lines, loads, units, data.slack, shunts)
+
+
+def measure(name: str, native: str, *, check: bool) -> dict[str, float]:
+    """Figures of one network, in seconds of processor time, children's included, where nothing else is said."""
+    row: dict[str, float] = {}
+
+    @contextmanager
+    def timed(key: str) -> Iterator[None]:
+        begun, wall = _processor_time(), time.perf_counter()
+        yield
+        row[key], row[f"{key}_wall"] = _processor_time() - begun, time.perf_counter() - wall
+        print(f"  {name}: {key} {row[key]:.2f} s, wall {row[f'{key}_wall']:.1f} s", file=sys.stderr, flush=True)
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_case(name, Path(folder))
+        case = load_case(path)
+        choices = {f"{pattern}.native": True for pattern in native.split(",") if pattern}
+        with timed("build"):
+            (prepared,) = case.prepare(overrides=choices)
+        with timed("prepare"):
+            case.prepare(overrides=choices)
+        components = prepared.system.components
+        row["buses"] = sum(output.endswith(".v_re") for output in components["grid"].description.outputs)
+        row["fmus"] = len(components)
+        with timed("instances"):
+            master = Master(prepared.system, prepared.schedule, prepared.step_size)
+        with master:
+            row["states"] = sum(len(c.description.states) for c in master.components.values())
+            with timed("steady"):
+                row["residual"] = find_operating_point(master).residual
+            with timed("linearise"):
+                model = compose(Blocks(master), master.schedule)
+            with timed("modes"):
+                critical = find_critical_modes(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
+            row["found"] = len(critical)
+            row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            if check and len(model.names) <= WHOLE:
+                row |= _against_dense(eigenvalues(model), critical)
+            begun = time.process_time()
+            master.advance(STEPS)
+            row["steps"] = STEPS / (time.process_time() - begun)
+    return row
+
+
+def _against_dense(values: Any, critical: list[Any]) -> dict[str, float]:
+    """Number of dense eigenvalues in the same region, and the largest distance of a critical mode from the nearest."""
+    hertz, damping = values.imag / (2 * np.pi), -values.real / np.abs(values)
+    inside = (hertz >= LOWEST_HZ) & (hertz <= HIGHEST_HZ) & (damping <= BELOW) & (damping >= -0.1)
+    apart = [float(np.abs(values - mode.eigenvalue).min()) for mode in critical]
+    return {"dense_found": int(inside.sum()), "apart": max(apart, default=0.0)}
+
+
+def _processor_time() -> float:
+    """Of this process and of its children that have ended [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cases", nargs="*", default=CASES)
+    parser.add_argument("--one", action="store_true", help="measure one case in this process, and print JSON")
+    parser.add_argument("--check", action="store_true", help="compare with the dense eigenvalues")
+    parser.add_argument("--native", default="sg*,gfor*", help="patterns of components that are compiled without Python")
+    given = parser.parse_args()
+    if given.one:
+        print(json.dumps(measure(given.cases[0], given.native, check=given.check)))
+        return
+    rows = {}
+    for name in given.cases:
+        command = [sys.executable, "-m", "tests.benchmarks.size", name, "--one", "--native", given.native]
+        with tempfile.TemporaryDirectory() as cache:
+            environment = os.environ | {"XDG_CACHE_HOME": cache, "OPENBLAS_NUM_THREADS": "1"}
+            done = subprocess.run(
+                [*command, *(["--check"] if given.check else [])],
+                env=environment, stdout=subprocess.PIPE, text=True, check=False,
+            )  # fmt: skip
+        if done.returncode:
+            print(f"{name}: not reached (exit status {done.returncode}); the reason stands above")
+            continue
+        rows[name] = json.loads(done.stdout)
+        print(f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in rows[name].items()), flush=True)
+    if len(rows) > 1:
+        buses = np.log([row["buses"] for row in rows.values()])
+        for key in ("build", "prepare", "steady", "linearise", "modes", "peak_mb", "steps"):
+            slope = np.polyfit(buses, np.log([max(row[key], 1e-3) for row in rows.values()]), 1)[0]
+            print(f"{key} grows as buses^{slope:.2f}")
+
+
+if __name__ == "__main__":
+    main()
