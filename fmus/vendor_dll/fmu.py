@@ -128,7 +128,8 @@ def _ask(path: Path, reader: str, *more: str) -> tuple[dict[str, Any], str]:
     try:
         answer = folder / "answer.json"
         command = [sys.executable, "-m", reader, str(path), str(answer), *more]
-        search = [entry for entry in sys.path if entry] + [str(Path(__file__).parents[2])]
+        # Not sys.path: Python-backed FMUs lengthen it, and Linux takes no variable of more than 128 KiB.
+        search = filter(None, [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH")])
         try:
             done = subprocess.run(
                 command,

@@ -1,6 +1,7 @@
 """An FMU in this process: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
@@ -57,6 +58,7 @@ class LoadedComponent(Derived):
         self.lost = False
         self._messages = Messages()
         self._own_directory = None if directory else extract(description.path)
+        self._resources = str((directory or self._own_directory or Path()) / "resources")
         self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None
         self._initialised = False
@@ -194,6 +196,8 @@ class LoadedComponent(Derived):
                 except FMICallException:
                     pass  # an FMU that failed may refuse to terminate; it is freed all the same
                 fmu.freeInstance()
+        if fmu is not None and self._resources in sys.path:
+            sys.path.remove(self._resources)  # the host of a Python-backed FMU puts it there, once for each instance
         if self._own_directory is not None:
             remove_tree(self._own_directory)
             self._own_directory = None

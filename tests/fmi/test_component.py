@@ -1,6 +1,7 @@
 """One running FMU: values by name and in batches, errors in the FMU's own words, nothing left behind."""
 
 import math
+import sys
 import tempfile
 import zipfile
 from dataclasses import replace
@@ -196,6 +197,19 @@ def test_the_extracted_folder_is_removed_on_leaving(description, temporary):
         initialise(component)
         assert len(list(temporary.iterdir())) == 1
     assert list(temporary.iterdir()) == []
+
+
+def test_a_python_backed_fmu_leaves_the_search_path_as_it_was(description, tmp_path):
+    """Its host adds the FMU's folder for each instance: a thousand of them made a variable too long for Linux."""
+    before = list(sys.path)
+    with LoadedComponent("a", description), LoadedComponent("b", description):
+        assert len(sys.path) == len(before) + 2
+    folder = fmpy.extract(str(description.path), unzipdir=str(tmp_path / "shared"))
+    with LoadedComponent("c", description, Path(folder)) as outer:
+        LoadedComponent("d", description, Path(folder)).close()
+        outer.values(["p"])
+        assert len(sys.path) == len(before) + 1
+    assert sys.path == before
 
 
 def test_the_extracted_folder_is_removed_after_a_failure(description, temporary):

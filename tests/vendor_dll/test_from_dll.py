@@ -1,5 +1,7 @@
 """A vendor's IEEE/CIGRE DLL as an FMU: what it computes, what it says, where its state is, and planted faults."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,12 @@ def test_samples_are_counted_in_integers_under_any_step(described, step, count, 
     with started(described(lag()), u=0.7) as component:
         assert steps(component, step, count) == recursion(0.7, samples)
         assert component.values(["samples"])["samples"] == samples
+
+
+def test_a_long_search_path_does_not_keep_a_dll_from_being_read(tmp_path, monkeypatch):
+    """Hosts of Python-backed FMUs lengthen sys.path; Linux takes no variable of more than 128 KiB."""
+    monkeypatch.setattr("sys.path", [*sys.path, *(f"/somewhere/{'x' * 60}/{k}" for k in range(3000))])
+    assert read_dll(compiled(lag(), tmp_path, "controller")).interface.sample_time == 1e-4
 
 
 def test_a_million_steps_lose_no_sample(described):
