@@ -58,7 +58,7 @@ class LoadedComponent(Derived):
         self.lost = False
         self._messages = Messages()
         self._own_directory = None if directory else extract(description.path)
-        self._resources = str((directory or self._own_directory or Path()) / "resources")
+        self._resources = str(Path(directory or self._own_directory or "") / "resources")
         self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None
         self._initialised = False
