@@ -97,6 +97,18 @@ class LinearModel:
         result: Vector = self.F @ z + self.G @ settled
         return result
 
+    @property
+    def clocks(self) -> int:
+        """Number of states that stand or advance by themselves, and are coupled with no other: each is a zero of its
+        own that says nothing of the system.
+        """
+        own = self.F.diagonal()
+        others = sp.csr_array(self.F - sp.diags_array(own))
+        alone = np.ones(len(self.names), dtype=bool)
+        for matrix, axis in ((others, 0), (others, 1), (self.G, 1), (self.H, 0)):
+            alone &= np.asarray(abs(matrix).sum(axis=axis)).ravel() == 0
+        return int((alone & (own == (0.0 if self.step_size is None else 1.0))).sum())
+
     @cached_property
     def settle(self) -> Callable[[Any], Any]:
         """W = (I − K)⁻¹·b."""

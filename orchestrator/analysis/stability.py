@@ -125,7 +125,7 @@ class Stability:
     growing
         Number of growing modes of the same model; a conjugate pair counts once.
     zeros
-        Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`): the free angle.
+        Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle.
     cause
         The cause of growth; None if no mode grows.
     continuous_growth_rate
@@ -164,9 +164,7 @@ class Stability:
         where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
-            tail += (
-                f"; {self.zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
-            )
+            tail += f"; {zeros_in_words(self.zeros)}"
         if self.stable:
             return f"stable: the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
         more = f"; {self.growing} modes grow" if self.growing > 1 else ""
@@ -195,6 +193,11 @@ class Stability:
             "reason": self.reason,
             "sentence": self.sentence(),
         }
+
+
+def zeros_in_words(zeros: int) -> str:
+    """What more than one eigenvalue of zero means."""
+    return f"{zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
 
 
 def place(value: complex, step_size: float | None = None) -> str:
@@ -316,7 +319,7 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
             f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
         )  # fmt: skip
     growing = int(grows(spectrum.eigenvalues).sum())
-    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum())
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
     cause = Cause.SYSTEM if growing and model.step_size is None else None
     return Stability(
         growing == 0, spectrum.rightmost, growing, zeros, len(spectrum.eigenvalues), cause, None, model.step_size

@@ -4,6 +4,7 @@ from collections import Counter
 
 from rich.table import Table
 
+from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.coordinated_design.ranking import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign
 from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict
@@ -137,10 +138,7 @@ def remarks(verdict: PointsVerdict) -> list[str]:
         )
     free = [point for point in verdict.known if point.after.zeros > 1]
     if free:
-        texts.append(
-            f"at {len(free)} of {total}, first at {free[0].where}: {free[0].after.zeros} eigenvalues are zero, one of "
-            "them may be the free angle: nothing restores the others"
-        )
+        texts.append(f"at {len(free)} of {total}, first at {free[0].where}: {zeros_in_words(free[0].after.zeros)}")
     unnamed = [point for point in verdict.known if point.unnamed]
     if unnamed:
         texts.append(

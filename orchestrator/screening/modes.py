@@ -181,7 +181,7 @@ def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
     growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
     others = growing[(np.abs(growing) > ZERO) & ~np.isin(growing, modes.eigenvalues)]
     fastest = complex(others[np.argmax(others.real)]) if len(others) else None
-    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum())
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
     return FoundModes(modes, True, int((1 + (others.imag > 0)).sum()), fastest, zeros)
 
 
@@ -197,7 +197,7 @@ def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
     slow = values[~zeros & (values.real > UNSTABLE) & (values.real <= GROWING)]
     known = [value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO]
     upper = [value for value in slow.tolist() if value.imag >= 0 and value not in known]
-    return int(zeros.sum()), sum(1 + (value.imag > ZERO) for value in upper)
+    return int(zeros.sum()) - model.clocks, sum(1 + (value.imag > ZERO) for value in upper)
 
 
 def _columns(modes: ModeSet) -> RefinedModes:

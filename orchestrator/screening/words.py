@@ -4,6 +4,7 @@ import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE
 from orchestrator.analysis.eigenvalue_count import GROWING
+from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord, Status
 from orchestrator.screening.study import ScreenedItem
@@ -26,8 +27,7 @@ def verdict_sentence(summary: Summary) -> str:
     if summary.free:
         first = summary.free[0]
         tail += (
-            f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {first.record.zeros} eigenvalues are "
-            "zero, one of them may be the free angle: nothing restores the others"
+            f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
         )
     if summary.stable:
         return f"stable: nothing grows at any of {total} points and outages{tail}"

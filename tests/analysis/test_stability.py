@@ -102,6 +102,15 @@ def test_a_free_angle_is_no_growth(size_of_it, zeros):
     assert verdict.stable is bool(zeros)
 
 
+@pytest.mark.parametrize("step_size", [None, STEP])
+def test_a_clock_is_no_second_zero_but_a_frequency_that_nothing_holds_is(step_size):
+    clock_and_angle = scipy.linalg.block_diag([[0.0]], [[0.0, 0.3], [0.0, -1.0]])
+    angle_and_frequency = scipy.linalg.block_diag([[0.0, 1.0], [0.0, 0.0]], [[-1.0]])
+    assert judge(model(clock_and_angle, step_size)).zeros == 1
+    assert judge(model(angle_and_frequency, step_size)).zeros == 2
+    assert "nothing restores" in judge(model(angle_and_frequency, step_size)).sentence()
+
+
 def test_the_system_or_the_coupling_is_named():
     growing, damped = np.array(pair(1.0, 0.2)), np.array(pair(1.0, -0.2))
     assert judge(model(growing, STEP), system=model(growing)).cause is Cause.SYSTEM
