@@ -44,9 +44,10 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
     taken = f"{counts.accepted} steps" if counts.accepted else "no step"
     if counts.accepted:
         taken += f" of {1e3 * counts.shortest:.3g} to {1e3 * counts.longest:.3g} ms"
+    back = "1 pair of steps was" if counts.rejected == 1 else f"{counts.rejected or 'no'} pairs of steps were"
     return (
-        f"{prepared.title}: tolerance {prepared.schedule.tolerance:g}: {taken}; {counts.rejected} pairs of steps were "
-        "taken back. The modes above are those of the fixed communication step."
+        f"{prepared.title}: tolerance {prepared.schedule.tolerance:g}: {taken}; {back} taken back. The modes above are "
+        "those of the fixed communication step."
     )
 
 

@@ -46,7 +46,7 @@ class StepStatistics:
     Attributes
     ----------
     steps, seconds
-        Communication steps done, and wall-clock time [s] they took, recording included.
+        Steps that count, and wall-clock time [s] they took, recording included.
     components
         In the order of the schedule. What is left of the time is the coupling, the observers, and threads that wait.
     simulated
@@ -69,7 +69,7 @@ class StepStatistics:
 
     @property
     def steps_per_second(self) -> float:
-        """Communication steps in a second of wall-clock time."""
+        """Steps that count in a second of wall-clock time."""
         return self.steps / self.seconds if self.seconds > 0 else 0.0
 
     @property

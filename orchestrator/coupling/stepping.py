@@ -171,12 +171,13 @@ class Stepper(CoupledComponents):
             banks = [isinstance(turn, WireBank) for group in self._turns() for turn in group]
             spent = [seconds for seconds, of_bank in zip(spent, banks, strict=True) if not of_bank]
         threads = self._loop.threads
+        adaptive = None if self._adaptive is None else replace(self._adaptive.counts)
         return StepStatistics(
-            steps,
+            steps if adaptive is None else adaptive.accepted,
             seconds,
             tuple(ComponentStatistics(n, steps, s, s / (threads * seconds)) for n, s in zip(names, spent, strict=True)),
             self.clock.time(steps),
             threads,
             {name: reason for name, c in self.components.items() if (reason := c.one_thread)},
-            None if self._adaptive is None else replace(self._adaptive.counts),
+            adaptive,
         )

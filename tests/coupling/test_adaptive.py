@@ -1,10 +1,12 @@
 """Steps within a tolerance, against exact solutions, and the FMUs that would make them wrong in silence."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.linalg
+import xarray as xr
 
 from orchestrator.api.case import load
 from orchestrator.cli.run_tables import on_adaptive_steps
@@ -162,6 +164,27 @@ def test_the_command_says_how_many_steps_were_taken():
         f"{ready.title}: tolerance 0.0001: 12 steps of 0.005 to 5 ms; 3 pairs of steps were taken back. The modes "
         "above are those of the fixed communication step."
     )
+
+
+@pytest.mark.slow
+def test_the_command_runs_within_a_tolerance_and_shows_the_steps_it_took(gfor, tmp_path):
+    """Nearer to short fixed steps than the case's own 5 ms are."""
+    found = {}
+    for name, options in {
+        "short": ("--schedule", "newton", "--step", "0.25 ms"),
+        "own": ("--schedule", "newton"),
+        "within": ("--tolerance", "1e-5"),
+    }.items():
+        out = tmp_path / name
+        code, text, _ = gfor("run", "two_area_rms", "--scenario", "gfor", "--stop", "2", "--out", out, *options)
+        assert code == 0
+        with xr.open_dataset(out / "gfor" / "trajectory.nc") as data:
+            found[name] = data["gfor.omega"].sel(time=slice(1.0, 2.0)).load()
+    off = {name: float(abs(values - found["short"]).max()) for name, values in found.items()}
+    assert 0 < off["within"] < 0.5 * off["own"]
+    said = re.search(r"tolerance 1e-05: (\d+) steps of [\d.]+ to 2\.5 ms; (no|\d+) pairs? of steps w", text)
+    assert said
+    assert re.search(rf"SG \+ GFOR │ +{said[1]} │", text)
 
 
 @pytest.mark.slow
