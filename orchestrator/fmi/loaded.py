@@ -114,7 +114,8 @@ class LoadedComponent(Derived):
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
-        root = ElementTree.parse(directory / MODEL_DESCRIPTION).getroot()
+        with (directory / MODEL_DESCRIPTION).open("rb") as file:
+            root = next(ElementTree.iterparse(file, events=("start",)))[1]  # the rest of it takes milliseconds
         if self.description.guid not in (root.get("guid") or root.get("instantiationToken") or ""):
             raise InputError(f"the guid {self.description.guid} is not that of the FMU; read its description again")
 
