@@ -48,6 +48,8 @@ class Draft:
     layers
         Values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
         one.
+    from_outside
+        Variables, by ``component.variable``, that the command line or its parameter files set.
     problems
         All problems found so far.
     data
@@ -81,6 +83,7 @@ class Draft:
     directory: Path
     place: Locate
     layers: list[Layer] = field(default_factory=list)
+    from_outside: frozenset[str] = frozenset()
     problems: list[Problem] = field(default_factory=list)
     data: NetworkData | None = None
     network: Network | None = None

@@ -128,6 +128,7 @@ class Preparer:
         self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
         draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
+        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters))
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)

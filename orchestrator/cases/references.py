@@ -12,7 +12,8 @@ from orchestrator.cases.values import convert
 
 
 def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> dict[str, ReferenceModeTable]:
-    """The modes of ``[reference]`` for a scenario; none where a condition of ``when`` does not hold.
+    """The modes of ``[reference]`` for a scenario; none where a condition of ``when`` does not hold, or where the
+    command line or one of its parameter files sets a value that is no condition.
 
     A condition is compared in the variable's own unit, with the value that is set, else with the default. A name that
     nothing has is noted as a problem.
@@ -28,7 +29,7 @@ def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> di
     if table is None:
         return {}
     held = [_holds(draft, key, wanted, imperfections) for key, wanted in table.when.items()]
-    return table.modes.get(draft.name, {}) if all(held) else {}
+    return table.modes.get(draft.name, {}) if all(held) and draft.from_outside <= set(table.when) else {}
 
 
 def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, float | bool]) -> bool:

@@ -34,6 +34,12 @@ def test_a_condition_that_does_not_hold_hides_the_figures(references):
     assert references('"grid.X_L" = "0.2 pu"') == []
 
 
+def test_a_value_from_outside_that_is_no_condition_hides_the_figures(references):
+    """They were published for the case's own values."""
+    assert references('"grid.X_L" = 0.1', {"grid.X_L": "0.1 pu"}) == ["electromechanical"]
+    assert references('"grid.X_L" = 0.1', {"grid.X_L": 0.1, "gfor.pod_p.K": 50.0}) == []
+
+
 def test_a_condition_on_a_value_that_nobody_set_looks_at_the_default(references):
     (prepared,) = load_case("two_area_rms").prepare(["pod_p"])
     default = prepared.system.components["sg1"].description.variables["machine.X_l"].start
