@@ -1,6 +1,7 @@
 """``gfor certify``: the grid code's damping test on any converter FMU."""
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,12 @@ from rich.table import Table
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.acceptance import Acceptance, read_checks, run_checks
+from orchestrator.certification.codes.all_codes import BY_DECLARATION
 from orchestrator.certification.details import TEMPLATE, Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.study import Certification, certify
-from orchestrator.certification.verdict import exit_code
+from orchestrator.certification.verdict import EXIT_CODES, INCOMPLETE, exit_code
 from orchestrator.cli.arguments import reactances, setting
 from orchestrator.cli.certify_codes import ALL, CODE_NAMES, NTS631, run_code
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
@@ -46,6 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
         help="a value of the converter, such as pod_p.K=150, or of the study, such as "
         "sg1.governor.enabled=true, which makes it another test than the norm's (repeatable)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--declare", action="append", default=[], type=setting, metavar="NAME=VALUE",
+        help="what is declared of the converter, for the codes that compare it with that: X_eff, D and H for rte "
+        "(repeatable)",
     )  # fmt: skip
     parser.add_argument(
         "--reactances", type=reactances, default=REACTANCES, metavar="X,X,…",
@@ -100,8 +107,12 @@ def _run_all(options: argparse.Namespace) -> int:
     folder = options.out or Path("results") / f"certify_{options.fmu.stem}"
     found = []
     for key in CODE_NAMES:
-        if key != ALL:
-            own = argparse.Namespace(**{**vars(options), "code": key, "out": folder / key})
+        if key in BY_DECLARATION and not options.declare:
+            print(f"--code {key} is left out: it needs --declare", file=sys.stderr)
+            found.append(EXIT_CODES[INCOMPLETE])
+        elif key != ALL:
+            declare = options.declare if key in BY_DECLARATION else []
+            own = argparse.Namespace(**{**vars(options), "code": key, "out": folder / key, "declare": declare})
             found.append(_run_nts631(own) if key == NTS631 else run_code(own, key))
     return next((code for code in (1, 3, 4) if code in found), 0)
 
@@ -169,6 +180,9 @@ def _certified(
 
 
 def _request(options: argparse.Namespace) -> CertificationRequest:
+    if options.declare:
+        raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, or "
+                         f"choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
     study = {name: value for name, value in options.set if name.split(".")[0] in STUDY}
     own = {name: value for name, value in options.set if name not in study}
     request = CertificationRequest(

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.certification.acceptance import read_checks, run_checks
-from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
 from orchestrator.certification.codes.record import figures_of, save_certificate
 from orchestrator.certification.details import Details, read_details
@@ -24,7 +24,7 @@ from orchestrator.safe_files import made_folder
 
 NTS631, ALL = "nts631", "all"
 
-CODE_NAMES = (NTS631, *CODES, ALL)
+CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, ALL)
 """What ``--code`` takes."""
 
 
@@ -42,6 +42,7 @@ def run_code(options: argparse.Namespace, key: str) -> int:
     -------
     As `gfor certify`.
     """
+    code = code_for(key, dict(options.declare))
     request = _request(options)
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
@@ -51,7 +52,7 @@ def run_code(options: argparse.Namespace, key: str) -> int:
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
         executor = choose_executor(options, ["orchestrator.certification.codes.bench_point"])
         found = progress.compute(
-            lambda report: certify_code(request, CODES[key], executor, folder, report=report), executor, console
+            lambda report: certify_code(request, code, executor, folder, report=report), executor, console
         )
         if acceptance is not None:
             acceptance.keep(folder)

@@ -1,6 +1,10 @@
 """The codes that `gfor certify --code` knows beside NTS 631."""
 
+from collections.abc import Callable, Mapping, Sequence
+
+from orchestrator.certification.codes import rte
 from orchestrator.certification.codes.aemo import AEMO
+from orchestrator.certification.codes.declared import Declaration, checked
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.fingrid import FINGRID
 from orchestrator.certification.codes.miso import MISO
@@ -8,3 +12,30 @@ from orchestrator.certification.codes.row import GridCode
 
 CODES: dict[str, GridCode] = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID)}
 """By what ``--code`` takes."""
+
+BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode]]] = {
+    "rte": (rte.DECLARED, rte.rte_code),
+}
+"""Codes whose rows depend on what the applicant declares: what that is, and the code for it."""
+
+
+def code_for(key: str, given: Mapping[str, object]) -> GridCode:
+    """A code, for what is declared of the converter.
+
+    Parameters
+    ----------
+    key
+        As ``--code`` takes it.
+    given
+        Declared values by name.
+
+    Raises
+    ------
+    InputError
+        If a declared value is missing, unknown or out of its range.
+    """
+    if key in CODES:
+        checked((), given, key)
+        return CODES[key]
+    wanted, made = BY_DECLARATION[key]
+    return made(checked(wanted, given, key))

@@ -7,7 +7,7 @@ from typing import Any
 import xarray as xr
 
 from orchestrator.acceptance.runner import file_hash
-from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.certificate import judge_row, verdict_of
@@ -28,7 +28,7 @@ def read_code_certificate(path: Path) -> tuple[Path, dict[str, Any]] | None:
         return None
     wanted = {"code": str, "rows": list, "verdict": str, "files": dict, "f_n": float, "missing": list, "sentence": str}
     bad = [name for name, kind in wanted.items() if not isinstance(content.get(name), kind)]
-    if bad or content["code"] not in CODES:
+    if bad or content["code"] not in {*CODES, *BY_DECLARATION}:
         raise InputError(
             f"{file}: {', '.join(bad) or 'code'} is not what `gfor certify` writes; make the certificate anew"
         )
@@ -63,7 +63,7 @@ def verify_code(folder: Path, content: dict[str, Any]) -> Verification:
 
 
 def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
-    code, faults, accepted = CODES[content["code"]], [], []
+    code, faults, accepted = code_for(content["code"], content.get("declared", {})), [], []
     rows = {row.name: row for row in code.rows}
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
         for stated in content["rows"]:

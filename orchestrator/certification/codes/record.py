@@ -56,7 +56,7 @@ def figures_of(c: CodeCertificate) -> dict[str, Any]:
         "format": FORMAT, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
         "f_n": c.f_n, "verdict": c.verdict, "sentence": c.sentence(), "model": c.description.model_name,
         "binding": c.request.binding.name if c.request.binding else None,
-        "values": dict(c.request.values),
+        "values": dict(c.request.values), "declared": dict(c.code.declared),
         "left_out": list(c.code.left_out), "readings": list(c.code.readings), "departures": list(c.departures),
         "missing": list(c.missing), "rows": [_row(v, c) for v in c.verdicts],
         "acceptance": c.acceptance.report if c.acceptance else None, "environment": environment(),

@@ -1,7 +1,7 @@
 """What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.programme import BenchProgramme
@@ -89,6 +89,8 @@ class GridCode:
         Where the code leaves something open, how it was read.
     has_verdict
         Whether the code gives numbers to judge by.
+    declared
+        What the applicant declares of the converter, where the rows depend on it.
     """
 
     key: str
@@ -100,3 +102,4 @@ class GridCode:
     left_out: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
     has_verdict: bool = True
+    declared: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,65 @@
+"""What an applicant declares of a converter, for codes that compare it with its own declaration."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from orchestrator.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """One value that has to be declared.
+
+    Attributes
+    ----------
+    name, meaning, unit
+        As ``--declare`` takes it, and what it is.
+    least, most
+        Range in which a value makes sense, in its unit.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    least: float
+    most: float
+
+
+def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: str) -> dict[str, float]:
+    """The declared values, each a number within its range.
+
+    Parameters
+    ----------
+    wanted
+        What the code needs.
+    given
+        By name, as the command line read it.
+    code
+        Whose declarations they are.
+
+    Raises
+    ------
+    InputError
+        With the first value that is missing, unknown or out of its range.
+    """
+    names = [declaration.name for declaration in wanted]
+    if unknown := [name for name in given if name not in names]:
+        raise InputError(f"--declare {unknown[0]}: --code {code} knows no such value; it takes {', '.join(names)}")
+    if missing := [d for d in wanted if d.name not in given]:
+        said = "; ".join(f"{d.name} ({d.meaning}) [{d.unit}]" for d in missing)
+        example = " ".join(f"--declare {d.name}=…" for d in missing)
+        raise InputError(f"--code {code} compares the converter with what is declared of it; missing: {said}. "
+                         f"Add {example}")  # fmt: skip
+    values = {}
+    for declaration in wanted:
+        value = given[declaration.name]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not (
+            math.isfinite(value) and declaration.least <= value <= declaration.most
+        ):
+            raise InputError(
+                f"--declare {declaration.name}={value}: the {declaration.meaning} is a number from "
+                f"{declaration.least:g} to {declaration.most:g} [{declaration.unit}]; give it so"
+            )
+        values[declaration.name] = float(value)
+    return values

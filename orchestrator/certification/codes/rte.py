@@ -1,0 +1,275 @@
+"""RTE: the four envelopes of its sheet "grid-forming", for the reactance, damping and inertia that an applicant declares."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import pi
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.certification.codes import criteria as c
+from orchestrator.certification.codes.declared import Declaration
+from orchestrator.certification.codes.envelope import (
+    CEILING,
+    DEMAND,
+    LATE,
+    SLACK,
+    Bounds,
+    Swinging,
+    amplitude_bounds,
+    jump_bounds,
+    ramp_bounds,
+    strength_bounds,
+)
+from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
+from orchestrator.certification.codes.programme import FIRST, BenchChange, BenchProgramme, ramps
+from orchestrator.certification.codes.row import CodeRow, GridCode, Judge, RowFinding
+
+DECLARED = (
+    Declaration("X_eff", "effective reactance up to the connection point", "pu of the rating", 0.01, 2.0),
+    Declaration("D", "damping", "pu of power per pu of frequency", 0.1, 2000.0),
+    Declaration("H", "inertia constant", "s", 0.05, 50.0),
+)
+"""What the applicant has to declare."""
+
+HORIZON = 5.0
+"""How long a response has to stay within its envelope [s]."""
+
+STRONG, WEAK = 10.0, 2.0
+"""Short-circuit ratios: the largest and the least."""
+
+X_R = 20.0
+"""X/R of the grid: the formulas have no resistance."""
+
+CURRENT = 0.15
+"""Reactive current for which the step of the voltage is made [pu]."""
+
+POWER = 0.3
+"""Active power for which the jump of the angle is made [pu]."""
+
+Distances = Callable[[Numbers], Bounds]
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Bounds of one response.
+
+    Attributes
+    ----------
+    distances
+        What is asked and allowed over the time after the event [s].
+    sign
+        +1 where the value has to rise.
+    opens_at_once
+        Whether all of what is allowed is allowed from the event on.
+    later
+        By how much more than `LATE` what is asked begins [s].
+    limited
+        Whether `DEMAND` and `CEILING` limit it: they are those of the active power.
+    """
+
+    distances: Distances
+    sign: int
+    opens_at_once: bool = False
+    later: float = 0.0
+    limited: bool = True
+
+    def between(self, t: Numbers, before: float) -> tuple[Numbers, Numbers]:
+        """Lower and upper bound at times after the event, for a value before it; each of the shape of ``t``."""
+        early = t < LATE
+        since = np.maximum(t - LATE, 0)
+        found = self.distances(since)
+        allowed, asked = found.allowed, found.asked
+        if self.opens_at_once:
+            widest = float(np.max(self.distances(np.linspace(0, HORIZON, 2000)).allowed))
+            narrow = float(self.distances(np.array([1e9])).asked[0])
+            allowed = np.where(early, widest, allowed)
+            behind = t < LATE + self.later
+            asked = np.where(behind, narrow, self.distances(np.maximum(t - LATE - self.later, 0)).asked)
+        near, far = before + self.sign * asked, before + self.sign * allowed
+        if self.limited:
+            near = np.clip(near, -DEMAND, DEMAND)
+            far = np.clip(far, -CEILING, CEILING)
+        return np.minimum(near, far), np.maximum(near, far)
+
+
+def active_power(row: MeasuredRow) -> Numbers:
+    """Active power, averaged over the period before each instant [pu]."""
+    return row.mean_p
+
+
+def reactive_current(row: MeasuredRow) -> Numbers:
+    """Reactive current, averaged over the period before each instant [pu]."""
+    return over_a_period(row.signals["q"] / np.maximum(row.signals["v"], 1e-3), row.times, row.f_n)
+
+
+def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
+                 quantity: Callable[[MeasuredRow], Numbers] = active_power, skipped: int = 1) -> Judge:  # fmt: skip
+    """The response lies within its envelope, from an event on for `HORIZON` or until the next one.
+
+    Parameters
+    ----------
+    event
+        Number of the event.
+    made
+        The envelope for a rated frequency [Hz].
+    name
+        Of the criterion.
+    quantity
+        What is compared [pu].
+    skipped
+        How many events later its time ends: 2 for a ramp, whose own end is an event.
+    """
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        begin = row.events[event]
+        later = row.events[event + skipped] if event + skipped < len(row.events) else float(row.times[-1])
+        values = quantity(row)
+        before = values[row.within(begin - 0.5, begin)]
+        part = row.within(begin, min(later, begin + HORIZON))
+        t, value = row.times[part] - begin, values[part]
+        low, high = made(row.f_n).between(t, float(np.mean(before)))
+        outside = np.maximum(low - value, value - high)
+        outside = np.where(np.isfinite(outside), outside, np.inf)
+        at = int(np.argmax(outside))
+        spare = np.minimum(high - value, value - low) / ((high - low) / 2)
+        spare = np.where(np.isfinite(spare), spare, -np.inf)
+        least = float(np.min(spare))
+        worst, found = float(outside[at]), float(value[at])
+        place = f"at {1e3 * t[at]:.0f} ms: {found:.3f} pu in {low[at]:.3f} to {high[at]:.3f} pu"
+        text = f"{worst:.3f} pu outside {place}" if worst > 0 else f"inside; nearest {place}"
+        number = worst if np.isfinite(worst) else None
+        return RowFinding(name, f"within the envelope for {HORIZON:g} s", c.CODE, number, 0.0,
+                          least if np.isfinite(least) else None, bool(worst <= 0), text)  # fmt: skip
+
+    return judge
+
+
+def rte_code(declared: Mapping[str, float]) -> GridCode:
+    """RTE's rows for what an applicant declares.
+
+    Parameters
+    ----------
+    declared
+        ``X_eff`` [pu of the rating], ``D`` [pu of power per pu of frequency], ``H`` [s].
+    """
+    rows = [
+        made
+        for scr in (STRONG, WEAK)
+        for make, powers in ((_jumps, (0.0, 0.5, -0.5)), (_steps, (0.0, 0.5, -0.5, 0.95, -0.95)))
+        for made in (make(declared, scr, power) for power in powers)
+    ]
+    rows += [_strength(declared, one, other, p) for one, other in ((STRONG, WEAK), (WEAK, STRONG)) for p in (0.5, -0.5)]
+    rows += [
+        _ramping(declared, scr, p, rate, lasts)
+        for scr in (STRONG, WEAK) for rate, lasts in ((0.5, 3.0), (2.0, 0.5)) for p in (0.0, 0.5, -0.5)
+    ]  # fmt: skip
+    rows.sort(key=lambda row: row.name[:5])
+    stated = ", ".join(f"{d.name} = {declared[d.name]:g}" for d in DECLARED)
+    return GridCode(
+        key="rte",
+        title=f"RTE: grid-forming, envelopes IGFM1 to IGFM4 for {stated}",
+        source="RTE, DyCoV (dynawo/dyn-grid-compliance-verification), PCS_RTE-IGFM1 to IGFM4 and their published curves; "
+        "the sheet of RTE's documentation itself was not at hand",
+        date="version 0.8",
+        f_n=50.0,
+        rows=tuple(rows),
+        left_out=(
+            "IGFM1 to IGFM4 with a nearly empty and a nearly full battery: a state of charge is not part of an FMU's port",
+            "the start at 49.5 or 50.5 Hz of IGFM4: the frequency leaves its rated value and comes back to it",
+        ),
+        readings=(
+            "the envelope of DyCoV is a verdict here: who stays within it meets it; DyCoV itself gives none",
+            "the active power and the reactive current are means over a period; the 20 ms by which DyCoV moves its "
+            "curves for measured waveforms are for that",
+            "what is asked is limited to 0.98 pu and what is allowed to 1.2 pu, as in the published curves of IGFM4",
+            "in IGFM3 all of what is allowed is allowed from the event on, and what is asked begins after 30 ms, as in "
+            "DyCoV's later revisions: the published curves allow nothing for 20 ms",
+            "the envelope knows no droop: a plant whose power follows the frequency for good leaves IGFM4",
+            "where ζ ≤ 1 the jump's ideal curve is DyCoV's, which is no solution of its own equation",
+        ),
+        declared=dict(declared),
+    )
+
+
+def _named(test: str, scr: float, power: float, more: str = "") -> str:
+    percent = f"{'m' if power < 0 else ''}{abs(round(100 * power))}"
+    return f"{test}_scr{scr:g}_p{percent}{more}"
+
+
+def _grid(declared: Mapping[str, float], scr: float, f_n: float) -> Swinging:
+    return Swinging(declared["D"], declared["H"], declared["X_eff"] + 1 / scr, 2 * pi * f_n)
+
+
+def _jumps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
+    angle = POWER * (declared["X_eff"] + 1 / scr)
+
+    def programme(f_n: float) -> BenchProgramme:
+        changes = tuple(BenchChange(FIRST + k * HORIZON, "source.jump", total) for k, total in enumerate((angle, 0.0)))
+        return BenchProgramme(scr, power, changes, FIRST + 2 * HORIZON, X_R)
+
+    def envelope(sign: int, f_n: float) -> Envelope:
+        return Envelope(jump_bounds(_grid(declared, scr, f_n), angle), sign)
+
+    return CodeRow(
+        _named("igfm1", scr, power), f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {power:.0%}", "IGFM1", programme,
+        (c.holds_together(), stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
+         stays_inside(1, partial(envelope, 1), "power after the jump back")),
+    )  # fmt: skip
+
+
+def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
+    X = declared["X_eff"] + 1 / scr
+
+    def programme(f_n: float) -> BenchProgramme:
+        still = BenchProgramme(scr, power, (), FIRST, X_R)
+        part = CURRENT * X / abs(1 - still.impedance * power)
+        factors = (1 + part, 1.0, 1 - part)
+        changes = tuple(BenchChange(FIRST + k * HORIZON, "source.factor", f) for k, f in enumerate(factors))
+        return BenchProgramme(scr, power, changes, FIRST + 3 * HORIZON, X_R)
+
+    def envelope(sign: int, f_n: float) -> Envelope:
+        return Envelope(amplitude_bounds(CURRENT), sign, limited=False)
+
+    return CodeRow(
+        _named("igfm2", scr, power), f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {power:.0%}", "IGFM2",
+        programme,
+        (c.holds_together(), stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
+         stays_inside(2, partial(envelope, 1), "current after the fall", reactive_current)),
+    )  # fmt: skip
+
+
+def _strength(declared: Mapping[str, float], start: float, end: float, power: float) -> CodeRow:
+    difference = 1 / end - 1 / start
+
+    def programme(f_n: float) -> BenchProgramme:
+        changes = tuple(BenchChange(FIRST, f"{name}_factor", start / end) for name in ("X", "R"))
+        return BenchProgramme(start, power, changes, FIRST + HORIZON, X_R)
+
+    def envelope(f_n: float) -> Envelope:
+        plant = _grid(declared, end, f_n)
+        change = abs(power * difference) / plant.X
+        return Envelope(strength_bounds(plant, change), -int(np.sign(difference * power)), True, SLACK)
+
+    return CodeRow(
+        _named("igfm3", start, power, f"_scr{end:g}"), f"SCR {start:g} → {end:g}, {power:.0%}", "IGFM3", programme,
+        (c.holds_together(), stays_inside(0, envelope, "power after the step")),
+    )  # fmt: skip
+
+
+def _ramping(declared: Mapping[str, float], scr: float, power: float, rate: float, lasts: float) -> CodeRow:
+    def programme(f_n: float) -> BenchProgramme:
+        made = ramps(scr, power, f_n, rate, (rate * lasts, -rate * lasts), HORIZON)
+        return BenchProgramme(scr, power, made.changes, made.stop, X_R)
+
+    def envelope(sign: int, f_n: float) -> Envelope:
+        plant = _grid(declared, scr, f_n)
+        return Envelope(ramp_bounds(plant, -sign * rate / f_n, lasts), sign)
+
+    return CodeRow(
+        _named("igfm4", scr, power, f"_{rate:g}".replace(".", "_")),
+        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {power:.0%}", "IGFM4", programme,
+        (c.holds_together(), stays_inside(0, partial(envelope, -1), "power while the frequency rises", skipped=2),
+         stays_inside(2, partial(envelope, 1), "power while the frequency falls", skipped=2)),
+    )  # fmt: skip
