@@ -181,8 +181,8 @@ def _certified(
 
 def _request(options: argparse.Namespace) -> CertificationRequest:
     if options.declare:
-        raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, or "
-                         f"choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
+        raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
+                         f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
     study = {name: value for name, value in options.set if name.split(".")[0] in STUDY}
     own = {name: value for name, value in options.set if name not in study}
     request = CertificationRequest(

@@ -103,6 +103,8 @@ def compute_row(task: BenchTask) -> BenchResult:
                 try:
                     master.run(prepared.stop_time, prepared.events, watch.observers)
                 except ComponentError as error:
+                    if error.status.startswith("hang"):
+                        raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
                     ended = error  # the converter gave up, or its values were no numbers: the row is not met
             _keep(result, watch)
             result.findings = [finding.as_json() for finding in watch.findings(ended)]

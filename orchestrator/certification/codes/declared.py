@@ -54,8 +54,10 @@ def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: st
     values = {}
     for declaration in wanted:
         value = given[declaration.name]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not (
-            math.isfinite(value) and declaration.least <= value <= declaration.most
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not (math.isfinite(value) and declaration.least <= value <= declaration.most)
         ):
             raise InputError(
                 f"--declare {declaration.name}={value}: the {declaration.meaning} is a number from "

@@ -1,7 +1,7 @@
 """Envelopes within which RTE expects the response of a grid-forming plant, from what its applicant declares.
 
-The plant is a voltage source behind X_eff whose angle obeys a swing equation, and the grid a reactance 1/SCR; X is their
-sum. Powers and currents are per unit of the rating, t counts from the event, ω_b is 2π·f_n:
+The plant is a voltage source behind X_eff whose angle obeys a swing equation. The grid is a reactance 1/SCR; X is the
+sum of both. Powers and currents are per unit of the rating, t counts from the event, ω_b is 2π·f_n:
 
     2H·dω/dt = −ΔP + D·(ω_f − ω),  dδ/dt = ω_b·(ω − ω_grid),  ΔP = δ/X,
 
@@ -134,8 +134,8 @@ class Swinging:
         final = 2 * self.H + self.D * LAG
         if self.ratio >= 1:
             return final
-        parts = self.D * LAG * _residues((*self.roots, 1 / LAG))
-        amplitude = 2 * abs(2 * self.H * _residues(self.roots)[0] + parts[0])
+        parts = self.D * LAG * _residues(_apart((*self.roots, 1 / LAG)))
+        amplitude = 2 * abs(2 * self.H * _residues(_apart(self.roots))[0] + parts[0])
         steady = final - parts[2].real
         return float(abs(steady + amplitude if rising else amplitude - steady))
 
@@ -262,16 +262,22 @@ def _tunnel(peak: float) -> float:
     return max(TUNNEL, TUNNEL_SHARE * peak)
 
 
-def _residues(poles: tuple[complex, ...]) -> Complex:
+def _apart(poles: tuple[complex, ...]) -> Complex:
+    """The poles, with those that are nearly one moved apart."""
+    moved = list(poles)
+    for k, pole in enumerate(moved):
+        if any(abs(pole - other) < _NEAR * abs(pole) for other in moved[:k]):
+            moved[k] = pole * (1 + 10 * _NEAR)
+    return np.array(moved)
+
+
+def _residues(poles: Complex) -> Complex:
     """c_k of Π p_k/(s·Π(s + p_k)) = 1/s − Σ c_k/(s + p_k)."""
-    apart = list(poles)
-    for k, pole in enumerate(apart):
-        if any(abs(pole - other) < _NEAR * abs(pole) for other in apart[:k]):
-            apart[k] = pole * (1 + 10 * _NEAR)
-    return np.array([np.prod([b / (b - a) for b in apart if b is not a]) for a in apart])
+    factors = poles[:, None] / (poles[:, None] - poles[None, :] + np.diag(poles))
+    return np.asarray(np.prod(factors, axis=0))
 
 
 def _step(poles: tuple[complex, ...], t: Numbers) -> Numbers:
     """Response to a step from 0 to 1 of a chain of lags whose inverse time constants these are."""
-    decays = np.exp(-np.outer(t, np.array(poles)))
-    return np.asarray(1 - (decays @ _residues(poles)).real)
+    moved = _apart(poles)
+    return np.asarray(1 - (np.exp(-np.outer(t, moved)) @ _residues(moved)).real)

@@ -1,4 +1,4 @@
-"""RTE: the four envelopes of its sheet "grid-forming", for the reactance, damping and inertia that an applicant declares."""
+"""RTE: the four envelopes of its sheet "grid-forming", for the reactance, damping and inertia that are declared."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from orchestrator.certification.codes.envelope import (
     DEMAND,
     LATE,
     SLACK,
+    TUNNEL,
     Bounds,
     Swinging,
     amplitude_bounds,
@@ -87,6 +88,7 @@ class Envelope:
             allowed = np.where(early, widest, allowed)
             behind = t < LATE + self.later
             asked = np.where(behind, narrow, self.distances(np.maximum(t - LATE - self.later, 0)).asked)
+        asked = np.where(early, np.minimum(asked, -TUNNEL), asked)
         near, far = before + self.sign * asked, before + self.sign * allowed
         if self.limited:
             near = np.clip(near, -DEMAND, DEMAND)
@@ -170,19 +172,21 @@ def rte_code(declared: Mapping[str, float]) -> GridCode:
     return GridCode(
         key="rte",
         title=f"RTE: grid-forming, envelopes IGFM1 to IGFM4 for {stated}",
-        source="RTE, DyCoV (dynawo/dyn-grid-compliance-verification), PCS_RTE-IGFM1 to IGFM4 and their published curves; "
-        "the sheet of RTE's documentation itself was not at hand",
+        source="RTE, DyCoV (dynawo/dyn-grid-compliance-verification), PCS_RTE-IGFM1 to IGFM4 and their published "
+        "curves; the sheet of RTE's documentation itself was not at hand",
         date="version 0.8",
         f_n=50.0,
         rows=tuple(rows),
         left_out=(
-            "IGFM1 to IGFM4 with a nearly empty and a nearly full battery: a state of charge is not part of an FMU's port",
+            "a nearly empty and a nearly full battery: a state of charge is not part of an FMU's port",
             "the start at 49.5 or 50.5 Hz of IGFM4: the frequency leaves its rated value and comes back to it",
         ),
         readings=(
             "the envelope of DyCoV is a verdict here: who stays within it meets it; DyCoV itself gives none",
             "the active power and the reactive current are means over a period; the 20 ms by which DyCoV moves its "
             "curves for measured waveforms are for that",
+            "for the first 20 ms, in which a mean over a period cannot respond, what is asked is to stay within 0.02 pu "
+            "of the value before; the published curves ask for up to 0.001 pu there",
             "what is asked is limited to 0.98 pu and what is allowed to 1.2 pu, as in the published curves of IGFM4",
             "in IGFM3 all of what is allowed is allowed from the event on, and what is asked begins after 30 ms, as in "
             "DyCoV's later revisions: the published curves allow nothing for 20 ms",
