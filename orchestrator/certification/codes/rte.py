@@ -185,8 +185,8 @@ def rte_code(declared: Mapping[str, float]) -> GridCode:
             "the envelope of DyCoV is a verdict here: who stays within it meets it; DyCoV itself gives none",
             "the active power and the reactive current are means over a period; the 20 ms by which DyCoV moves its "
             "curves for measured waveforms are for that",
-            "for the first 20 ms, in which a mean over a period cannot respond, what is asked is to stay within 0.02 pu "
-            "of the value before; the published curves ask for up to 0.001 pu there",
+            "for the first 20 ms, in which a mean over a period cannot respond, what is asked is to stay within 0.02 "
+            "pu of the value before; the published curves ask for up to 0.001 pu there",
             "what is asked is limited to 0.98 pu and what is allowed to 1.2 pu, as in the published curves of IGFM4",
             "in IGFM3 all of what is allowed is allowed from the event on, and what is asked begins after 30 ms, as in "
             "DyCoV's later revisions: the published curves allow nothing for 20 ms",
