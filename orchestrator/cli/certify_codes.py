@@ -8,7 +8,10 @@ from rich.markup import escape
 
 from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
+from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
+from orchestrator.certification.codes.declared import checked
+from orchestrator.certification.codes.frequency_domain import figures_of_stiffness, measure_stiffness, save_stiffness
 from orchestrator.certification.codes.record import figures_of, save_certificate
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
@@ -16,15 +19,15 @@ from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.executors import choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, said_stages
 from orchestrator.errors import InputError
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
-NTS631, ALL = "nts631", "all"
+NTS631, GB, ALL = "nts631", "gb", "all"
 
-CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, ALL)
+CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, GB, ALL)
 """What ``--code`` takes."""
 
 
@@ -42,6 +45,8 @@ def run_code(options: argparse.Namespace, key: str) -> int:
     -------
     As `gfor certify`.
     """
+    if key == GB:
+        return _run_gb(options)
     code = code_for(key, dict(options.declare))
     request = _request(options)
     details = read_details(options.details) if options.details else Details()
@@ -71,6 +76,30 @@ def run_code(options: argparse.Namespace, key: str) -> int:
             console.print(escape(f"Not tested: {text}"), soft_wrap=True, highlight=False)
         console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
     return exit_code(found.verdict, refused=found.refused)
+
+
+def _run_gb(options: argparse.Namespace) -> int:
+    """Measure a converter in the frequency domain; there is no verdict, so that it neither passes nor fails."""
+    checked((), dict(options.declare), GB)
+    request = _request(options)
+    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}_{GB}", "--out")
+    console = make_console(stderr=options.json)
+    with held(folder), said_stages() as report:
+        found = measure_stiffness(request, rated_frequency(request, 50.0), report)
+        files = save_stiffness(found, request.fmu.stem, folder)
+    figures = figures_of_stiffness(found, request.fmu.stem)
+    if options.json:
+        print(json.dumps(figures, indent=1, ensure_ascii=False))
+        return 0
+    for name, one in figures["least"].items():
+        console.print(escape(f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz"), highlight=False)
+    slow = figures["slow"]
+    console.print(
+        escape(f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"), highlight=False
+    )
+    console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
+    console.print(escape(f"Files in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+    return 0
 
 
 def _request(options: argparse.Namespace) -> CertificationRequest:

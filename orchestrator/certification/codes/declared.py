@@ -45,7 +45,8 @@ def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: st
     """
     names = [declaration.name for declaration in wanted]
     if unknown := [name for name in given if name not in names]:
-        raise InputError(f"--declare {unknown[0]}: --code {code} knows no such value; it takes {', '.join(names)}")
+        takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"
+        raise InputError(f"--declare {unknown[0]}: --code {code} knows no such value; {takes}")
     if missing := [d for d in wanted if d.name not in given]:
         said = "; ".join(f"{d.name} ({d.meaning}) [{d.unit}]" for d in missing)
         example = " ".join(f"--declare {d.name}=…" for d in missing)

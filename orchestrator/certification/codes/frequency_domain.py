@@ -1,0 +1,138 @@
+"""GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
+
+import cmath
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.black_box.bench import Bench
+from orchestrator.black_box.frequency_response import Excitation, measure
+from orchestrator.black_box.stiffness import Stiffness, stiffness
+from orchestrator.cases.values import convert
+from orchestrator.certification.codes.bench_case import STEP
+from orchestrator.certification.codes.programme import RATING_MVA
+from orchestrator.certification.request import CertificationRequest
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.report.plot_style import STYLE, colour, save_figure
+from orchestrator.results.storage import save_table
+from orchestrator.safe_files import write_text
+
+POWER = 0.5
+"""Active power at which it is measured [pu]."""
+
+BAND = (5.0, 40.0)
+"""Band in which the least stiffness is told [Hz]: between the droops and the period of the grid."""
+
+EXCITATION = Excitation()
+"""How it is excited: from 0.05 to 1000 Hz."""
+
+NO_VERDICT = (
+    "no verdict: the GB Grid Code (ECP.A.3.9) states no criteria for the plot, and the thresholds and the band of "
+    f"arXiv 2605.02131 were not at hand; {BAND[0]:g} to {BAND[1]:g} Hz is this program's band"
+)
+
+
+def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
+    """Measure a converter at an ideal bus, at half of its rating and 1 pu.
+
+    Parameters
+    ----------
+    request
+        The converter, its binding and its values.
+    f_n
+        Rated frequency [Hz].
+    report
+        Called with a sentence before each run.
+
+    Raises
+    ------
+    InputError
+        If it has no port, or a value cannot be used.
+    AnalysisError
+        If it does not come to rest or its response does not settle.
+    """
+    description = bound_fmu(request.fmu, request.binding)
+    values = _values(description, request, f_n)
+    rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
+    bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=STEP)
+    if missing := [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]:
+        raise InputError(f"{request.fmu}: it has no {', '.join(missing)}; map its variables to our port with --binding")
+    return stiffness(measure(bench, EXCITATION, report), rest, 2 * np.pi * f_n)
+
+
+def _values(description: FmuDescription, request: CertificationRequest, f_n: float) -> dict[str, float | bool]:
+    given: dict[str, Any] = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+    wanted = {name: value for name, value in given.items() if name in description.variables} | dict(request.values)
+    values = {}
+    for name, value in wanted.items():
+        if name not in description.variables:
+            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor info` lists them")
+        try:
+            values[name] = convert(description.variables[name], value)
+        except ValueError as error:
+            raise InputError(f"--set {name}: {error}") from error
+    return values
+
+
+def figures_of_stiffness(found: Stiffness, model: str) -> dict[str, Any]:
+    """The figures, as JSON's types."""
+    least = {
+        name: dict(zip(("value", "at_hz"), found.least(values, *BAND), strict=True))
+        for name, values in (("P/theta [pu/rad]", found.p_theta), ("Q/V [pu/pu]", found.q_v))
+    }
+    slow = found.p_omega[0]
+    return {
+        "code": "gb", "model": model, "verdict": None, "sentence": NO_VERDICT, "band_hz": list(BAND), "least": least,
+        "slow": {"name": "P/omega [pu/pu]", "real": float(slow.real), "imag": float(slow.imag),
+                                                    "at_hz": float(found.frequencies[0])},
+    }  # fmt: skip
+
+
+def save_stiffness(found: Stiffness, model: str, folder: Path) -> list[Path]:
+    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``.
+
+    Parameters
+    ----------
+    found
+        What was measured.
+    model
+        Name of the converter.
+    folder
+        Where the files go.
+    """
+    table, figures, picture = (folder / f"frequency.{kind}" for kind in ("csv", "json", "png"))
+    rows = []
+    for k, f in enumerate(found.frequencies.tolist()):
+        row = {"frequency [Hz]": f}
+        for name, values in (("P/omega", found.p_omega), ("P/theta", found.p_theta), ("Q/V", found.q_v),
+                             ("P/V", found.p_v), ("Q/theta", found.q_theta)):  # fmt: skip
+            row[f"re {name}"], row[f"im {name}"] = float(values[k].real), float(values[k].imag)
+        rows.append(row)
+    save_table(rows, table)
+    write_text(figures, json.dumps(figures_of_stiffness(found, model), indent=1) + "\n")
+    _plot(found, picture)
+    return [table, figures, picture]
+
+
+def _plot(found: Stiffness, path: Path) -> None:
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        size, phase, stiff = figure.subplots(3, 1, sharex=True)
+        size.plot(found.frequencies, np.abs(found.p_omega), ".-", ms=3, color=colour(0))
+        size.set(xscale="log", yscale="log", ylabel="|P/ω| [pu/pu]")
+        size.set_title("Network frequency perturbation, no verdict", loc="left")
+        phase.plot(found.frequencies, np.rad2deg(np.angle(found.p_omega)), ".-", ms=3, color=colour(0))
+        phase.set_ylabel("Phase of P/ω [°]")
+        for k, (name, values) in enumerate((("|P/θ| [pu/rad]", found.p_theta), ("|Q/V| [pu/pu]", found.q_v))):
+            stiff.plot(found.frequencies, np.abs(values), ".-", ms=3, color=colour(k), label=name)
+        stiff.axvspan(*BAND, color="0.9", zorder=0)
+        stiff.set(yscale="log", ylabel="Stiffness", xlabel="Frequency of the change [Hz]")
+        stiff.legend()
+        save_figure(figure, path)
