@@ -143,7 +143,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
         least = float(np.min(spare))
         worst, found = float(outside[at]), float(value[at])
         place = f"at {1e3 * t[at]:.0f} ms: {found:.3f} pu in {low[at]:.3f} to {high[at]:.3f} pu"
-        text = f"{worst:.3f} pu outside {place}" if worst > 0 else f"inside; nearest {place}"
+        text = f"{worst:.2g} pu outside {place}" if worst > 0 else f"inside; nearest {place}"
         number = worst if np.isfinite(worst) else None
         return RowFinding(name, f"within the envelope for {HORIZON:g} s", c.CODE, number, 0.0,
                           least if np.isfinite(least) else None, bool(worst <= 0), text)  # fmt: skip
