@@ -11,7 +11,7 @@ from orchestrator.certification.codes import envelope as e
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.certificate import judge_row
-from orchestrator.certification.codes.rte import DECLARED, rte_code
+from orchestrator.certification.codes.rte import DECLARED, Envelope, rte_code
 from orchestrator.cli import certify
 from orchestrator.errors import InputError
 
@@ -213,6 +213,53 @@ def test_a_constant_current_falls_out_of_every_envelope(name):
     found = judge_row(row, BenchResult(name, times, signals), 50.0)
     assert not found.accepted
     assert all("within the envelope" in finding.rule for finding in found.failed)
+
+
+def changed(name, change, values=DAMPED):
+    """The verdict on the ideal response after a change of its power, which gets times and power [s, pu]."""
+    row = next(row for row in rte_code(values).rows if row.name == name)
+    result = integrated(row, values, values, 0.0 if "_p0" in name else 0.5)
+    result.signals["p"] = change(result.times, result.signals["p"])
+    return [finding.criterion for finding in judge_row(row, result, 50.0).failed]
+
+
+@pytest.mark.parametrize(
+    ("name", "time", "criterion"),
+    [("igfm1_scr10_p50", 4.0, "power after the jump ahead"), ("igfm1_scr10_p50", 9.0, "power after the jump back"),
+     ("igfm4_scr2_p0_2", 10.0, "power while the frequency rises"),
+     ("igfm4_scr2_p0_2", 15.0, "power while the frequency falls")],
+)  # fmt: skip
+def test_a_late_excursion_is_seen(name, time, criterion):
+    """Seconds after the jump, and long after the end of the ramp; each by the criterion of its own event."""
+    assert not changed(name, lambda times, p: p)
+    assert criterion in changed(name, lambda times, p: p + 0.2 * (np.abs(times - time) < 0.05))
+
+
+def test_more_is_allowed_while_the_frequency_rises_than_while_it_falls():
+    """1.5 and 1.3 times the largest variation."""
+    assert changed("igfm4_scr2_p0_2", lambda times, p: 1.68 * p) == ["power while the frequency falls"]
+
+
+@pytest.mark.parametrize(("late", "accepted"), [(0.015, True), (0.026, False)])
+def test_after_a_step_of_the_grid_half_of_the_power_is_asked_for_from_30_ms_on(late, accepted):
+    shift = round(late / 1e-3)
+    failed = changed("igfm3_scr10_p50_scr2", lambda times, p: np.concatenate([np.full(shift, 0.5), p[:-shift]]))
+    assert (failed == []) == accepted
+
+
+def test_power_is_limited_and_current_is_not():
+    wide = e.Bounds(*(np.full(2, distance) for distance in (2.0, 1.5, 3.0)))
+    times = np.array([1.0, 2.0])
+    assert np.allclose(Envelope(lambda t: wide, -1).between(times, 0.5), [[-1.2, -1.2], [-0.98, -0.98]])
+    assert np.allclose(Envelope(lambda t: wide, 1, limited=False).between(times, 0.5), [[2.0, 2.0], [3.5, 3.5]])
+
+
+def test_nothing_is_asked_for_before_a_mean_over_a_period_can_respond():
+    bounds = e.jump_bounds(plant(SLOW, STRONG_GRID), 0.3 * STRONG_GRID)
+    lower, upper = Envelope(bounds, 1).between(np.array([0.0, 0.019, 0.05]), 0.5)
+    assert lower[:2].tolist() == [0.48, 0.48]
+    assert lower[2] > 0.6
+    assert (upper > 0.9).all()
 
 
 def test_a_response_that_is_no_number_is_not_inside():
