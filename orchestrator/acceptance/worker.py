@@ -49,7 +49,7 @@ class Host(Worker):
         return self._instances[self._asked]
 
     def do_open(self, name: str) -> int:
-        component = open_component(name, self._description, self._request["directory"], isolated=False)
+        component = open_component(name, self._description, Path(self._request["directory"]), isolated=False)
         number = next(n for n in range(_MOST) if n not in self._instances)
         self._instances[number] = component
         functions = (component.set_real, component.get_real, component.do_step)
