@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fmus.control_dll.sheet import data_sheet
 from fmus.control_dll.source import dll_source
@@ -140,14 +141,24 @@ def write_dll(
         )
     chosen = with_values(part, values or {}, sample_time)
     code = dll_source(chosen.model, sample_time)
-    libraries = {}
+    name, built = chosen.model.name, {}
     for platform in platforms:
         target, ending = DLL_TARGETS[platform]
-        built = compile_for(code, target, ending)
-        libraries[platform] = folder / platform / f"{chosen.model.name}{ending}"
-        libraries[platform].parent.mkdir(parents=True, exist_ok=True)
-        libraries[platform].write_bytes(built.read_bytes())
-    sheet = folder / f"{chosen.model.name}.md"
-    sheet.parent.mkdir(parents=True, exist_ok=True)
-    sheet.write_text(data_sheet(chosen, sample_time), encoding="utf-8")
+        built[platform] = (f"{name}{ending}", compile_for(code, target, ending).read_bytes())
+    libraries = {platform: folder / platform / file for platform, (file, _) in built.items()}
+    sheet = folder / f"{name}.md"
+    _write_all(folder, {path: built[platform][1] for platform, path in libraries.items()}
+               | {sheet: data_sheet(chosen, sample_time).encode()})  # fmt: skip
     return WrittenDll(libraries, sheet)
+
+
+def _write_all(folder: Path, contents: Mapping[Path, bytes]) -> None:
+    """Write the files beside their places, and move them there once all are whole."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix=".part-", dir=folder) as beside:
+        parts = {path: Path(beside) / str(number) for number, path in enumerate(contents)}
+        for path, part in parts.items():
+            part.write_bytes(contents[path])
+        for path, part in parts.items():
+            path.parent.mkdir(exist_ok=True)
+            part.replace(path)

@@ -143,7 +143,9 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise DeviceFileError(f"{path}: cannot be read: {error.strerror}") from error
+        raise DeviceFileError(
+            f"{path}: cannot be read: {error.strerror}; give a device's file, which lays a circuit around a DLL"
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DeviceFileError(f"{path}: it is not TOML: {error}") from error
     if unknown := sorted(table.keys() - _KEYS):

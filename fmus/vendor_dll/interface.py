@@ -50,6 +50,9 @@ DATA_TYPES = {
 CALLS = ("FirstCall", "CheckParameters", "Initialize", "Outputs", "Iterate", "Terminate", "PrintInfo")
 """Functions beside ``Model_GetInfo``, without their prefix ``Model_``."""
 
+CONTROLLER = "controller."
+"""Before the names of the DLL's variables, where a circuit lies around it."""
+
 _SHORTEST = 1e-9
 """A shorter sample time is none [s]."""
 

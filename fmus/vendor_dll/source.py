@@ -10,7 +10,7 @@ from fmus.toolchain.variables import Input, Parameter, State, Variable
 from fmus.vendor_dll.circuit import ANGLE, BRIDGE, MEASURED, TRIMS
 from fmus.vendor_dll.circuit_source import circuit_source, kernel_source, no_circuit_source, no_kernel_source
 from fmus.vendor_dll.device import Device
-from fmus.vendor_dll.interface import DATA_TYPES, DllInterface, DllParameter, Place, Signal, layout
+from fmus.vendor_dll.interface import CONTROLLER, DATA_TYPES, DllInterface, DllParameter, Place, Signal, layout
 from fmus.vendor_dll.state_trial import Trial
 
 _C = Path(__file__).with_name("c")
@@ -22,9 +22,6 @@ _HEADERS = "#define _GNU_SOURCE\n" + "".join(
 PARAMETER, INITIAL, INPUT, OUTPUT, HELD, INT_STATE, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, SAMPLES = range(10)
 CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(10, 16)
 """What a variable is to the host. What lies up to `INITIAL` is set before the start."""
-
-CONTROLLER = "controller."
-"""Before the names of the DLL's variables, where a circuit lies around it."""
 
 _ROLES = ("PARAMETER", "INITIAL", "INPUT", "OUTPUT", "HELD", "INT_STATE", "FLOAT_STATE", "DOUBLE_STATE",
           "MEMORY_STATE", "SAMPLES", "CIRCUIT_PARAMETER", "CIRCUIT_INPUT", "CIRCUIT_STATE",

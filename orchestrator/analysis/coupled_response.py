@@ -23,8 +23,9 @@ from orchestrator.errors import AnalysisError, ComponentError
 from orchestrator.fmi.instance import is_ours
 from orchestrator.fmi.port import without_binding
 
-SIZES = (1e-4, 1e-5)
-"""Disturbances of the states, relative to max(1, |value|); a smaller one is tried where the larger does not agree."""
+SIZES = (1e-4, 1e-5, 1e-6)
+"""Disturbances of the states, relative to max(1, |value|); a smaller one is tried where the larger does not agree. The
+last is that of the perturbation: a controller with dead bands or limits close by is linear for nothing larger."""
 
 LARGEST_ERROR = 0.05
 """Accepted error, as a part of the response's size in the same window. Our own converter in the two-area system stays
@@ -63,12 +64,15 @@ class Disagreement:
         Relative to the response's size at that time.
     seconds
         How long the response was followed [s].
+    size
+        Of the disturbance, one of `SIZES`.
     """
 
     state: str
     time: float
     error: float
     seconds: float
+    size: float
 
 
 def foreign_components(master: Master) -> list[str]:
@@ -138,8 +142,10 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
     except ComponentError as error:
         return f"after a small disturbance the FMUs cannot be run to confirm the linear model: {error}", ""
     if not found.error > LARGEST_ERROR:
-        short = f"the FMU of {', '.join(foreign)} was followed for {found.seconds:.2g} s only"
-        return "", short if found.seconds < _SHORT else ""
+        whose = f"the FMU of {', '.join(foreign)}"
+        short = f"{whose} was followed for {found.seconds:.2g} s only" if found.seconds < _SHORT else ""
+        narrow = f"{whose} is linear for disturbances of {found.size:g} only: a limit or dead band is near"
+        return "", "; ".join(text for text in (short, narrow if found.size == SIZES[-1] else "") if text)
     of = found.state.partition(".")[0]
     whose = f"component {of!r}" if of in foreign else f"the system with the foreign FMU of {', '.join(foreign)}"
     return (
@@ -170,7 +176,7 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     for size in SIZES:
         measured, start = _response(master, state, model, x_0, size * shape, every)
         expected = _predicted(model, start, every, len(measured))[:, : len(x_0)]
-        found = _compare(measured, expected, size * np.maximum(1.0, np.abs(x_0)), model, every)
+        found = _compare(measured, expected, size, np.maximum(1.0, np.abs(x_0)), model, every)
         best = found if best is None or found.error < best.error else best
         if best.error <= LARGEST_ERROR:
             break
@@ -225,16 +231,18 @@ def _predicted(model: LinearModel, z: Matrix, every: int, times: int) -> Matrix:
     return np.array(rows)
 
 
-def _compare(measured: Matrix, expected: Matrix, disturbed: Matrix, model: LinearModel, every: int) -> Disagreement:
+def _compare(
+    measured: Matrix, expected: Matrix, disturbance: float, scale: Matrix, model: LinearModel, every: int
+) -> Disagreement:
     """The largest error of any state in any window, relative to the response there."""
     interval = every * (model.step_size or 0.0)
-    floor = _FLOOR * np.maximum(np.abs(expected).max(axis=0), disturbed)
-    worst = Disagreement("", 0.0, 0.0, len(measured) * interval)
+    floor = _FLOOR * np.maximum(np.abs(expected).max(axis=0), disturbance * scale)
+    worst = Disagreement("", 0.0, 0.0, len(measured) * interval, disturbance)
     for window in np.array_split(np.arange(len(measured)), min(_WINDOWS, len(measured))):
         size = np.maximum(np.abs(expected[window]).max(axis=0), floor)
         error = np.nan_to_num(np.abs(measured[window] - expected[window]) / size, nan=np.inf)
         k, i = np.unravel_index(np.argmax(error), error.shape)
         if error[k, i] > worst.error:
             time = (window[k] + 1) * interval
-            worst = Disagreement(model.names[i], float(time), float(error[k, i]), worst.seconds)
+            worst = Disagreement(model.names[i], float(time), float(error[k, i]), worst.seconds, disturbance)
     return worst

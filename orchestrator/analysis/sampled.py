@@ -10,6 +10,7 @@ from math import gcd, lcm
 
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError
+from orchestrator.fmi.component import Component
 
 LONGEST = 1.0
 """Common periods above this [s] are refused."""
@@ -20,16 +21,30 @@ _FINEST = 10**12
 
 def repeating(master: Master) -> dict[str, tuple[Fraction, ...]]:
     """By name of a sampled component: the times after which something in it repeats [s]."""
-    found = {}
-    for name, component in master.components.items():
-        d = component.description
-        times = [Fraction(d.sample_time).limit_denominator(_FINEST)] if d.sample_time else []
-        if d.frequency:
-            value = float(component.values([d.frequency])[d.frequency])
-            times.append(1 / Fraction(value).limit_denominator(10**6))
-        if times:
-            found[name] = tuple(times)
-    return found
+    times = {name: times_of(component) for name, component in master.components.items()}
+    return {name: found for name, found in times.items() if found}
+
+
+def times_of(component: Component) -> tuple[Fraction, ...]:
+    """Times after which something in a component repeats [s]: its sample time and the network's period."""
+    d = component.description
+    times = [Fraction(d.sample_time).limit_denominator(_FINEST)] if d.sample_time else []
+    if d.frequency:
+        value = float(component.values([d.frequency])[d.frequency])
+        times.append(1 / Fraction(value).limit_denominator(10**6))
+    return tuple(times)
+
+
+def steps_of_times(times: Iterable[Fraction], step_size: float) -> int:
+    """Communication steps [s] after which all of these times end together; 1 where each step is like every other."""
+    step = Fraction(step_size).limit_denominator(_FINEST)
+    known = tuple(times)
+    if all(step % time == 0 for time in known):
+        return 1
+    common = step
+    for time in known:
+        common = _common(common, time)
+    return int(common / step)
 
 
 def steps_of_period(master: Master, step_size: float, without: Iterable[str] = ()) -> int:
@@ -41,20 +56,15 @@ def steps_of_period(master: Master, step_size: float, without: Iterable[str] = (
         If they repeat together after a second at the earliest.
     """
     times = {name: t for name, t in repeating(master).items() if name not in set(without)}
-    step = Fraction(step_size).limit_denominator(_FINEST)
-    if all(step % time == 0 for found in times.values() for time in found):
-        return 1
-    common = step
-    for time in (time for found in times.values() for time in found):
-        common = _common(common, time)
-    if common > LONGEST:
+    steps = steps_of_times((time for found in times.values() for time in found), step_size)
+    if steps > 1 and steps * step_size > LONGEST * (1 + 1e-9):
         told = "; ".join(f"{name}: {', '.join(f'{float(t):.6g} s' for t in found)}" for name, found in times.items())
         raise AnalysisError(
             f"sampled components and the communication step of {step_size:g} s repeat together after "
-            f"{float(common):.4g} s only, more than {LONGEST:g} s ({told}); take a step that divides these times, or "
-            "that they divide"
+            f"{steps * step_size:.4g} s only, more than {LONGEST:g} s ({told}); take a step that divides these times, "
+            "or that they divide"
         )
-    return int(common / step)
+    return steps
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:

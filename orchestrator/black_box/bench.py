@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fmus.toolchain.compiler import compile_here
+from orchestrator.analysis.sampled import steps_of_times, times_of
 from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component, RealBatch
@@ -28,7 +29,8 @@ _STRETCH = 20000
 """Number of steps in one call of the C library; an interrupt from the keyboard takes effect between two calls."""
 
 STILL = 1e-9
-"""Largest change of an output over a second [pu] at which the device counts as being in steady state."""
+"""Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over
+the period, where a sampled controller of phase quantities makes the output repeat after a period."""
 
 
 @dataclass
@@ -189,7 +191,7 @@ class Runs:
         bench = self._bench
         second = round(1.0 / bench.step_size)
         while True:
-            outputs = self._hold(second)
+            outputs = self._means(self._hold(second))
             movement = np.abs(np.ptp(outputs, axis=0)).max()
             if movement <= STILL:
                 self.still_after = self._index * bench.step_size - 1.0
@@ -200,6 +202,14 @@ class Runs:
                     f"pu in a second after {bench.longest_wait:g} s, so there is no operating point to identify it at; "
                     "check its start values, or give it more time"
                 )
+
+    def _means(self, outputs: Numbers) -> Numbers:
+        """Means over the period after which the device repeats, one below the other; else the outputs as they are."""
+        period = steps_of_times(times_of(self._running), self._bench.step_size)
+        whole = len(outputs) // period  # periods
+        if period == 1 or whole < 2:
+            return outputs
+        return np.asarray(outputs[len(outputs) - whole * period :].reshape(whole, period, -1).mean(axis=1))
 
     def _hold(self, count: int) -> Numbers:
         return self._drive(np.tile(self._bench.rest, (count, 1)))

@@ -15,6 +15,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, find_spectrum
+from orchestrator.analysis.sampled import repeating, steps_of_period
 from orchestrator.analysis.state_access import StateAccess, obstacle
 from orchestrator.analysis.steady_state import OperatingPoint, what_to_check
 from orchestrator.black_box.bench import Bench
@@ -197,6 +198,13 @@ def _check_still(master: Master, boxes: Sequence[str]) -> float:
     """Largest change of a known state in one communication step. With a black box, no better operating point can be
     solved for.
     """
+    if steps_of_period(master, master.clock.step_size, without=boxes) > 1:
+        sampled = ", ".join(name for name in repeating(master) if name not in boxes)
+        raise AnalysisError(
+            f"{sampled} is sampled beside the communication step, or works on phase quantities, so each step differs "
+            f"from the last, and no map of one step describes it beside the black box {', '.join(boxes)}; measure "
+            f"{sampled} itself as the black box, or take `gfor modes` where every component lets its states be set"
+        )
     moves = {name: _movement(master, name) for name in master.components if name not in boxes}
     worst = max(moves, key=lambda name: moves[name], default=None)
     if worst is None:

@@ -25,6 +25,7 @@ from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -93,6 +94,8 @@ def _start(description: FmuDescription, name: str) -> float:
 
 def _check_port(description: FmuDescription, bench: Bench) -> None:
     missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
+    if missing and is_controller_alone(description):
+        raise InputError(f"{description.path.name}: it has no {', '.join(missing)}: {NO_BUS}")
     if missing:
         raise InputError(
             f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "

@@ -7,6 +7,7 @@ from orchestrator.binding.draft import draft_binding
 from orchestrator.binding.tables import REQUIRED
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.description import read_description
+from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 from orchestrator.safe_files import write_text
 
 
@@ -29,6 +30,8 @@ def run(options: argparse.Namespace) -> int:
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
     marked = [line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")]
+    if is_controller_alone(description):
+        print(f"{options.file}: {NO_BUS}; a binding makes a device of it only where its DLL is a whole converter")
     print(f"{out}: confirm what is marked GUESS")
     for line in marked:
         print(f"  to be filled in: {line}")

@@ -23,7 +23,7 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import INTERRUPTED, InputError
-from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.fmi.devices import as_device
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -186,7 +186,13 @@ def _request(options: argparse.Namespace) -> CertificationRequest:
     study = {name: value for name, value in options.set if name.split(".")[0] in STUDY}
     own = {name: value for name, value in options.set if name not in study}
     request = CertificationRequest(
-        as_fmu(options.fmu), options.binding, own, options.pod, options.reactances, study, options.black_box
+        as_device(options.fmu, options.binding),
+        options.binding,
+        own,
+        options.pod,
+        options.reactances,
+        study,
+        options.black_box,
     )
     request.check()
     return request

@@ -21,6 +21,7 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, said_stages
 from orchestrator.errors import InputError
+from orchestrator.fmi.devices import as_device
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -112,7 +113,7 @@ def _request(options: argparse.Namespace) -> CertificationRequest:
         )
     if study := [name for name, _ in options.set if name.split(".")[0] in STUDY]:
         raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
-    request = CertificationRequest(options.fmu, options.binding, dict(options.set))
+    request = CertificationRequest(as_device(options.fmu, options.binding), options.binding, dict(options.set))
     request.check()
     return request
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from fmus.vendor_dll.interface import CONTROLLER
 from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
 from orchestrator.cli.terminal import make_console
-from orchestrator.fmi.description import missing_binary
+from orchestrator.fmi.description import FmuDescription, missing_binary
 from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.report.tables import fmu_variables
 
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     )
     settable = "settable by a master" if description.states_are_settable else "not settable"
     console.print(
-        f"platforms: {', '.join(description.platforms)}; continuous states: {len(description.states)} ({settable}); "
+        f"platforms: {', '.join(description.platforms)}; {_states(description)} ({settable}); "
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
@@ -49,6 +50,24 @@ def run(options: argparse.Namespace) -> int:
     for table in fmu_variables(description):
         console.print("", table)
     return 0
+
+
+def _states(description: FmuDescription) -> str:
+    """How many there are; those of a vendor's DLL are no continuous ones, and by what they are."""
+    if not description.kept_in:
+        return f"continuous states: {len(description.states)}"
+    of_circuit = [name for name in description.states if description.frequency and not name.startswith(CONTROLLER)]
+    own, circuit = [name.removeprefix(CONTROLLER) for name in description.states], len(of_circuit)
+    held = sum(name.startswith("held.") for name in own)
+    memory = sum(name.startswith("memory[") for name in own)
+    parts = (
+        (len(own) - circuit - held - memory, "in the arrays that it declares"),
+        (memory, "in its own memory"),
+        (held, "outputs held until its next sample"),
+        (circuit, "of the circuit around it"),
+    )
+    told = ", ".join(f"{count} {where}" for count, where in parts if count)
+    return f"states of a sampled controller: {told or 'none'}"
 
 
 def _in_words(model: EmbeddedModel) -> str:

@@ -13,10 +13,12 @@ import numpy as np
 
 from orchestrator.analysis.continuation import Eigenpair, pair_at, pairs_near
 from orchestrator.analysis.coupled_response import foreign_components
+from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.eigenvalue_shift import eigenvalue_shift
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
+from orchestrator.analysis.linearization import Blocks, continuous, where_given
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
+from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Numbers
 from orchestrator.cases.prepare import PreparedScenario
@@ -193,7 +195,7 @@ def find_sensitivities(
                 rows[parameter] = _none(
                     parameter, chosen, "held", "a fixed parameter moves the start: leave --held out"
                 )
-            elif held or (parameter.tunable and _stays(master, parameter)):
+            elif held or (parameter.tunable and _stays(master, parameter, blocks.period)):
                 row = _row(parameter, chosen, "held" if held else "stays", _in_running(master, blocks, at, parameter))
                 if row.derivative == 0 and not held and parameter.component in unknown:
                     anew.append(parameter)
@@ -245,7 +247,7 @@ class _Mode:
         AnalysisError
             If the changed system has other states.
         """
-        varied = compose(blocks, master.schedule)
+        varied = model_of(master, blocks)
         if varied.names != self._model.names:
             raise AnalysisError("with another value the outputs depend on other inputs, which changes the states")
         system = None
@@ -276,19 +278,33 @@ def _changed(master: Master, parameter: Parameter, value: float) -> Iterator[Non
         component.set({parameter.variable: parameter.value})
 
 
-def _stays(master: Master, parameter: Parameter) -> bool:
-    """Whether a component is where it was, with another value of a parameter, now and a step later."""
+def _stays(master: Master, parameter: Parameter, period: int) -> bool:
+    """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
+    of it a period [communication steps] later where sampled controllers make the steps differ.
+    """
     change = _TRIED * parameter.scale
-    before = _answer(master, parameter.component)
+
+    def answer() -> Numbers:
+        return _answer(master, parameter.component) if period == 1 else _after(master, period)
+
+    before = answer()
     for value in (parameter.value + sign * change for sign in (1, -1) if parameter.allows(sign * change)):
         try:
             with _changed(master, parameter, value):
-                after = _answer(master, parameter.component)
+                after = answer()
         except CosimError:  # it will not have the value while it runs; perhaps at a start
             return False
         if np.any(np.abs(after - before) > _STAYS * np.maximum(1.0, np.abs(before))):
             return False
     return True
+
+
+def _after(master: Master, steps: int) -> Numbers:
+    """All states some steps later; the system is put back."""
+    state = CoupledState(master)
+    with state.put_back():
+        master.advance(steps)
+        return state.read()
 
 
 def _not_of_the_catalogue(prepared: PreparedScenario, master: Master) -> set[str]:
