@@ -10,6 +10,7 @@ import casadi as ca
 from fmus.synchronous_generator.excitation.ac1a import ac1a
 from fmus.synchronous_generator.excitation.ac4a import ac4a
 from fmus.synchronous_generator.excitation.dc1a import dc1a, ieeet1
+from fmus.synchronous_generator.excitation.external import external
 from fmus.synchronous_generator.excitation.manual import manual
 from fmus.synchronous_generator.excitation.sexs import sexs
 from fmus.synchronous_generator.excitation.st1a import st1a
@@ -46,7 +47,7 @@ MACHINES: dict[str, MachinePart] = {
 }  # fmt: skip
 EXCITERS: dict[str, Exciter] = {
     "manual": manual, "sexs": sexs, "ieeet1": ieeet1, "dc1a": dc1a, "ac1a": ac1a, "ac4a": ac4a, "st1a": st1a,
-    "st4b": st4b,
+    "st4b": st4b, "external": external,
 }  # fmt: skip
 GOVERNORS: dict[str, GovernorPart] = {
     "constant_power": constant_power, "constant_torque": constant_torque, "tgov1": tgov1, "hygov": hygov, "gast": gast,

@@ -51,6 +51,8 @@ class PeriodicPoint:
 
     Attributes
     ----------
+    names
+        Of all states; outputs that are held over a step follow those of the components.
     x
         Values of all states, shape (n,).
     change
@@ -64,6 +66,7 @@ class PeriodicPoint:
         turns, shape (n,).
     """
 
+    names: tuple[str, ...]
     x: Matrix
     change: Matrix
     first: float
@@ -93,36 +96,48 @@ def period_model(master: Master, blocks: Blocks) -> LinearModel:
     blocks
         Its components, linearised there.
     """
-    scale = _scales(blocks, master.schedule)
-    maps = _Period(master, blocks.period, scale).maps()
+    names, scale = _names_and_scales(blocks, master.schedule)
+    maps = _Period(master, blocks.period, names, scale).maps()
     per_step = _per_step(maps, blocks.period)
-    made = LinearModel.from_matrix(per_step, tuple(blocks.state_names()), blocks.step_size, blocks.disagreement)
+    made = LinearModel.from_matrix(per_step, names, blocks.step_size, blocks.disagreement)
     return replace(made, sources=blocks.how, period=blocks.period)
 
 
-def _scales(blocks: Blocks, schedule: Schedule) -> Matrix:
-    """What is 1 to each state: at least 1, or what a change of another state by 1 does to it in one step."""
+def _names_and_scales(blocks: Blocks, schedule: Schedule) -> tuple[tuple[str, ...], Matrix]:
+    """All states, held outputs among them, and what is 1 to each: at least 1, or what a change of another one by 1 does
+    to it in one step.
+    """
     model = compose(blocks, schedule, within_period=True)
-    if remembered := [name for name in model.names if name.endswith(HELD) or DELAYED in name]:
+    if delayed := [name for name in model.names if DELAYED in name]:
         raise AnalysisError(
             f"sampled controllers that repeat after {blocks.period} communication steps have modes only where nothing "
-            f"is on its way between components; here {remembered[0]} is: take gauss-seidel with the devices "
-            "first, and no imperfections of connections"
+            f"is on its way between components; here {delayed[0]} is: leave the delays of connections out"
         )
     scales: Matrix = np.maximum(1.0, np.abs(model.A).max(axis=1, initial=0.0))
-    return scales
+    return tuple(model.names), scales
 
 
 class _Period:
     """Runs a system over a period from states beside the present one; it is put back each time."""
 
-    def __init__(self, master: Master, steps: int, scale: Matrix) -> None:
+    def __init__(self, master: Master, steps: int, names: tuple[str, ...], scale: Matrix) -> None:
         self._master, self._steps, self._state = master, steps, CoupledState(master)
-        self.x = self._state.read()
+        held = [name.removesuffix(HELD) for name in names if name.endswith(HELD)]
+        self._held = [master.output_names.index(name) for name in held]
+        self._first_held = len(names) - len(held)
+        self.x = self._read()
         self.scale = np.maximum(scale, np.abs(self.x))
         looks = min(_LOOKS, steps)
         ends = np.unique(np.round(np.linspace(0, steps, looks + 1)).astype(int))
         self._parts = np.diff(ends)
+
+    def _read(self) -> Matrix:
+        return np.concatenate([self._state.read(), self._master.y[self._held]])
+
+    def _write(self, x: Matrix) -> None:
+        """Set all states; an output that is held keeps what it is given, though other outputs follow the states."""
+        self._state.write(x[: self._first_held])
+        self._master.y[self._held] = x[self._first_held :]
 
     def change(self, x: Matrix) -> Matrix:
         """Of all states over a period from ``x``, shape (n,)."""
@@ -131,15 +146,15 @@ class _Period:
     def _run(self, x: Matrix, parts: list[int]) -> list[Matrix]:
         found = []
         with self._state.put_back():
-            self._state.write(x)
+            self._write(x)
             for part in parts:
                 self._master.advance(part)
-                found.append(self._state.read())
+                found.append(self._read())
         return found
 
     def take(self, x: Matrix) -> None:
         """Stand at another state."""
-        self._state.write(x)
+        self._write(x)
         self.x = x
 
     def maps(self) -> NDArray[np.float64]:
@@ -215,7 +230,9 @@ def find_periodic_point(master: Master, accept: float, most: int) -> PeriodicPoi
     """
     schedule = gauss_seidel(master.schedule.groups)
     blocks = Blocks(master, schedule=schedule)
-    period = _Period(master, steps_of_period(master, master.clock.step_size), _scales(blocks, schedule))
+    steps = steps_of_period(master, master.clock.step_size)
+    names, scale = _names_and_scales(blocks, schedule)
+    period = _Period(master, steps, names, scale)
     x = period.x
     change, counting = _without_counts(period, x)
     first = _largest(change)
@@ -229,7 +246,7 @@ def find_periodic_point(master: Master, accept: float, most: int) -> PeriodicPoi
             break
         x, change, counting, iterations = candidate, new, counts, iterations + 1
     period.take(x)
-    return PeriodicPoint(x, change, first, iterations, counting)
+    return PeriodicPoint(names, x, change, first, iterations, counting)
 
 
 def _without_counts(period: _Period, x: Matrix) -> tuple[Matrix, Mask]:

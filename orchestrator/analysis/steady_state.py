@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
+from orchestrator.analysis.linear_model import HELD
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.periodic import find_periodic_point
 from orchestrator.analysis.sampled import steps_of_period
@@ -106,17 +107,16 @@ def find_operating_point(
 
 def _periodic_point(master: Master, steps: int, tolerance: float, accept: float, most: int) -> OperatingPoint:
     """The same with sampled controllers: all must repeat after a period, and the limits are those of all its steps."""
-    names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
     found = find_periodic_point(master, accept * steps, most)
     period = steps * master.clock.step_size
     tolerance *= steps * min(1.0, master.clock.step_size / _SHORT)
     if not found.residual <= tolerance:
-        worst = ", ".join(f"{names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3])
+        worst = ", ".join(f"{found.names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3])
         raise AnalysisError(
             f"no steady state found: {_newton_in_words(found.iterations)} a period of {period:g} s, after which "
             f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}"
         )
-    values = dict(zip(names, found.x.tolist(), strict=True))
+    values = {name: x for name, x in zip(found.names, found.x.tolist(), strict=True) if not name.endswith(HELD)}
     return OperatingPoint(found.residual, found.residual / period, found.first, found.iterations, values)
 
 

@@ -120,8 +120,12 @@ def test_a_generator_with_it_starts_in_steady_state(name, factory):
         factory(exciter=name), AT_BUS | {"transformer.X_t": 0.12, "machine.s_10": 0.1, "machine.s_12": 0.4}
     )
     assert not refused(device)
-    assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-8
-    assert device.outputs([BUS.real, BUS.imag])["q"] == pytest.approx(0.15, abs=1e-12)
+    at_rest = [BUS.real, BUS.imag]
+    if name == "external":
+        at_rest.append(device.parameters["exciter.E_fd_0"])
+        assert max(map(abs, device.rates([*at_rest[:2], 0.9 * at_rest[2]]).values())) > 1e-3
+    assert max(map(abs, device.rates(at_rest).values())) < 1e-8
+    assert device.outputs(at_rest)["q"] == pytest.approx(0.15, abs=1e-12)
 
 
 # -- ceilings -----------------------------------------------------------------------------------
