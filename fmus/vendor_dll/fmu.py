@@ -91,7 +91,10 @@ def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
     if end and not answer:
         answer, again = _ask(path, reader)
         if again and not answer:
-            raise DllError(f"{path.name}: the process that loads it {end}; ask its author for a DLL that loads")
+            raise DllError(
+                f"{path.name}: the process that reads it {end}: it crashes while it is "
+                "loaded, or its structures are of another layout; ask its author for a DLL that loads"
+            )
         answer["trial"] = Trial("not tried", why=f"with inputs that move, the process that ran it {end}").as_json()
     if "error" in answer:
         raise DllError(f"{path.name}: {answer['error']}")

@@ -56,6 +56,11 @@ CONTROLLER = "controller."
 _SHORTEST = 1e-9
 """A shorter sample time is none [s]."""
 
+_VERSIONS = (0, 1, 2)
+"""First numbers of the interface's version that are known: 1 is that of both editions of its API; some write 2 for the
+second edition, some nothing.
+"""
+
 NEEDED = ("Initialize", "Outputs")
 """Without these a DLL cannot be run."""
 
@@ -139,6 +144,9 @@ class DllInterface:
         found = [
             f"it has no function Model_{call}, which every host calls" for call in NEEDED if call not in self.calls
         ]
+        if self.interface_version[0] not in _VERSIONS:
+            told = ".".join(map(str, self.interface_version))
+            found.append(f"it was written for version {told} of the interface, whose structures are not known here")
         if not self.outputs:
             found.append("it declares no outputs, or its structure is of another layout")
         groups: tuple[tuple[str, Sequence[Signal | DllParameter]], ...] = (

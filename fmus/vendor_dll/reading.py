@@ -111,6 +111,9 @@ def _parameter(row: _Parameter) -> DllParameter:
         number: Number = getattr(value, kind.name) if kind else 0
         return number
 
+    bounds = (None, None) if text else (bound(row.minimum), bound(row.maximum))
+    if bounds == (0, 0):  # the author wrote none
+        bounds = (None, None)
     return DllParameter(
         _text(row.name),
         _text(row.group),
@@ -119,8 +122,7 @@ def _parameter(row: _Parameter) -> DllParameter:
         row.data_type,
         bool(row.fixed),
         (_text(row.default.c_string) if kind else "") if text else bound(row.default) or 0,
-        None if text else bound(row.minimum),
-        None if text else bound(row.maximum),
+        *bounds,
     )
 
 
