@@ -91,6 +91,7 @@ int32_t Model_Outputs(struct instance *s) {
     const struct in *u = s->in; struct out *y = s->out; const struct par *p = s->par;
     const double turn = 6.283185307179586, peak = u->v_ref * p->V * sqrt(2.0 / 3.0);
     double power = 0, *theta = s->doubles, *filtered = s->doubles + 1;
+    HIDE
     for (int k = 0; k < 3; ++k) {
         y->e[k] = peak * cos(*theta - k * turn / 3);
         power += y->e[k] * u->i[k] / p->S;
@@ -135,9 +136,12 @@ def _library(source):
         return compiled(source, Path(folder)).read_bytes()
 
 
-def droop_device(folder, *, sample=1e-4, delay=0, wrap="*theta = fmod(*theta, turn);", changes=()):
-    """File of a device: the droop behind an inductor and a transformer; ``changes`` replace text in it."""
-    source = INTERFACE + DROOP.replace("SAMPLE", repr(sample)).replace("WRAP", wrap)
+def droop_device(folder, *, sample=1e-4, delay=0, wrap="*theta = fmod(*theta, turn);", hide="", changes=()):
+    """File of a device: the droop behind an inductor and a transformer.
+
+    ``changes`` replace text in it; ``hide`` may put the filtered power elsewhere.
+    """
+    source = INTERFACE + DROOP.replace("SAMPLE", repr(sample)).replace("WRAP", wrap).replace("HIDE", hide)
     (folder / "droop.so").write_bytes(_library(source))
     text = DEVICE.format(delay=delay)
     for old, new in changes:

@@ -80,8 +80,8 @@ def test_a_defect_in_what_it_declares_is_refused(tmp_path, planted):
 KEEPING = {
     "a hidden global": (lag(state="own", doubles=0, head="static double own; "), "library"),
     "memory that it allocates": (
-        lag(state="(*own)", doubles=0, head="static double *volatile own; ",
-            begin="own = malloc(8); *own = 0;"), "hidden"),
+        lag(state="(*own)", doubles=0, head="static double *volatile own; "
+            "int32_t Model_FirstCall(struct instance *s) { own = malloc(8); *own = 0; return 0; } "), "hidden"),
     "a file": (
         lag(head="#include <stdio.h>\nstatic int n; ",
             do='FILE *f = fopen("n", "a+"); if (f) { fputc(1, f); ((double *)s->out)[0] += ftell(f); fclose(f); }'),
