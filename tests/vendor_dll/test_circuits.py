@@ -1,4 +1,4 @@
-"""The circuits around a controller against equations written by hand and linearised by SciPy; and a hidden state in one."""
+"""The circuits around a controller against equations by hand, linearised by SciPy; and a hidden state in one."""
 
 import cmath
 
