@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fmus.control_dll import export
 from fmus.control_dll.export import DLL_TARGETS, ControlDllError, control_part_of, with_values, write_dll
 from fmus.vendor_dll.fmu import dll_fmu, read_dll
 from orchestrator.cli import main
@@ -198,3 +199,18 @@ def test_the_command_writes_library_and_sheet(tmp_path, capsys):
     assert "give NAME=VALUE with a number" in capsys.readouterr().err
     assert main(["export-dll", "gfl", "--dest", str(tmp_path)]) == 2
     assert "'gfl' has no control part" in capsys.readouterr().err
+
+
+def test_an_export_that_ends_half_way_leaves_nothing(part, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(export, "data_sheet", full)
+    with pytest.raises(OSError, match="no space left"):
+        write_dll(part, tmp_path / "dest", ("linux64",))
+    assert not (tmp_path / "dest").exists()
+    monkeypatch.undo()
+    monkeypatch.setattr(export.Path, "replace", full)
+    with pytest.raises(OSError, match="no space left"):
+        write_dll(part, tmp_path / "dest", ("linux64",))
+    assert not [path for path in (tmp_path / "dest").rglob("*") if path.is_file()]

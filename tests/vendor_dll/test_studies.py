@@ -181,3 +181,11 @@ def test_a_sweep_has_the_modes_of_each_value(folder):
     expected = modes_with(folder, tau=0.051)
     assert float(rows[0.051]["imag [rad/s]"]) == pytest.approx(expected.imag, rel=1e-6)
     assert float(rows[0.05]["imag [rad/s]"]) != pytest.approx(expected.imag, rel=1e-4)
+
+
+def test_info_says_what_the_states_of_a_sampled_controller_are(folder, capsys):
+    assert main(["info", str(folder / "droop.toml")]) == 0
+    text = "3 in the arrays that it declares, 4 outputs held until its next sample, 5 of the circuit around it"
+    assert f"states of a sampled controller: {text}" in said(capsys)
+    assert main(["info", str(folder / "none.so")]) == 2
+    assert "give the vendor's .so or .dll file" in said(capsys)
