@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.acceptance import Acceptance, read_checks, run_checks
@@ -224,6 +225,6 @@ def _table(result: Certification) -> Table:
             "–" if before is None else f"{before.imag / (2 * np.pi):.3f} Hz, {100 * damping_ratio(before):.2f} %",
             "–" if ratio is None else f"{ratio:.3f}",
             "–" if seen is None else f"{seen:.2f}",
-            "accepted" if v.accepted else "[red]not accepted[/]" if v.judged else "[red]not judged[/]",
+            "accepted" if v.accepted else Text("not accepted" if v.judged else "not judged", "red"),
         )
     return table
