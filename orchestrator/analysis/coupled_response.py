@@ -141,13 +141,17 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
         found = worst_disagreement(master, model)
     except ComponentError as error:
         return f"after a small disturbance the FMUs cannot be run to confirm the linear model: {error}", ""
-    if not found.error > LARGEST_ERROR:
-        whose = f"the FMU of {', '.join(foreign)}"
-        short = f"{whose} was followed for {found.seconds:.2g} s only" if found.seconds < _SHORT else ""
-        narrow = f"{whose} is linear for disturbances of {found.size:g} only: a limit or dead band is near"
-        return "", "; ".join(text for text in (short, narrow if found.size == SIZES[-1] else "") if text)
     of = found.state.partition(".")[0]
     whose = f"component {of!r}" if of in foreign else f"the system with the foreign FMU of {', '.join(foreign)}"
+    if not found.error > LARGEST_ERROR:
+        if found.size == SIZES[-1]:
+            return (
+                f"the system with the foreign FMU of {', '.join(foreign)} answers as its linear model does after a "
+                f"disturbance of {found.size:g} of each state, and not after one of {SIZES[-2]:g}: a limit or a dead "
+                "band is near, and the modes hold for nothing larger. Simulate it with `gfor run`"
+            ), ""
+        short = f"the FMU of {', '.join(foreign)} was followed for {found.seconds:.2g} s only"
+        return "", short if found.seconds < _SHORT else ""
     return (
         f"{whose} does not answer as its linear model does: {found.time:.3g} s after a small disturbance {found.state} "
         f"differs by {100 * found.error:.3g} % of the response, where {100 * LARGEST_ERROR:g} % is allowed. Does the "

@@ -1,5 +1,6 @@
 /* y = x + v + 0.1·h: x of a controller, v of a filter, both following u, and with HIDDEN an h that nothing declares.
    With SAMPLED the controller acts every 20 ms and stands still in between.
+   With BAND x grows at 35 1/s beyond 3e-6, up to a limit of 200.
    With RUNAWAY x grows at 40 1/s up to a limit of 200. */
 enum { U, Y, X, V, RATE_X, RATE_V, SIZE };
 enum { H, SINCE, MEMORY };
@@ -20,6 +21,10 @@ static void advance(double *z, double *m, double *hidden, double time, double st
     z[X] = fmax(-200, fmin(200, z[X] + step * (40 * z[X] + z[U])));
 #else
     z[X] += -expm1(-step / T_X) * (z[U] - z[X]);
+#endif
+#ifdef BAND
+    z[X] += step * 40 * copysign(fmax(0, fmin(200, fabs(z[X])) - 3e-6), z[X]);
+    z[X] = fmax(-200, fmin(200, z[X]));
 #endif
     z[V] += -expm1(-step / T_V) * (z[U] - z[V]);
 }

@@ -107,6 +107,13 @@ def test_growth_that_an_fmu_does_not_declare_leaves_the_verdict_not_known(tmp_pa
     assert found.stability.largest_growth_rate < 0  # what the declared states alone say
 
 
+def test_a_system_that_is_stable_within_a_dead_band_only_is_not_called_stable(tmp_path):
+    found = modes(tmp_path, device(tmp_path, "narrow", BAND=1))
+    assert found.stability.largest_growth_rate < 0  # within the band
+    assert found.stability.stable is None
+    assert "after a disturbance of 1e-06 of each state, and not after one of 1e-05" in found.stability.reason
+
+
 @pytest.mark.parametrize("as_continuous", [False, True])
 def test_a_linear_model_of_an_fmu_that_hides_growth_is_not_called_stable(tmp_path, as_continuous):
     prepared = loop(tmp_path, device(tmp_path, "hiding", HIDDEN=1), -0.5)
