@@ -1,8 +1,13 @@
-"""Solution of complex nodal equations Y·v = i with symbols, by elimination in an order that keeps them sparse."""
+"""Solution of complex nodal equations Y·v = i with symbols, by elimination in an order that keeps them sparse; or as
+data, by the kernel of the model.
+"""
 
+from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 
 from fmus.toolchain.frames import ZERO, Phasor
+from fmus.toolchain.model import Model
+from fmus.toolchain.model_builder import ModelBuilder
 
 Admittances = dict[str, dict[str, Phasor]]
 """Rows and columns by bus; the pattern is symmetric."""
@@ -55,3 +60,25 @@ def solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
                 known -= value * voltages[column]
         voltages[bus] = known / rows[bus][bus]
     return voltages
+
+
+def solved_as_data(
+    m: ModelBuilder, Y: Admittances, currents: dict[str, Phasor], written_out: Callable[[], Model]
+) -> dict[str, Phasor]:
+    """Voltages of all buses, which the model's kernel solves for.
+
+    Parameters
+    ----------
+    m
+        The model.
+    Y, currents
+        As `solve`.
+    written_out
+        Makes the same model by `solve`.
+    """
+    place = {bus: k for k, bus in enumerate(Y)}
+    elements = {
+        (place[bus], place[other]): (y.re, y.im) for bus, row in Y.items() for other, y in row.items()
+    }  # fmt: skip
+    found = m.nodes(elements, [(currents[bus].re, currents[bus].im) for bus in Y], written_out)
+    return {bus: Phasor(re, im) for bus, (re, im) in zip(Y, found, strict=True)}

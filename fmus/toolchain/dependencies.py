@@ -39,8 +39,8 @@ class Structure:
 def structure(model: Model) -> Structure:
     """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs.
 
-    Where there would be more than `MOST` dependencies, nothing is listed, which means in both versions of FMI that
-    there may be any.
+    Where there would be more than `MOST` dependencies, or a network is solved as data, nothing is listed, which means
+    in both versions of FMI that there may be any.
     """
     np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
     nx, ny = len(model.states), len(model.outputs)
@@ -53,7 +53,7 @@ def structure(model: Model) -> Structure:
     def of(function: ca.Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
         """Dependence of a function's rows while it runs, and at the start."""
         running = start = _all_unknown(first, function.size1_out(0))
-        if _length(function, 1) <= MOST:
+        if model.nodal is None and _length(function, 1) <= MOST:
             by_x, by_u = _pattern(function, 0, 0), _pattern(function, 0, 1)
             running = _unknowns(first, [(by_u, inputs), (by_x, states)])
             if _length(function, 2) <= MOST:

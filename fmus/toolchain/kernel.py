@@ -19,8 +19,8 @@ from pathlib import Path
 
 import casadi as ca
 
-from fmus.toolchain.elimination import Elimination, plan_elimination
-from fmus.toolchain.long_functions import cut
+from fmus.toolchain.elimination import plan_elimination
+from fmus.toolchain.long_functions import LONGEST, LONGEST_OF_DATA, cut
 from fmus.toolchain.model import Model
 
 _C = Path(__file__).with_name("c")
@@ -47,12 +47,17 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
     if model.integrator == "sdirk":
         elimination = plan_elimination(model)
         functions["iteration"] = elimination.values
-        sizes |= {"NM": len(elimination.matrix_column), "NLU": len(elimination.column)}
-        tables = _tables(elimination)
+        sizes |= {"NM": len(elimination.plan.matrix_column), "NLU": len(elimination.plan.column)}
+        tables = _tables(elimination.plan.tables())
     else:
         held = [index for index, state in enumerate(model.states) if state.stepwise]
         sizes["NS"] = len(held)
         tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
+    if model.nodal is not None:
+        plan = model.nodal.plan
+        sizes |= {"NM": len(plan.matrix_column), "NLU": len(plan.column), "NB": len(plan.order)}
+        sizes["NG"] = len(model.nodal.given)
+        tables += "\n" + _tables(plan.tables() | {"GIVEN": list(model.nodal.given) or [-1]})
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     if further:
         sizes["NWD"] = max(f.sz_w() for f in further.values())
@@ -62,27 +67,29 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
     for name, function in (functions | further).items():
         generator.add(scalar_function(function, f"{name}_code"))
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
-    parts = [cut(str(generator.dump())), enumeration, tables]
-    parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
+    parts = [cut(str(generator.dump()), LONGEST if model.nodal is None else LONGEST_OF_DATA), enumeration, tables]
+    files = ["nodal.c"] if model.nodal is not None else []
+    parts += [(_C / name).read_text(encoding="utf-8") for name in (*files, "kernel.c", f"{model.integrator}.c")]
     return "\n".join(parts)
 
 
-def _tables(e: Elimination) -> str:
-    lists = {
-        "PERM": e.order,
-        "ROW": e.row,
-        "COL": e.column,
-        "DIAG": e.diagonal,
-        "MROW": e.matrix_row,
-        "MCOL": e.matrix_column,
-    }
+def _tables(lists: Mapping[str, list[int]]) -> str:
     return "\n".join(
         f"static const int {name}[] = {{{', '.join(map(str, values))}}};" for name, values in lists.items()
     )
 
 
 def kernel_functions(model: Model) -> dict[str, ca.Function]:
-    """The functions of a kernel by name."""
+    """The functions of a kernel by name; where voltages are solved for, those at given voltages, and the equations."""
+    if model.nodal is not None:
+        return {
+            "initialise": model.initialise,
+            "outputs_at": model.outputs_function,
+            "derivatives_at": model.derivatives,
+            "requirements": model.requirements,
+            "nodal_values": model.nodal.values,
+            "nodal_currents": model.nodal.currents,
+        }
     return {
         "initialise": model.initialise,
         "outputs": model.outputs_function,

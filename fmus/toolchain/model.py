@@ -1,10 +1,16 @@
 """A model: its variables and its equations ẋ = f(x, u, p), y = g(x, u, p), with the initial state."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
+
+if TYPE_CHECKING:
+    from fmus.toolchain.elimination_plan import Plan
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
@@ -13,6 +19,31 @@ FmiVersion = Literal["2.0", "3.0"]
 
 Function = Any
 """A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""
+
+
+@dataclass(frozen=True)
+class NodalEquations:
+    """Y·v = i of a large network: a matrix whose pattern never changes, and currents.
+
+    Attributes
+    ----------
+    plan
+        Order and fill of the factorisation of Y.
+    values
+        (u, p, c) → real parts of the elements of Y in the plan's order, then their imaginary parts.
+    currents
+        (x, u, p, c) → real parts of i by bus, then imaginary parts.
+    given
+        Numbers of the inputs that Y depends on.
+    written_out
+        Makes the same model without such equations.
+    """
+
+    plan: Plan
+    values: Function
+    currents: Function
+    given: tuple[int, ...]
+    written_out: Callable[[], Model]
 
 
 @dataclass(frozen=True)
@@ -38,6 +69,9 @@ class Model:
         are linear in x but for what ``implicit`` leaves out).
     implicit
         (x, u, p, c) → the part of ẋ that an implicit step solves for; None for all of ẋ.
+    nodal
+        Equations of a large network, which a kernel solves as data. Their voltages are a fifth argument of
+        ``derivatives`` and ``outputs_function`` then.
     """
 
     name: str
@@ -54,6 +88,12 @@ class Model:
     requirement_texts: tuple[str, ...]
     integrator: Integrator = "runge_kutta"
     implicit: Function | None = None
+    nodal: NodalEquations | None = None
+
+    @property
+    def written_out(self) -> Model:
+        """The same model as functions of (x, u, p, c) alone, whose network is solved operation by operation."""
+        return self if self.nodal is None else self.nodal.written_out()
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -70,6 +110,8 @@ class Model:
         """Exact (A, B, C, D) of the continuous model as a function of (x, u, p, c)."""
         import casadi as ca  # noqa: PLC0415 - of the extra `build`
 
+        if self.nodal is not None:
+            return self.written_out.jacobians()
         x, u, p, c = (ca.SX.sym(s, n) for s, n in zip("xupc", self._sizes, strict=True))
         f = self.derivatives(x, u, p, c)
         y = self.outputs_function(x, u, p, c)

@@ -3,13 +3,14 @@
 A quantity is declared where it is used, and the equations read like the block diagram.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
 import casadi as ca
 
 from fmus.toolchain.model import Integrator, Model
+from fmus.toolchain.nodes import Complex, Nodes
 from fmus.toolchain.variables import (
     UNITS,
     CalculatedParameter,
@@ -49,6 +50,7 @@ class ModelBuilder:
         self._requirements: list[tuple[ca.SX, str]] = []
         self._opened: list[ca.SX] = []
         self._algebraic: list[tuple[ca.SX, ca.SX]] = []
+        self._nodes: Nodes | None = None
         self.internal_step = self.parameter(
             "internal_step",
             internal_step,
@@ -256,6 +258,22 @@ class ModelBuilder:
             raise ValueError(f"model {self.name}: signal {symbol.name()!r} depends directly on itself")
         self._algebraic.append((symbol, value))
 
+    def nodes(
+        self,
+        elements: Mapping[tuple[int, int], Complex],
+        currents: Sequence[Complex],
+        written_out: Callable[[], Model],
+    ) -> list[tuple[ca.SX, ca.SX]]:
+        """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v.
+
+        Parameters
+        ----------
+        elements, currents, written_out
+            As `Nodes`.
+        """
+        self._nodes = Nodes(elements, currents, written_out)
+        return self._nodes.voltages
+
     def require(self, positive: Scalar, rule: str) -> None:
         """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
         self._requirements.append((ca.SX(positive), rule))
@@ -283,6 +301,8 @@ class ModelBuilder:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
         if integrator == "sdirk" and any(isinstance(v, State) and v.stepwise for v, _ in kinds[State]):
             raise ValueError(f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta")
+        if integrator == "sdirk" and self._nodes is not None:
+            raise ValueError(f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta")
 
         def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
             stacked = _stack([values[variable.name] for variable, _ in entries])
@@ -294,6 +314,10 @@ class ModelBuilder:
         x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
         r_value = _stack([value for value, _ in self._requirements])
         arguments = [x, u, p, c]
+        nodal = None
+        if self._nodes is not None:
+            nodal = self._nodes.equations(x, u, p, c)
+            arguments.append(self._nodes.symbol)
         implicit = None
         if self._implicit:
             rates = collect(kinds[State], self._derivatives | self._implicit)
@@ -313,6 +337,7 @@ class ModelBuilder:
             requirement_texts=tuple(text for _, text in self._requirements),
             integrator=integrator,
             implicit=implicit,
+            nodal=nodal,
         )
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:

@@ -41,7 +41,7 @@ class NativeFmu:
     cache_prefix = "native_"
 
     def __init__(self, model: Model, version: FmiVersion = "2.0", *, sources: bool = False) -> None:
-        self.model, self._version = model, version
+        self.model, self._version = (model := model.written_out), version
         self._source_file = f"{model.name}.c" if sources else ""
         self._code = native_source(model, version)
         self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None

@@ -7,6 +7,7 @@ results to rounding.
 import casadi as ca
 
 from fmus.toolchain.elimination import plan_elimination
+from fmus.toolchain.elimination_plan import Plan
 from fmus.toolchain.kernel import kernel_functions, scalar_function
 from fmus.toolchain.model import Model
 
@@ -88,6 +89,63 @@ def _finish(z, x):
             return index + 1
     outputs(z)
     return 0
+"""
+
+_NODAL = """
+
+
+_nodal_factors = {}
+
+
+def _factorise_nodes(u, p, c):
+    values = nodal_values_code(u, p, c)[0]
+    count, buses = len(MCOL), len(PERM)
+    lu, inverse = [0j] * len(COL), [0j] * buses
+    for i in range(buses):
+        row = dict.fromkeys(COL[ROW[i]:ROW[i + 1]], 0j)
+        for q in range(MROW[i], MROW[i + 1]):
+            row[MCOL[q]] = complex(values[q], values[count + q])
+        for q in range(ROW[i], DIAG[i]):
+            k = COL[q]
+            factor = row[k] * inverse[k]
+            row[k] = factor
+            for r in range(DIAG[k] + 1, ROW[k + 1]):
+                row[COL[r]] -= factor * lu[r]
+        for q in range(ROW[i], ROW[i + 1]):
+            lu[q] = row[COL[q]]
+        inverse[i] = 1 / row[i] if row[i] else complex(nan, nan)
+    return lu, inverse
+
+
+def _voltages(x, u, p, c):
+    key = (*p, *c, *(u[k] for k in GIVEN))
+    if key not in _nodal_factors:
+        _nodal_factors.clear()
+        _nodal_factors[key] = _factorise_nodes(u, p, c)
+    lu, inverse = _nodal_factors[key]
+    currents = nodal_currents_code(x, u, p, c)[0]
+    buses = len(PERM)
+    s, v = [0j] * buses, [0.0] * (2 * buses)
+    for i in range(buses):
+        known = complex(currents[PERM[i]], currents[buses + PERM[i]])
+        for q in range(ROW[i], DIAG[i]):
+            known -= lu[q] * s[COL[q]]
+        s[i] = known
+    for i in range(buses - 1, -1, -1):
+        known = s[i]
+        for q in range(DIAG[i] + 1, ROW[i + 1]):
+            known -= lu[q] * s[COL[q]]
+        s[i] = known * inverse[i]
+        v[PERM[i]], v[buses + PERM[i]] = s[i].real, s[i].imag
+    return v
+
+
+def outputs_code(x, u, p, c):
+    return outputs_at_code(x, u, p, c, _voltages(x, u, p, c))
+
+
+def derivatives_code(x, u, p, c):
+    return derivatives_at_code(x, u, p, c, _voltages(x, u, p, c))
 """
 
 _RUNGE_KUTTA = """
@@ -224,15 +282,19 @@ def python_source(model: Model) -> str:
     functions, advance = kernel_functions(model), _RUNGE_KUTTA
     tables = f"STEPWISE = {[index for index, state in enumerate(model.states) if state.stepwise]}\n\n"
     if model.integrator == "sdirk":
-        e = plan_elimination(model)
-        functions["iteration"] = e.values
+        elimination = plan_elimination(model)
+        functions["iteration"] = elimination.values
         advance = _SDIRK
-        tables = (
-            f"PERM = {e.order}\nROW = {e.row}\nCOL = {e.column}\nDIAG = {e.diagonal}\n"
-            f"MROW = {e.matrix_row}\nMCOL = {e.matrix_column}\n\n"
-        )
+        tables = _tables(elimination.plan)
+    if model.nodal is not None:
+        tables += _tables(model.nodal.plan) + f"GIVEN = {list(model.nodal.given)}\n\n"
     bodies = [_python_function(f"{name}_code", function) for name, function in functions.items()]
-    return header + tables + "\n\n".join(bodies) + _PYTHON_FUNCTIONS + advance
+    nodal = _NODAL if model.nodal is not None else ""
+    return header + tables + "\n\n".join(bodies) + nodal + _PYTHON_FUNCTIONS + advance
+
+
+def _tables(plan: Plan) -> str:
+    return "".join(f"{name} = {values}\n" for name, values in plan.tables().items()) + "\n"
 
 
 def _python_function(name: str, function: ca.Function) -> str:

@@ -1,0 +1,159 @@
+"""A network that is solved as data, by a planned factorisation, beside the same network in code."""
+
+import ctypes
+import math
+
+import numpy as np
+import pytest
+
+from fmus.grid import phasor_grid
+from fmus.grid.network import Line, Load, Network, Port, Zip
+from fmus.toolchain.compiler import compile_library, host_platform
+from fmus.toolchain.dependencies import structure
+from fmus.toolchain.elimination_plan import plan_pattern
+from fmus.toolchain.kernel import c_source
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.native_fmu import NativeFmu
+from fmus.toolchain.python_kernel import python_source
+
+BUSES = 12
+
+
+def meshed() -> Network:
+    """A ring with a chord and a phase shifter, a load that follows a law of its own, static generation, and a fault."""
+    names = [f"b{k}" for k in range(BUSES)]
+    lines = [
+        Line(f"l{k}", names[k], names[(k + 1) % BUSES], X=0.1 + 0.01 * k, R=0.01, B=0.02, tap=1.0 + 0.01 * (k % 3),
+             shift=0.1 * (k == 4))
+        for k in range(BUSES)
+    ]  # fmt: skip
+    lines.append(Line("chord", "b1", "b8", X=0.3, R=0.02))
+    loads = (
+        Load("d1", "b3", 50.0, 20.0),
+        Load("d2", "b6", 40.0, 10.0, active=Zip(i=0.5, p=0.5)),
+        Load("d3", "b9", -30.0, 5.0, active=Zip(p=1.0), k_pf=1.5),
+    )
+    ports = (Port("g1", "b0"), Port("g2", "b5"), Port("g3", "b10"))
+    return Network("meshed", tuple(names), tuple(lines), loads, ports, stray_B=0.001, faults=("b7",), phasors=True)
+
+
+@pytest.fixture(scope="module")
+def models():
+    """The same network, solved by code and from data."""
+    return {how: phasor_grid._phasor_grid(meshed(), how) for how in ("code", "data")}
+
+
+@pytest.fixture(scope="module")
+def kernels(models):
+    libraries = {}
+    for how, model in models.items():
+        library = ctypes.CDLL(str(compile_library(c_source(model), host_platform())))
+        library.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
+        libraries[how] = library
+    scope = {}
+    exec(python_source(models["data"]), scope)
+    return libraries | {"python": type("Kernel", (), {k: staticmethod(v) for k, v in scope.items() if callable(v)})}
+
+
+def started(model, kernel):
+    z = (ctypes.c_double * len(model.value_references))()
+    for variable in (*model.parameters, *model.inputs):
+        z[model.value_references[variable.name]] = variable.start
+    for k, name in enumerate(("g1", "g2", "g3")):
+        for variable, value in (("e_re", 1.0), ("e_im", 0.1 * k), ("y_re", 0.1), ("y_im", -3.0 - k)):
+            z[model.value_references[f"{name}.{variable}"]] = value
+    kernel.initialise(z)
+    return z
+
+
+@pytest.mark.parametrize("how", ["data", "python"])
+def test_data_and_code_have_one_solution(models, kernels, how):
+    """At the start, after steps, with another admittance, an open line, a fault, and back at the start."""
+    at = models["code"].value_references
+    assert at == models["data"].value_references
+
+    def course(kernel):
+        z, seen = started(models["code"], kernel), []
+        for changes in ({}, {"g2.y_im": -9.0}, {"chord.connected": 0.0}, {"b7.fault.on": 1.0}):
+            for name, value in changes.items():
+                z[at[name]] = value
+            assert kernel.advance(z, 2e-3, 3, None) == 0
+            kernel.derivatives(z)
+            seen.append(list(z))
+        z = started(models["code"], kernel)
+        kernel.outputs(z)
+        return np.array([*seen, list(z)])
+
+    by_code, other = course(kernels["code"]), course(kernels[how])
+    assert np.isfinite(by_code).all()
+    moved = np.abs(np.diff(by_code[:, at["b8.v_re"]]))
+    assert (moved > 1e-4).all()  # each change reaches the voltages
+    assert np.abs(by_code - other).max() <= 1e-11 * np.abs(by_code).max()
+    assert not np.array_equal(by_code, other)  # really another way of solving
+
+
+def test_the_factors_of_one_instance_do_not_serve_another(models, kernels):
+    """Two instances with different admittances share the kernel's factors; each gets its own answer, in turns."""
+    kernel, at = kernels["data"], models["data"].value_references
+
+    def voltage(z):
+        kernel.outputs(z)
+        return z[at["b3.v_re"]], z[at["b3.v_im"]]
+
+    first, second = started(models["data"], kernel), started(models["data"], kernel)
+    second[at["g1.y_im"]] = -0.5
+    alone = voltage(first), voltage(second)
+    assert alone[0] != alone[1]
+    assert [voltage(z) for z in (first, second, first, second)] == [*alone, *alone]
+
+
+def test_large_networks_are_data_and_small_ones_code(monkeypatch):
+    network = meshed()
+    assert phasor_grid.phasor_grid(network).nodal is None
+    monkeypatch.setattr(phasor_grid, "WRITTEN_OUT", BUSES - 1)
+    model = phasor_grid.phasor_grid(network)
+    assert model.nodal is not None
+    assert {u.known for u in structure(model).outputs} == {None}  # any output may depend on anything
+    assert NativeFmu(model).model.nodal is None  # with exact derivatives, in code
+    assert np.shape(model.jacobians().size_out(0)) == (2,)
+
+
+def test_a_matrix_that_is_singular_gives_no_finite_voltage(models, kernels):
+    """An emf behind an infinite admittance: the slave then names what is not finite."""
+    for how in ("data", "python"):
+        z = started(models["data"], kernels[how])
+        z[models["data"].value_references["g1.y_re"]] = math.inf
+        kernels[how].outputs(z)
+        assert not math.isfinite(z[models["data"].value_references["b0.v_re"]])
+
+
+def test_the_plan_holds_the_matrix_and_its_fill():
+    """An arrow: eliminated from its tip it fills, from its shaft it does not."""
+    n = 30
+    rows, columns = [*range(n), *[0] * (n - 1), *range(1, n)], [*range(n), *range(1, n), *[0] * (n - 1)]
+    plan = plan_pattern(n, rows, columns)
+    assert sorted(plan.entries) == sorted(zip(rows, columns, strict=True))
+    assert len(plan.column) == len(rows)
+    assert plan.order.index(0) >= n - 2
+    assert [plan.column[k] for k in plan.diagonal] == list(range(n))
+
+
+def test_an_implicit_integrator_has_no_nodal_equations():
+    m = ModelBuilder("network", "A network")
+    x = m.state("x", 0.0, "1", "State")
+    m.derivative(x, -x)
+    m.nodes({(0, 0): (1.0, 0.0)}, [(1.0, 0.0)], m.build)
+    with pytest.raises(ValueError, match="the implicit integrator solves no nodal equations; take runge_kutta"):
+        m.build(integrator="sdirk")
+
+
+def test_a_change_that_is_undone_gives_the_first_answer_again(models, kernels):
+    """A line that is opened and closed, to the last bit."""
+    kernel, at = kernels["data"], models["data"].value_references
+    z = started(models["data"], kernel)
+    seen = []
+    for closed in (1.0, 0.0, 1.0):
+        z[at["chord.connected"]] = closed
+        kernel.outputs(z)
+        seen.append(z[at["b8.v_im"]])
+    assert seen[0] == seen[2] != seen[1]
