@@ -27,6 +27,11 @@ class Line:
     X_C: float = 0.0
 
     @property
+    def is_equivalent(self) -> bool:
+        """Whether it stands for a part of a network that was reduced, and is no line itself: R or X is negative."""
+        return self.R < 0 or self.X < 0
+
+    @property
     def has_ratio(self) -> bool:
         """Whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0

@@ -122,8 +122,9 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
         )  # fmt: skip
 
     start, end = buses[line.from_bus], buses[line.to_bus]
-    X = parameter("X", line.X, "pu", "Reactance", SMALLEST_REACTANCE, 100)
-    R = parameter("R", line.R, "pu", "Resistance", 0, None)
+    least, most = (-100, -SMALLEST_REACTANCE) if line.X < 0 else (SMALLEST_REACTANCE, 100)
+    X = parameter("X", line.X, "pu", "Reactance", least, most)
+    R = parameter("R", line.R, "pu", "Resistance", *((None, 0) if line.R < 0 else (0, None)))
     connected = m.switch(line.variable("connected"), True, f"Line {line.name} is closed at both ends", tunable=True)
     ratio, turns = None, ca.SX(1)
     if line.has_ratio:

@@ -13,6 +13,11 @@ OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
 voltage."""
 
+_ONLY_PHASORS = (
+    "; the current of such an equivalent of a reduced network would grow in an EMT network, and the model phasor_grid "
+    "takes it as an admittance"
+)
+
 
 @dataclass(frozen=True)
 class Network:
@@ -29,13 +34,15 @@ class Network:
     transformers
         Those with three windings; others are lines with a ratio.
     phasors
-        Whether it is for a model without transients, where a bus needs neither a load nor capacitance.
+        Whether it is for a model without transients, where a bus needs neither a load nor capacitance, and a line may
+        have a negative resistance or reactance, as equivalents of reduced networks have them.
 
     Raises
     ------
     ValueError
-        Naming every element that refers to an unknown bus, has no reactance or repeats a name,
-        and, unless it is for phasors, every bus that has neither a resistive load nor capacitance.
+        Naming every element that refers to an unknown bus, has no reactance or repeats a name, and, unless it is for
+        phasors, every line with a negative resistance or reactance, and every bus that has neither a resistive load nor
+        capacitance.
     """
 
     name: str
@@ -135,27 +142,39 @@ class Network:
             f"the name {name!r} is used twice" for name in sorted(n for n, k in Counter(names).items() if k > 1)
         )
 
-    def _bad_elements(self) -> Iterable[str]:
+    def _bad_lines(self) -> Iterable[str]:
         for line in self.lines:
             ends = f"between buses {line.from_bus!r} and {line.to_bus!r}"
             if line.from_bus == line.to_bus:
                 yield f"line {line.name!r} begins and ends at bus {line.from_bus!r}"
-            if not line.X >= SMALLEST_REACTANCE:
-                yield (
-                    f"line {line.name!r} has the reactance {line.X:g} pu {ends}; it must be at least "
-                    f"{SMALLEST_REACTANCE:g}: give a series capacitor as X_C of the line in series with it, merge the "
-                    "star point of a transformer equivalent, and merge buses that nothing separates"
-                )
+            if not (abs(line.X) if self.phasors else line.X) >= SMALLEST_REACTANCE:
+                yield f"line {line.name!r} has the reactance {line.X:g} pu {ends}; {self._reactance_rule(line)}"
             if not 0 <= line.X_C < max(line.X, SMALLEST_REACTANCE):
                 yield (
                     f"line {line.name!r} has the series capacitor X_C = {line.X_C:g} pu and the reactance X = "
                     f"{line.X:g} pu {ends}; X_C must not be negative, and be less than X"
                 )
-            for quantity, value in (("resistance", line.R), ("charging", line.B)):
+            for quantity, value, why in (
+                ("resistance", 0.0 if self.phasors and line.R < 0 else line.R, _ONLY_PHASORS),
+                ("charging", line.B, ""),
+            ):
                 if not value >= 0:
-                    yield f"line {line.name!r} has the {quantity} {value:g} pu {ends}; it must not be negative"
+                    yield f"line {line.name!r} has the {quantity} {value:g} pu {ends}; it must not be negative{why}"
             if not line.tap > 0:
                 yield f"line {line.name!r} has the ratio {line.tap:g} {ends}; it must exceed 0, and is 1 without one"
+
+    def _reactance_rule(self, line: Line) -> str:
+        """What a reactance must be, and what to do."""
+        if self.phasors:
+            return f"its size must be at least {SMALLEST_REACTANCE:g}: merge buses that nothing separates"
+        return (
+            f"it must be at least {SMALLEST_REACTANCE:g}: give a series capacitor as X_C of the line in series with "
+            "it, merge the star point of a transformer equivalent, and merge buses that nothing separates"
+            f"{_ONLY_PHASORS if line.X < 0 else ''}"
+        )
+
+    def _bad_elements(self) -> Iterable[str]:
+        yield from self._bad_lines()
         for x in self.transformers:
             values = ", ".join(f"{value:g}" for value in x.X)
             if not x.is_passive or not min(abs(value) for value in x.X) >= SMALLEST_REACTANCE:

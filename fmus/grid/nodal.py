@@ -5,9 +5,12 @@ data, by the kernel of the model.
 from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 
+import casadi as ca
+
 from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.nodes import LARGEST_REST
 
 Admittances = dict[str, dict[str, Phasor]]
 """Rows and columns by bus; the pattern is symmetric."""
@@ -28,12 +31,34 @@ def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None
     Y[row][column] = Y[row].get(column, ZERO) + value
 
 
-def solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
+def solve(Y: Admittances, currents: dict[str, Phasor], *, checked: bool = False) -> dict[str, Phasor]:
     """Voltages of all buses.
 
     The bus with the fewest neighbours is eliminated first. There is no pivoting: a passive network needs none, unless
     a bus has no admittance at all, and then its voltage is not finite.
+
+    Parameters
+    ----------
+    Y, currents
+        The equations.
+    checked
+        Whether no voltage is finite where the solution leaves more than `LARGEST_REST` over: for networks that are not
+        passive, in which an element that is divided by may vanish.
     """
+    voltages = _solve(Y, currents)
+    if not checked:
+        return voltages
+    worst = ca.SX(0)
+    for bus, row in Y.items():
+        terms = [y * voltages[other] for other, y in row.items()]
+        rest = sum(terms, -currents[bus])
+        size = sum((abs(t.re) + abs(t.im) for t in terms), abs(currents[bus].re) + abs(currents[bus].im))
+        worst = ca.fmax(worst, abs(rest.re) + abs(rest.im) - LARGEST_REST * size)
+    holds = worst <= 0
+    return {bus: Phasor(v.re / holds, v.im / holds) for bus, v in voltages.items()}
+
+
+def _solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
     rows = {bus: dict(entries) for bus, entries in Y.items()}
     right, place, order = dict(currents), {bus: k for k, bus in enumerate(Y)}, list[str]()
     queue = [(len(row), place[bus], bus) for bus, row in rows.items()]

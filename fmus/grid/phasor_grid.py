@@ -105,7 +105,7 @@ def _settle(
     currents = {name: bus.injected for name, bus in buses.items()}
     voltages: dict[str, Phasor] = {}
     if solution == "code":
-        voltages = solve(Y, currents)
+        voltages = solve(Y, currents, checked=any(line.is_equivalent for line in network.lines))
     elif solution == "data":
         voltages = solved_as_data(m, Y, currents, partial(_phasor_grid, network, "code"))
     for name, bus in buses.items():

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.toolchain.elimination_plan import Plan, plan_pattern
+from fmus.toolchain.elimination_plan import plan_pattern
 from fmus.toolchain.model import Model
+from fmus.toolchain.plan import Plan
 
 
 @dataclass(frozen=True)

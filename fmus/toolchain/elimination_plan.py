@@ -1,53 +1,12 @@
 """Sparse elimination planned ahead: order and fill of an LU factorisation whose pattern never changes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-
-@dataclass(frozen=True)
-class Plan:
-    """Pattern of a square matrix and of its factors, rows in order of elimination.
-
-    Attributes
-    ----------
-    order
-        ``order[i]`` is the unknown that is eliminated at position i.
-    row, column, diagonal
-        Factors, compressed by rows: columns ascending, ``diagonal`` the position of each pivot.
-    matrix_row, matrix_column
-        The matrix itself, in the same order.
-    """
-
-    order: list[int]
-    row: list[int]
-    column: list[int]
-    diagonal: list[int]
-    matrix_row: list[int]
-    matrix_column: list[int]
-
-    @property
-    def entries(self) -> list[tuple[int, int]]:
-        """Row and column of each element of the matrix, as they were before the order of elimination."""
-        return [
-            (self.order[i], self.order[j])
-            for i in range(len(self.order))
-            for j in self.matrix_column[self.matrix_row[i] : self.matrix_row[i + 1]]
-        ]
-
-    def tables(self) -> dict[str, list[int]]:
-        """The lists by the names that they have in a kernel."""
-        return {
-            "PERM": self.order,
-            "ROW": self.row,
-            "COL": self.column,
-            "DIAG": self.diagonal,
-            "MROW": self.matrix_row,
-            "MCOL": self.matrix_column,
-        }
+from fmus.toolchain.plan import Plan
 
 
 def plan_pattern(n: int, rows: Sequence[int], columns: Sequence[int]) -> Plan:

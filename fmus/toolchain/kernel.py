@@ -22,6 +22,7 @@ import casadi as ca
 from fmus.toolchain.elimination import plan_elimination
 from fmus.toolchain.long_functions import LONGEST, LONGEST_OF_DATA, cut
 from fmus.toolchain.model import Model
+from fmus.toolchain.nodes import LARGEST_REST
 
 _C = Path(__file__).with_name("c")
 
@@ -57,7 +58,9 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
         plan = model.nodal.plan
         sizes |= {"NM": len(plan.matrix_column), "NLU": len(plan.column), "NB": len(plan.order)}
         sizes["NG"] = len(model.nodal.given)
-        tables += "\n" + _tables(plan.tables() | {"GIVEN": list(model.nodal.given) or [-1]})
+        tables += f"\n#define LARGEST_REST {LARGEST_REST!r}\n" + _tables(
+            plan.tables() | {"GIVEN": list(model.nodal.given) or [-1]}
+        )
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     if further:
         sizes["NWD"] = max(f.sz_w() for f in further.values())

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+from fmus.toolchain.plan import Plan
 from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
-
-if TYPE_CHECKING:
-    from fmus.toolchain.elimination_plan import Plan
 
 Integrator = Literal["runge_kutta", "sdirk"]
 

@@ -12,6 +12,9 @@ from fmus.toolchain.model import Model, NodalEquations
 Complex = tuple[ca.SX | float, ca.SX | float]
 """Real and imaginary part."""
 
+LARGEST_REST = 1e-6
+"""Part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite."""
+
 
 @dataclass(frozen=True)
 class Nodes:

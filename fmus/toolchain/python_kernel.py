@@ -7,9 +7,10 @@ results to rounding.
 import casadi as ca
 
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.elimination_plan import Plan
 from fmus.toolchain.kernel import kernel_functions, scalar_function
 from fmus.toolchain.model import Model
+from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.plan import Plan
 
 _PYTHON_HEADER = '''"""Pure-Python kernel of {name}: the fallback where no compiled kernel fits the platform."""
 
@@ -114,20 +115,19 @@ def _factorise_nodes(u, p, c):
         for q in range(ROW[i], ROW[i + 1]):
             lu[q] = row[COL[q]]
         inverse[i] = 1 / row[i] if row[i] else complex(nan, nan)
+    s = _through_factors([1.0] * buses + [0.0] * buses, lu, inverse)
+    for i in range(buses):
+        terms = [complex(values[q], values[count + q]) * s[MCOL[q]] for q in range(MROW[i], MROW[i + 1])]
+        if abs(sum(terms, -1)) > LARGEST_REST * sum(map(abs, terms), 1.0):
+            inverse = [complex(nan, nan)] * buses
     return lu, inverse
 
 
-def _voltages(x, u, p, c):
-    key = (*p, *c, *(u[k] for k in GIVEN))
-    if key not in _nodal_factors:
-        _nodal_factors.clear()
-        _nodal_factors[key] = _factorise_nodes(u, p, c)
-    lu, inverse = _nodal_factors[key]
-    currents = nodal_currents_code(x, u, p, c)[0]
+def _through_factors(b, lu, inverse):
     buses = len(PERM)
-    s, v = [0j] * buses, [0.0] * (2 * buses)
+    s = [0j] * buses
     for i in range(buses):
-        known = complex(currents[PERM[i]], currents[buses + PERM[i]])
+        known = complex(b[PERM[i]], b[buses + PERM[i]])
         for q in range(ROW[i], DIAG[i]):
             known -= lu[q] * s[COL[q]]
         s[i] = known
@@ -136,7 +136,17 @@ def _voltages(x, u, p, c):
         for q in range(DIAG[i] + 1, ROW[i + 1]):
             known -= lu[q] * s[COL[q]]
         s[i] = known * inverse[i]
-        v[PERM[i]], v[buses + PERM[i]] = s[i].real, s[i].imag
+    return s
+
+
+def _voltages(x, u, p, c):
+    key = (*p, *c, *(u[k] for k in GIVEN))
+    if key not in _nodal_factors:
+        _nodal_factors.clear()
+        _nodal_factors[key] = _factorise_nodes(u, p, c)
+    s, v = _through_factors(nodal_currents_code(x, u, p, c)[0], *_nodal_factors[key]), [0.0] * (2 * len(PERM))
+    for i, value in enumerate(s):
+        v[PERM[i]], v[len(PERM) + PERM[i]] = value.real, value.imag
     return v
 
 
@@ -287,7 +297,7 @@ def python_source(model: Model) -> str:
         advance = _SDIRK
         tables = _tables(elimination.plan)
     if model.nodal is not None:
-        tables += _tables(model.nodal.plan) + f"GIVEN = {list(model.nodal.given)}\n\n"
+        tables += _tables(model.nodal.plan) + f"GIVEN = {list(model.nodal.given)}\nLARGEST_REST = {LARGEST_REST}\n\n"
     bodies = [_python_function(f"{name}_code", function) for name, function in functions.items()]
     nodal = _NODAL if model.nodal is not None else ""
     return header + tables + "\n\n".join(bodies) + nodal + _PYTHON_FUNCTIONS + advance

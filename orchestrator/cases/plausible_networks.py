@@ -5,11 +5,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
-from fmus.grid.network import Line, ThreeWinding
+from fmus.grid.network import Line, Network, ThreeWinding
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
 from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
 from orchestrator.coupling.system import ComponentPlan
+
+_SHOWN = 3
+"""Equivalents that are named."""
 
 
 def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
@@ -17,6 +20,7 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
     grid = draft.system.components.get(draft.grid or "")
     if grid is None or draft.network is None or draft.grid is None:
         return
+    yield from _equivalents(draft, draft.grid, draft.network)
     for line in draft.network.lines:
         yield from _line(draft, draft.grid, grid, line)
     for transformer in draft.network.transformers:
@@ -25,13 +29,27 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
         yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
 
 
+def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualValue]:
+    """Name the branches of a network of phasors that only a reduction can have made."""
+    for quantity, what in (("R", "resistance"), ("X", "reactance")):
+        found = [line for line in network.lines if getattr(line, quantity) < 0]
+        if found:
+            shown = ", ".join(f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found[:_SHOWN])
+            more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+            text = (
+                f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}{more}; as equivalents "
+                "of a reduced network they are taken as admittances, which hold at rated frequency alone"
+            )
+            yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.place("network"), text)
+
+
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:
     """Reactance, charging, ratio, shift, R/X and X_C/X."""
     variables = {q: line.variable(q) for q in ("X", "R", "B", "tap", "shift", "X_C")}
     found = {q: value_of(grid, variable) for q, variable in variables.items()}
     place = {q: _place(draft, "lines", line.name, q, variable) for q, variable in variables.items()}
     for quantity, usual in {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}.items():
-        if (value := found[quantity]) is not None:
+        if (value := found[quantity]) is not None and not (quantity == "X" and line.X < 0):
             yield from outside(draft, name, variables[quantity], value, usual, place[quantity])
     yield from _shift(name, variables["shift"], found["shift"], place["shift"])
     R, X, X_C = found["R"], found["X"], found["X_C"]
