@@ -50,12 +50,17 @@ def solve(Y: Admittances, currents: dict[str, Phasor], *, checked: bool = False)
         return voltages
     worst = ca.SX(0)
     for bus, row in Y.items():
-        terms = [y * voltages[other] for other, y in row.items()]
-        rest = sum(terms, -currents[bus])
-        size = sum((abs(t.re) + abs(t.im) for t in terms), abs(currents[bus].re) + abs(currents[bus].im))
-        worst = ca.fmax(worst, abs(rest.re) + abs(rest.im) - LARGEST_REST * size)
+        rest, size = -currents[bus], _size(currents[bus])
+        for other, y in row.items():
+            term = y * voltages[other]
+            rest, size = rest + term, size + _size(term)
+        worst = ca.fmax(worst, _size(rest) - LARGEST_REST * size)
     holds = worst <= 0
     return {bus: Phasor(v.re / holds, v.im / holds) for bus, v in voltages.items()}
+
+
+def _size(value: Phasor) -> ca.SX:
+    return ca.fabs(value.re) + ca.fabs(value.im)
 
 
 def _solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:
