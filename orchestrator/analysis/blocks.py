@@ -1,7 +1,7 @@
 """Linearised components of a running system, with what connects them."""
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,10 @@ from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.step_awareness import knows_step, other_step
 from orchestrator.coupling.system import Endpoint
 from orchestrator.errors import AnalysisError, InputError
+
+MANY_INPUTS = 1_000
+"""Of a component with so many inputs those that nothing moves are not perturbed: the devices' admittances, half of the
+inputs of a large phasor network."""
 
 
 class Blocks:
@@ -94,7 +98,7 @@ class Blocks:
         self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
         _check_driven(master, self._driven)
         self.period = steps_of_period(master, self.step_size, known)
-        self.components = {name: known.get(name) or self._linearize(master, name) for name in master.exchanges}
+        self.components = self._linearized(master, known)
         # External inputs follow the coupled outputs, as if a further component gave them.
         first_external = len(master.output_names)
         self.sources = {
@@ -116,20 +120,48 @@ class Blocks:
             self.window[name] = slice(first, first + len(exchange.outputs.names))
             first += len(exchange.outputs.names)
 
+    def _linearized(
+        self, master: Master, known: Mapping[str, ComponentLinearization]
+    ) -> dict[str, ComponentLinearization]:
+        """All components, those with most inputs last: by then it is known which of their inputs nothing moves."""
+        found: dict[str, ComponentLinearization] = {}
+        self._idle: dict[str, frozenset[str]] = {}
+        for name in sorted(master.exchanges, key=lambda name: _has_many_inputs(master, name)):
+            found[name] = known.get(name) or self._linearize_beside(master, name, found)
+        return {name: found[name] for name in master.exchanges}
+
+    def _linearize_beside(
+        self, master: Master, name: str, others: Mapping[str, ComponentLinearization]
+    ) -> ComponentLinearization:
+        """One component, without the inputs that nothing moves where others are as they are."""
+        self._idle[name] = _idle_inputs(master, name, others) if _has_many_inputs(master, name) else frozenset()
+        return self._linearize(master, name, self._idle[name])
+
+    def _anew(self, master: Master, names: Iterable[str]) -> dict[str, ComponentLinearization]:
+        """All components, some of them linearised again, and with them those whose idle inputs move now."""
+        found = dict(self.components)
+        for name in sorted(names, key=lambda name: _has_many_inputs(master, name)):
+            found[name] = self._linearize_beside(master, name, found)
+        for name, idle in list(self._idle.items()):
+            if idle and not idle <= _idle_inputs(master, name, found):
+                found[name] = self._linearize_beside(master, name, found)
+        return found
+
     def renew(self, master: Master, names: Iterable[str]) -> None:
         """Linearise some components again, whose parameters were changed."""
-        self.components.update({name: self._linearize(master, name) for name in names})
+        self.components = self._anew(master, names)
 
     def with_component(self, master: Master, name: str) -> "Blocks":
         """The same blocks, with one component linearised as it is now: beside a parameter that was changed."""
         other = copy.copy(self)
-        other.components = self.components | {name: self._linearize(master, name)}
+        other._idle = dict(self._idle)
+        other.components = other._anew(master, [name])
         return other
 
-    def _linearize(self, master: Master, name: str) -> ComponentLinearization:
+    def _linearize(self, master: Master, name: str, idle: Collection[str] = ()) -> ComponentLinearization:
         return linearize_within(
             master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
-            derivatives=self._derivatives, without_step=self._untold, directional=self._directional,
+            derivatives=self._derivatives, without_step=self._untold, directional=self._directional, idle=idle,
         )  # fmt: skip
 
     def check_made_for(self, schedule: Schedule | None) -> None:
@@ -213,6 +245,7 @@ def linearize_within(
     derivatives: bool = False,
     without_step: bool = False,
     directional: bool = False,
+    idle: Collection[str] = (),
 ) -> ComponentLinearization:
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
 
@@ -224,7 +257,7 @@ def linearize_within(
         Of the component.
     step_size
         Communication step to linearise over [s].
-    inputs, observed, derivatives
+    inputs, observed, derivatives, idle
         As `linearize_component`.
     without_step, directional
         As `Blocks`.
@@ -233,7 +266,24 @@ def linearize_within(
     with other_step(master, name, 0.0 if without_step else step_size):
         if directional:
             return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
-        return linearize_component(exchange, time, step_size, inputs, observed, derivatives=derivatives)
+        return linearize_component(exchange, time, step_size, inputs, observed, derivatives=derivatives, idle=idle)
+
+
+def _has_many_inputs(master: Master, name: str) -> bool:
+    return len(master.exchanges[name].inputs.names) >= MANY_INPUTS
+
+
+def _idle_inputs(master: Master, name: str, found: Mapping[str, ComponentLinearization]) -> frozenset[str]:
+    """Inputs of a component whose sources answer nothing at all, to the last bit."""
+    feeds = {str(c.target): c.source for c in master.system.connections}
+    still = {
+        f"{source}.{output}"
+        for source, c in found.items()
+        for output, C, D in zip(c.outputs, c.C, c.D, strict=True)
+        if not (C.any() or D.any())
+    }
+    inputs = master.exchanges[name].inputs.names
+    return frozenset(variable for variable in inputs if str(feeds.get(f"{name}.{variable}")) in still)
 
 
 def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:

@@ -3,7 +3,7 @@
 Where an FMU gives directional derivatives, these give the same model in an independent way.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -92,6 +92,7 @@ def linearize_component(
     observed: Sequence[str] = (),
     *,
     derivatives: bool = False,
+    idle: Collection[str] = (),
 ) -> ComponentLinearization:
     """Perturb one component around its present state, and restore that state.
 
@@ -109,6 +110,8 @@ def linearize_component(
         Tunable parameters or open inputs, and outputs, in addition to the connected ones.
     derivatives
         Also difference the FMU's own derivatives, if it declares them; it costs a third more.
+    idle
+        Connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
     """
     component = exchange.component
     StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
@@ -119,10 +122,18 @@ def linearize_component(
     n, p = len(names), len(exchange.outputs.names)
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
-    found = perturb(PerturbedStep(component, entries, exits, time, step_size), rates)
+    moved = [k for k, name in enumerate(entries) if name not in idle]
+    found = perturb(PerturbedStep(component, [entries[k] for k in moved], exits, time, step_size), rates)
+
+    def by_input(answers: Matrix) -> Matrix:
+        if len(moved) == len(entries):
+            return answers[:, n:]
+        whole = np.zeros((len(answers), len(entries)))
+        whole[:, moved] = answers[:, n:]
+        return whole
 
     def step_map(after: Matrix, outputs: Matrix) -> StepMap:
-        return StepMap(after[:, :n], after[:, n:], outputs[:p, :n], outputs[:p, n:])
+        return StepMap(after[:, :n], by_input(after), outputs[:p, :n], by_input(outputs[:p]))
 
     small, large = found.small, found.large
     one, other = step_map(small.after, small.outputs), step_map(large.after, large.outputs)
@@ -134,9 +145,9 @@ def linearize_component(
         *one,
         observed=tuple(observed),
         C_o=small.outputs[p:, :n],
-        D_o=small.outputs[p:, n:],
+        D_o=by_input(small.outputs[p:]),
         A_c=small.slopes[:, :n] if len(rates) == n and derivatives else None,
-        B_c=small.slopes[:, n:] if len(rates) == n and derivatives else None,
+        B_c=by_input(small.slopes) if len(rates) == n and derivatives else None,
         disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)),
         variants=(
             other,
