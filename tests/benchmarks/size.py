@@ -3,7 +3,8 @@
 pandapower's networks of 39 to 9241 buses with a machine and a converter at every bus with generators, as phasor models
 at 5 ms. A row for each: seconds of processor time of each part, peak memory, steps per second; then the exponents with
 which all that grows with the number of buses. Each network has a process of its own, with nothing kept from others.
-``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states.
+``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states. ``--count``
+counts the eigenvalues of the region by the turns of the determinant around it, in networks with a hub.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from orchestrator.cases.network_data import network_data
 from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowShunt, FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.coupling.master import Master
+from tests.benchmarks.region_count import count_within
 
 CASES = ("case39", "case118", "case300", "case1354pegase", "case2869pegase", "case9241pegase")
 
@@ -92,7 +94,7 @@ def _flow(data: Any, units: list[FlowUnit]) -> PowerFlow:
     return solve_power_flow(data.buses, lines, loads, units, data.slack, shunts)
 
 
-def measure(name: str, native: str, *, check: bool) -> dict[str, float]:
+def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, float]:
     """Figures of one network, in seconds of processor time, children's included, where nothing else is said."""
     row: dict[str, float] = {}
 
@@ -126,6 +128,9 @@ def measure(name: str, native: str, *, check: bool) -> dict[str, float]:
                 critical = find_critical_modes(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
             row["found"] = len(critical)
             row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            if count:
+                with timed("count"):
+                    row["counted"], row["points"] = count_within(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
             if check and len(model.names) <= WHOLE:
                 row |= _against_dense(eigenvalues(model), critical)
             begun = time.process_time()
@@ -154,9 +159,10 @@ def main() -> None:
     parser.add_argument("--one", action="store_true", help="measure one case in this process, and print JSON")
     parser.add_argument("--check", action="store_true", help="compare with the dense eigenvalues")
     parser.add_argument("--native", default="sg*,gfor*", help="patterns of components that are compiled without Python")
+    parser.add_argument("--count", action="store_true", help="count the critical modes by turns of the determinant")
     given = parser.parse_args()
     if given.one:
-        print(json.dumps(measure(given.cases[0], given.native, check=given.check)))
+        print(json.dumps(measure(given.cases[0], given.native, check=given.check, count=given.count)))
         return
     rows = {}
     for name in given.cases:
@@ -164,7 +170,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as cache:
             environment = os.environ | {"XDG_CACHE_HOME": cache, "OPENBLAS_NUM_THREADS": "1"}
             done = subprocess.run(
-                [*command, *(["--check"] if given.check else [])],
+                [*command, *(["--check"] if given.check else []), *(["--count"] if given.count else [])],
                 env=environment, stdout=subprocess.PIPE, text=True, check=False,
             )  # fmt: skip
         if done.returncode:
