@@ -5,9 +5,12 @@ followed around the region on its own, with as many points as it needs.
 """
 
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
 
 from orchestrator.analysis.hub_elimination import HubFactors, hub_equations
 from orchestrator.analysis.linear_model import LinearModel
@@ -18,7 +21,7 @@ STEP = 0.7
 
 
 def count_within(model: LinearModel, lowest_hz: float, highest_hz: float, damping: float) -> tuple[int, int]:
-    """Number of eigenvalues with damping ratios from −0.1 to a given one, and number of points that were factorised.
+    """Number of eigenvalues with damping ratios from −0.1 to a given one, and of points at which all was factorised.
 
     Parameters
     ----------
@@ -32,26 +35,26 @@ def count_within(model: LinearModel, lowest_hz: float, highest_hz: float, dampin
     hub = hub_equations(model.F, model.G, model.H, model.K)
     assert hub is not None
     assert model.step_size is not None
-    found: dict[complex, tuple[complex, complex]] = {}
+    P, at_rest = hub.quadrants[0], sp.diags_array((hub.rest < hub.states).astype(float))
 
-    def logarithms(point: complex) -> tuple[complex, complex]:
-        if point not in found:
-            factors = hub.at(np.exp(point * model.step_size))
-            if factors is None:
-                raise ArithmeticError(f"{point:.6g} rad/s is too close to an eigenvalue of a block")
-            found[point] = _of_blocks(factors), _of_rest(factors)
-        return found[point]
+    @cache
+    def of_blocks(point: complex) -> complex:
+        lu = spla.splu((P - np.exp(point * model.step_size) * at_rest).tocsc(), options={"Equil": False})
+        return Factors(lu, 0).log_determinant
+
+    @cache
+    def of_rest(point: complex) -> complex:
+        factors = hub.at(np.exp(point * model.step_size))
+        if factors is None:
+            raise ArithmeticError(f"{point:.6g} rad/s is too close to an eigenvalue of a block")
+        return _of_port(factors)
 
     line = list(_around(2 * np.pi * lowest_hz, 2 * np.pi * highest_hz, damping))
-    turns = [_turns(line, lambda point, part=part: logarithms(point)[part]) for part in (0, 1)]
-    return sum(turns), len(found)
+    turns = _turns(line, of_blocks) + _turns(line, of_rest)
+    return turns, of_rest.cache_info().currsize
 
 
-def _of_blocks(factors: HubFactors) -> complex:
-    return Factors(factors.blocks, 0).log_determinant
-
-
-def _of_rest(factors: HubFactors) -> complex:
+def _of_port(factors: HubFactors) -> complex:
     matrix, pivots = factors.port
     swaps = int((pivots != np.arange(len(pivots))).sum()) % 2
     return complex(np.log(np.diag(matrix).astype(complex)).sum() + 1j * np.pi * swaps)
