@@ -16,9 +16,10 @@ from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_bo
 from orchestrator.cases.case import Case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.errors import CosimError
 from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.failure import failure_kept
 from orchestrator.points.key import same_case
+from orchestrator.points.signals import signal_arrays, take_signals
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import modes_of, running
 from orchestrator.watch.watch import Watch
@@ -29,10 +30,6 @@ lists modes just outside."""
 
 CONVERTER = "converter"
 POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
-
-
-_SIGNAL = "signal "
-"""Beginning of the names of signals among a stored point's arrays."""
 
 
 @dataclass(frozen=True)
@@ -122,16 +119,13 @@ class PointResult:
         """Header and arrays for a `PointStore`."""
         header = {name: value for name, value in vars(self).items() if name not in ("modes", "times", "signals")}
         modes = self.modes.arrays() if self.modes is not None else {}
-        signals = {_SIGNAL + name: values for name, values in self.signals.items()}
-        return header | {"names": self.modes and self.modes.names}, {**modes, **signals, "times": self.times}
+        return header | {"names": self.modes and self.modes.names}, {**modes, **signal_arrays(self.times, self.signals)}
 
     @classmethod
     def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
         """The result that was stored in this form; None if the file has another form."""
         try:
-            names, times = header.pop("names"), arrays.pop("times")
-            recorded = [name for name in arrays if name.startswith(_SIGNAL)]
-            signals = {name.removeprefix(_SIGNAL): arrays.pop(name) for name in recorded}
+            names, (times, signals) = header.pop("names"), take_signals(arrays)
             modes = None if names is None else ModeSet(**arrays, names=tuple(names))
             header["warnings"] = tuple(header["warnings"])
             header["findings"]  # a stored point without findings was not watched, and is computed again
@@ -150,13 +144,8 @@ def compute_point(task: CertificatePointTask) -> PointResult:
     """
     case = same_case(task.case, task.fingerprint)
     result = PointResult(task.X_L, task.scenario)
-    try:
-        with alone():
-            _compute(case, task, result)
-    except CosimError as error:
-        result.failure = str(error)
-    except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
-        result.failure = f"{type(error).__name__}: {error}"
+    with failure_kept(result), alone():
+        _compute(case, task, result)
     return result
 
 

@@ -66,6 +66,7 @@ examples:
   gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
   gfor black-box two_area --scenario gfor --component gfor
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
+  gfor certify one.fmu two.fmu --code all        several converters under all codes, as one matrix
   gfor verify results/certify_vendor             whether a certificate still holds
   gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
   gfor export-dll gfor --dest dlls                its control as IEEE/CIGRE DLL for EMT programs

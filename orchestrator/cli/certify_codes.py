@@ -1,30 +1,25 @@
-"""``gfor certify --code``: the rows of one grid code, or of all, on a test bench."""
+"""``gfor certify --code``: the rows of one grid code on a test bench."""
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
+from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
-from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
-from orchestrator.certification.codes.declared import checked
-from orchestrator.certification.codes.frequency_domain import figures_of_stiffness, measure_stiffness, save_stiffness
 from orchestrator.certification.codes.record import figures_of, save_certificate
-from orchestrator.certification.details import Details, read_details
+from orchestrator.certification.devices import Device
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
-from orchestrator.cli.executors import choose_executor
-from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, said_stages
+from orchestrator.cli.certificate import certified
+from orchestrator.cli.certify_sensitivities import find_needs
+from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.report.tables import PlainTable
-from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
 
 NTS631, GB, ALL = "nts631", "gb", "all"
 
@@ -32,78 +27,53 @@ CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, GB, ALL)
 """What ``--code`` takes."""
 
 
-def run_code(options: argparse.Namespace, key: str) -> int:
+def codes_of(asked: str) -> tuple[str, ...]:
+    """The codes with a verdict that an option ``--code`` asks for."""
+    return (NTS631, *CODES, *BY_DECLARATION) if asked == ALL else (asked,)
+
+
+def run_code(options: argparse.Namespace, device: Device) -> int:
     """Run one code's rows, write the certificate and print it.
 
     Parameters
     ----------
     options
         Of the command.
-    key
-        Which code.
+    device
+        What is tested.
 
     Returns
     -------
     As `gfor certify`.
     """
-    if key == GB:
-        return _run_gb(options)
-    code = code_for(key, dict(options.declare))
-    request = _request(options)
-    details = read_details(options.details) if options.details else Details()
-    acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
-    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}_{key}", "--out")
+    check_code_options(options, [device])
+    folder = options.out or Path("results") / f"certify_{device.name}_{options.code}"
     console = make_console(stderr=options.json)
-    progress = Progressing(folder)
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, ["orchestrator.certification.codes.bench_point"])
-        found = progress.compute(
-            lambda report: certify_code(request, code, executor, folder, report=report), executor, console
-        )
-        if acceptance is not None:
-            acceptance.keep(folder)
-        elif not options.no_check:
-            with console.status("Acceptance tests of the FMU"):
-                acceptance = run_checks(request.fmu, request.binding, folder)
-        found.details, found.acceptance = details, acceptance
-        files = save_certificate(found, folder)
+    found, files = certified_code(options, device, options.code, folder, console)
+    if not options.json:
+        show_code(found, files, folder, console)
+    needs = find_needs(options, found, folder, console) if options.sensitivities else None
     if options.json:
-        print(json.dumps(figures_of(found), indent=1, ensure_ascii=False))
-    else:
-        console.print(_table(found), "")
-        colour = {FAILS: "red", INCOMPLETE: "yellow"}.get(found.verdict, "green")
-        console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)
-        for text in found.missing:
-            console.print(escape(f"Not tested: {text}"), soft_wrap=True, highlight=False)
-        console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+        beside = {"sensitivities": needs} if options.sensitivities else {}
+        print(json.dumps(figures_of(found) | beside, indent=1, ensure_ascii=False))
     return exit_code(found.verdict, refused=found.refused)
 
 
-def _run_gb(options: argparse.Namespace) -> int:
-    """Measure a converter in the frequency domain; there is no verdict, so that it neither passes nor fails."""
-    checked((), dict(options.declare), GB)
-    request = _request(options)
-    folder = made_folder(options.out or Path("results") / f"certify_{options.fmu.stem}_{GB}", "--out")
-    console = make_console(stderr=options.json)
-    with held(folder), said_stages() as report:
-        found = measure_stiffness(request, rated_frequency(request, 50.0), report)
-        files = save_stiffness(found, request.fmu.stem, folder)
-    figures = figures_of_stiffness(found, request.fmu.stem)
-    if options.json:
-        print(json.dumps(figures, indent=1, ensure_ascii=False))
-        return 0
-    for name, one in figures["least"].items():
-        console.print(escape(f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz"), highlight=False)
-    slow = figures["slow"]
-    console.print(
-        escape(f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"), highlight=False
-    )
-    console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
-    console.print(escape(f"Files in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
-    return 0
+def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
+    """Refuse what only the norm's damping test has.
 
+    Parameters
+    ----------
+    options
+        Of the command.
+    devices
+        With the values that they are given.
 
-def _request(options: argparse.Namespace) -> CertificationRequest:
+    Raises
+    ------
+    InputError
+        With the first such option.
+    """
     asked = {"--pod": options.pod, "--black-box": options.black_box, "--pdf": options.pdf,
              "--reactances": options.reactances != REACTANCES}  # fmt: skip
     if other := [name for name, value in asked.items() if value]:
@@ -111,11 +81,58 @@ def _request(options: argparse.Namespace) -> CertificationRequest:
             f"{', '.join(other)}: only --code {NTS631} has it; the other codes need no modes: leave it out, "
             "and set a damping controller by --set"
         )
-    if study := [name for name, _ in options.set if name.split(".")[0] in STUDY]:
+    if study := [name for device in devices for name in device.values if name.split(".")[0] in STUDY]:
         raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
-    request = CertificationRequest(as_device(options.fmu, options.binding), options.binding, dict(options.set))
+
+
+def certified_code(
+    options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
+) -> tuple[CodeCertificate, list[Path]]:
+    """The certificate, and its files.
+
+    Parameters
+    ----------
+    options
+        Of the command.
+    device
+        What is tested.
+    key
+        Which code.
+    folder
+        For the results.
+    console
+        Shows the progress.
+    """
+    code = code_for(key, dict(options.declare))
+    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
     request.check()
-    return request
+    return certified(
+        options, request, folder, "orchestrator.certification.codes.bench_point",
+        lambda executor, report: certify_code(request, code, executor, folder, report=report), save_certificate,
+        console,
+    )  # fmt: skip
+
+
+def show_code(found: CodeCertificate, files: Sequence[Path], folder: Path, console: Console) -> None:
+    """Print a certificate.
+
+    Parameters
+    ----------
+    found
+        The certificate.
+    files
+        That were written.
+    folder
+        That holds them.
+    console
+        Where to.
+    """
+    console.print(_table(found), "")
+    colour = {FAILS: "red", INCOMPLETE: "yellow"}.get(found.verdict, "green")
+    console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)
+    for text in found.missing:
+        console.print(escape(f"Not tested: {text}"), soft_wrap=True, highlight=False)
+    console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
 
 
 def _table(found: CodeCertificate) -> PlainTable:

@@ -1,13 +1,13 @@
 """Which parameters of a running system a mode can be differentiated by."""
 
 import fnmatch
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.cases.names import close_names
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.fmi.description import VariableInfo
+from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 SHARE = 0.01
 """Part of a parameter for which effects "per percent" are given."""
@@ -72,10 +72,39 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
     InputError
         If a pattern fits nothing that a mode can be differentiated by.
     """
+    descriptions = {name: running.description for name, running in master.components.items()}
+    return parameters_in(
+        descriptions, lambda name, variable: master.components[name].get([variable])[variable], patterns, fixed=fixed
+    )
+
+
+def parameters_in(
+    descriptions: Mapping[str, FmuDescription],
+    value_of: Callable[[str, str], float],
+    patterns: Sequence[str] = (),
+    *,
+    fixed: bool = False,
+) -> list[Parameter]:
+    """As `parameters_of`, of components that need not run.
+
+    Parameters
+    ----------
+    descriptions
+        By component.
+    value_of
+        Value of a component's variable, in its unit; asked for the chosen ones only.
+    patterns, fixed
+        As `parameters_of`.
+
+    Raises
+    ------
+    InputError
+        As `parameters_of`.
+    """
     everything = {
         f"{component}.{info.name}": (component, info)
-        for component, running in master.components.items()
-        for info in running.description.variables.values()
+        for component, description in descriptions.items()
+        for info in description.variables.values()
         if info.causality == "parameter"
     }
     real = {name: found for name, found in everything.items() if found[1].type == "Real"}
@@ -86,7 +115,7 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
         for name, (component, info) in real.items()
         if (any(fnmatch.fnmatchcase(name, p) for p in patterns) if patterns else fixed or info.variability == "tunable")
     }
-    return [_parameter(master, component, info) for component, info in chosen.values()]
+    return [_parameter(component, info, value_of(component, info.name)) for component, info in chosen.values()]
 
 
 def _check_fits(
@@ -104,7 +133,6 @@ def _check_fits(
     raise InputError(f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}")
 
 
-def _parameter(master: Master, component: str, info: VariableInfo) -> Parameter:
-    value = master.components[component].get([info.name])[info.name]
+def _parameter(component: str, info: VariableInfo, value: float) -> Parameter:
     tunable = info.variability == "tunable"
     return Parameter(component, info.name, info.unit or "1", value, tunable, info.minimum, info.maximum)

@@ -1,5 +1,6 @@
 """One row of a code, run on the test bench. It can run in another process."""
 
+import os
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -7,16 +8,16 @@ import numpy as np
 
 from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
+from orchestrator.cases.schema import Value
 from orchestrator.certification.codes.bench_case import BENCH
 from orchestrator.errors import ComponentError, CosimError
 from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.failure import failure_kept
 from orchestrator.points.key import same_case
+from orchestrator.points.signals import signal_arrays, take_signals
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import running
 from orchestrator.watch.watch import Watch
-
-_SIGNAL = "signal "
-"""Beginning of the names of signals among a stored row's arrays."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +32,15 @@ class BenchTask:
         Path of the case file, and its fingerprint.
     key
         Name of the result's file: a hash of everything that the result depends on.
+    changes
+        Values by ``component.variable`` that are others than the case file's.
     """
 
     row: str
     case: str
     fingerprint: str
     key: str
+    changes: tuple[tuple[str, Value], ...] = ()
 
 
 @dataclass
@@ -49,6 +53,8 @@ class BenchResult:
         By the bench's names, each of the shape of ``times``.
     findings
         Of the watch, in the form of `Finding.as_json`.
+    seconds
+        Processor time of the run, that of FMUs in processes of their own included [s].
     failure
         Why there is no whole response.
     """
@@ -57,6 +63,7 @@ class BenchResult:
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     findings: list[dict[str, Any]] = field(default_factory=list)
+    seconds: float = 0.0
     failure: str | None = None
 
     @property
@@ -71,16 +78,15 @@ class BenchResult:
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""
-        header = {"row": self.row, "findings": self.findings}
-        return header, {"times": self.times, **{_SIGNAL + name: values for name, values in self.signals.items()}}
+        header = {"row": self.row, "findings": self.findings, "seconds": self.seconds}
+        return header, signal_arrays(self.times, self.signals)
 
     @classmethod
     def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
         """The result that was stored in this form; None if the file has another form."""
         try:
-            signals = {name.removeprefix(_SIGNAL): a for name, a in arrays.items() if name.startswith(_SIGNAL)}
-            return cls(header["row"], arrays["times"], signals, header["findings"])
-        except KeyError:
+            return cls(header["row"], *take_signals(arrays), header["findings"], header["seconds"])
+        except (KeyError, TypeError, ValueError):
             return None
 
 
@@ -93,26 +99,27 @@ def compute_row(task: BenchTask) -> BenchResult:
         As `same_case`.
     """
     case = same_case(task.case, task.fingerprint)
-    result = BenchResult(task.row)
-    try:
-        with alone():
-            (prepared,) = case.prepare()
-            watch = Watch(prepared)
-            ended: CosimError | None = None
-            with running(prepared) as master:
-                try:
-                    master.run(prepared.stop_time, prepared.events, watch.observers)
-                except ComponentError as error:
-                    if error.status.startswith("hang"):
-                        raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
-                    ended = error  # the converter gave up, or its values were no numbers: the row is not met
-            _keep(result, watch)
-            result.findings = [finding.as_json() for finding in watch.findings(ended)]
-    except CosimError as error:
-        result.failure = str(error)
-    except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other rows
-        result.failure = f"{type(error).__name__}: {error}"
+    result, begin = BenchResult(task.row), _processor_time()
+    with failure_kept(result), alone():
+        (prepared,) = case.prepare((), dict(task.changes))
+        watch = Watch(prepared)
+        ended: CosimError | None = None
+        with running(prepared) as master:
+            try:
+                master.run(prepared.stop_time, prepared.events, watch.observers)
+            except ComponentError as error:
+                if error.status.startswith("hang"):
+                    raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
+                ended = error  # the converter gave up, or its values were no numbers: the row is not met
+        _keep(result, watch)
+        result.findings = [finding.as_json() for finding in watch.findings(ended)]
+        result.seconds = _processor_time() - begin
     return result
+
+
+def _processor_time() -> float:
+    """Of this process and of those that it has started and that have ended [s]."""
+    return sum(os.times()[:4])
 
 
 def _keep(result: BenchResult, watch: Watch) -> None:

@@ -22,7 +22,7 @@ from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import POINTS, PointStore
 
-_GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
+GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 """Values of the converter that the rows give it."""
 
 
@@ -87,7 +87,7 @@ class CodeCertificate:
     @property
     def departures(self) -> tuple[str, ...]:
         """By what the test departs from the code's."""
-        set_too = tuple(f"converter.{n} = {shown(self.request.values[n])}" for n in _GIVEN if n in self.request.values)
+        set_too = tuple(f"converter.{n} = {shown(self.request.values[n])}" for n in GIVEN if n in self.request.values)
         if self.f_n != self.code.f_n:
             set_too += (f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz",)
         return set_too

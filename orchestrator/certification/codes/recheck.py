@@ -71,7 +71,7 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
             prefix = f"{row.name}."
             signals = {str(n).removeprefix(prefix): data[n].values for n in data.data_vars if str(n).startswith(prefix)}
             times = data[f"time_{row.name}"].values
-            result = BenchResult(row.name, times, signals, stated["findings"], stated["unknown"] or None)
+            result = BenchResult(row.name, times, signals, stated["findings"], failure=stated["unknown"] or None)
             again = judge_row(row, result, content["f_n"])
             same = [finding_json(f) for f in again.findings] == stated["criteria"]
             if not same or (again.judged, again.accepted) != (stated["judged"], stated["accepted"]):

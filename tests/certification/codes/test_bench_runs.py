@@ -5,7 +5,9 @@ import json
 import pytest
 
 import orchestrator as gfor
+from orchestrator.certification.codes import bench_point
 from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
@@ -78,3 +80,29 @@ def test_ours_and_its_duplicate_feed_the_load_without_the_source(converter, tmp_
         CertificationRequest(converter), CODES["miso"], Serial(), tmp_path, ("llsm_charging",)
     ).verdicts
     assert not row.failed
+
+
+def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(converter, tmp_path, monkeypatch):
+    """And it is not kept: the next start computes it."""
+    whole = bench_point.running
+
+    def breaking(prepared):
+        master = whole(prepared)
+        if prepared.case.path.name == case_name("inertia_up"):
+            monkeypatch.setattr(master, "run", lambda *_: {}["licence"])
+        return master
+
+    def certified():
+        return certify_code(CertificationRequest(converter), ERCOT, Serial(), tmp_path, ("inertia_up", "phase_jumps"))
+
+    monkeypatch.setattr(bench_point, "running", breaking)
+    found = certified()
+    assert [(v.row.name, v.judged, v.unknown) for v in found.verdicts] == [
+        ("inertia_up", False, "KeyError: 'licence'"), ("phase_jumps", True, "")
+    ]  # fmt: skip
+    assert found.verdict == "incomplete"
+    assert "row inertia_up" in found.missing
+    monkeypatch.setattr(bench_point, "running", whole)
+    again = certified()
+    assert again.stored == 1
+    assert all(v.judged for v in again.verdicts)

@@ -1,6 +1,5 @@
 """RTE's envelopes: against published curves, against an integration of the equations, and with wrong declarations."""
 
-import argparse
 import math
 
 import numpy as np
@@ -12,7 +11,9 @@ from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, co
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.certificate import judge_row
 from orchestrator.certification.codes.rte import DECLARED, Envelope, rte_code
-from orchestrator.cli import certify
+from orchestrator.certification.matrix import MatrixCell
+from orchestrator.certification.verdict import PASSES
+from orchestrator.cli import certify_matrix
 from orchestrator.errors import InputError
 
 OMEGA_PUBLISHED = 314.0
@@ -308,22 +309,21 @@ def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():
 
 @pytest.mark.parametrize(
     ("declare", "codes", "answer"),
-    [([], ["nts631", "miso", "aemo", "ercot", "fingrid", "gb"], 3),
-     ([("D", 2.0)], ["nts631", "miso", "aemo", "ercot", "fingrid", "rte", "gb"], 0)],
+    [([], ["nts631", "miso", "aemo", "ercot", "fingrid"], 3),
+     (["D=2.0"], ["nts631", "miso", "aemo", "ercot", "fingrid", "rte"], 0)],
 )  # fmt: skip
-def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer, monkeypatch, capsys, tmp_path):
+def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer, monkeypatch, gfor, tmp_path):
     """It is said, and the test is incomplete; only the code that asks for declarations gets them."""
-    run = []
+    asked = []
 
-    def noted(options, key="nts631"):
-        run.append((key, options.declare))
-        return 0
+    def noted(options, device, key, folder, place, console, *, several):
+        asked.append((key, options.declare))
+        return MatrixCell(device.name, key, place, verdict=PASSES)
 
-    monkeypatch.setattr(certify, "run_code", noted)
-    monkeypatch.setattr(certify, "_run_nts631", noted)
-    options = argparse.Namespace(fmu=tmp_path / "x.fmu", out=tmp_path, code="all", declare=declare,
-                                 details_template=False)  # fmt: skip
-    assert certify.run(options) == answer
-    assert [key for key, _ in run] == codes
-    assert all(given == (declare if key == "rte" else []) for key, given in run)
-    assert ("--code rte is left out: it needs --declare" in capsys.readouterr().err) == (not declare)
+    monkeypatch.setattr(certify_matrix, "_tested", noted)
+    words = [word for value in declare for word in ("--declare", value)]
+    code, text, _ = gfor("certify", tmp_path / "x.fmu", "--code", "all", "--out", tmp_path, *words)
+    assert code == answer
+    assert [key for key, _ in asked] == codes
+    assert all(given == ([("D", 2.0)] if declare and key == "rte" else []) for key, given in asked)
+    assert ("Left out, as it needs --declare: rte" in text) == (not declare)

@@ -1,0 +1,159 @@
+"""A row with one value of the converter changed, judged where it is computed. It can run in another process."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from orchestrator.certification.codes.all_codes import code_for
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.codes.certificate import RowVerdict, judge_row
+from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.store import Arrays
+from orchestrator.watch.finding import UNSTABLE
+
+ENDED = "runs"
+"""Criterion of a run that ends early; its value is the time of the end."""
+
+_TIMED = ("stable", ENDED)
+"""Criteria without a figure of their own that are the further off the earlier something goes wrong."""
+
+
+@dataclass(frozen=True)
+class ChangeTask:
+    """A row of a code with changed values.
+
+    Attributes
+    ----------
+    code
+        Key of the code.
+    f_n
+        Rated frequency of the bench [Hz].
+    bench
+        The row's case file and the changes.
+    declared
+        Values by which the code judges, as ``--declare`` gave them.
+    """
+
+    code: str
+    f_n: float
+    bench: BenchTask
+    declared: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Name of the result's file."""
+        return self.bench.key
+
+
+@dataclass(frozen=True)
+class ChangedCriterion:
+    """A criterion of a changed row.
+
+    Attributes
+    ----------
+    margin
+        In parts of the limit; None where there is no figure.
+    timed
+        Whether it is a criterion without a figure of its own, and the margin is the time until the first fault in parts
+        of the run, less one.
+    """
+
+    criterion: str
+    margin: float | None
+    accepted: bool
+    text: str
+    timed: bool = False
+
+
+@dataclass
+class ChangeResult:
+    """What the criteria of a row say of a changed converter.
+
+    Attributes
+    ----------
+    criteria
+        In their order; empty where the row could not be run.
+    mark
+        Hash of the response: two responses with one mark agree to the last bit.
+    failure
+        Why there are no criteria, as where the FMU refuses the value.
+    """
+
+    criteria: tuple[ChangedCriterion, ...] = ()
+    mark: str = ""
+    failure: str | None = None
+
+    @property
+    def lasting(self) -> bool:
+        """As `BenchResult.lasting`."""
+        return self.failure is None
+
+    @classmethod
+    def lost(cls, _: ChangeTask, error: WorkerLostError) -> Self:
+        """The result of a row whose worker died."""
+        return cls(failure=str(error))
+
+    def stored(self) -> tuple[dict[str, Any], Arrays]:
+        """Header and arrays for a `PointStore`."""
+        return {"criteria": [asdict(criterion) for criterion in self.criteria], "mark": self.mark}, {}
+
+    @classmethod
+    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
+        """The result that was stored in this form; None if the file has another form."""
+        try:
+            return cls(tuple(ChangedCriterion(**entry) for entry in header["criteria"]), header["mark"])
+        except (KeyError, TypeError):
+            return None
+
+
+def compute_change(task: ChangeTask) -> ChangeResult:
+    """Run and judge a changed row; a failure becomes part of the result.
+
+    Raises
+    ------
+    InputError
+        As `same_case`.
+    """
+    result = compute_row(task.bench)
+    if result.failure is not None:
+        return ChangeResult(failure=result.failure)
+    row = next(row for row in code_for(task.code, dict(task.declared)).rows if row.name == task.bench.row)
+    verdict = judge_row(row, result, task.f_n)
+    return ChangeResult(margins_with_time(verdict, result.findings, task.f_n), mark_of(result))
+
+
+def margins_with_time(
+    verdict: RowVerdict, findings: Sequence[Mapping[str, Any]], f_n: float
+) -> tuple[ChangedCriterion, ...]:
+    """The criteria of a row; one that has no figure, as a loss of synchronism, takes the time until the first fault.
+
+    Parameters
+    ----------
+    verdict
+        Of the row.
+    findings
+        Of the watch over the run, in the form of `Finding.as_json`.
+    f_n
+        Rated frequency of the bench [Hz].
+    """
+    stop = verdict.row.programme(f_n).stop
+    faults = [float(f["time"]) for f in findings if f["kind"] in UNSTABLE]
+    found = []
+    for f in verdict.findings:
+        margin, timed = f.margin, f.margin is None and f.criterion in _TIMED
+        times = [*faults, f.value or 0.0] if f.criterion == ENDED else faults
+        if timed and not f.accepted and times:
+            margin = min(times) / stop - 1
+        found.append(ChangedCriterion(f.criterion, margin, bool(f.accepted), f.text, timed))
+    return tuple(found)
+
+
+def mark_of(result: BenchResult) -> str:
+    """Hash of a response."""
+    hasher = hashlib.sha256(np.ascontiguousarray(result.times).tobytes())
+    for name in sorted(result.signals):
+        hasher.update(name.encode() + b"\0" + np.ascontiguousarray(result.signals[name]).tobytes())
+    return hasher.hexdigest()

@@ -1,0 +1,307 @@
+"""What a failed criterion would take: each parameter of the converter is changed to either side, and the row run again.
+
+Only rows that fail are run. What comes out is a slope at the present values; the change that a straight line asks for
+is only told where it was run.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeVar
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.certification.codes.bench_case import DUPLICATE, PLANT, case_name
+from orchestrator.certification.codes.bench_point import BenchTask
+from orchestrator.certification.codes.certificate import GIVEN, CodeCertificate, RowVerdict
+from orchestrator.certification.codes.change_point import (
+    ChangedCriterion,
+    ChangeResult,
+    ChangeTask,
+    compute_change,
+    margins_with_time,
+    mark_of,
+)
+from orchestrator.certification.codes.sensitivity import MarginSensitivity, sensitivity_of
+from orchestrator.coupling.step_awareness import INTERNAL_STEP, STEP_PARAMETER
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import VariableInfo
+from orchestrator.points.executor import Executor
+from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
+from orchestrator.points.points import CountReport, kept_or_computed
+from orchestrator.points.store import POINTS, PointStore
+from orchestrator.sensitivities.parameters import Parameter, parameters_in
+
+CHANGE = 0.05
+"""By which part of itself a parameter is changed to either side; of 1 of its unit where it is 0."""
+
+
+@dataclass(frozen=True)
+class ConfirmedChange:
+    """The most effective single change, run.
+
+    Attributes
+    ----------
+    parameter
+        That was changed.
+    change
+        Relative; of 1 unit where the parameter is 0.
+    straight_line
+        Margin that the slope lets expect.
+    margin
+        Margin that came out; None without one.
+    met
+        Whether the criterion is met; None where the row could not be run.
+    failing
+        Criteria of the row that are not met with the change.
+    reason
+        Why the row could not be run.
+    """
+
+    parameter: Parameter
+    change: float
+    straight_line: float
+    margin: float | None
+    met: bool | None
+    failing: tuple[str, ...]
+    reason: str = ""
+
+    @property
+    def value(self) -> float:
+        """The parameter's value with the change, in its unit."""
+        return self.parameter.value + self.change * self.parameter.scale
+
+
+@dataclass
+class CriterionNeeds:
+    """A failed criterion, and how each parameter moves its margin.
+
+    Attributes
+    ----------
+    row
+        Name of the row.
+    criterion
+        With the converter as it is.
+    sensitivities
+        Largest effect first.
+    confirmed
+        The most effective change, if that was asked for and there is one.
+    """
+
+    row: str
+    criterion: ChangedCriterion
+    sensitivities: Sequence[MarginSensitivity]
+    confirmed: ConfirmedChange | None = None
+
+
+@dataclass(frozen=True)
+class ChangePlan:
+    """What is to be run.
+
+    Attributes
+    ----------
+    folder
+        Of the certificate.
+    rows
+        The failed rows.
+    parameters
+        That are changed.
+    left_out
+        Parameters of the converter that are not changed, with the reason.
+    change
+        Relative, to either side.
+    tasks
+        A changed row for each row, parameter and side that the declared bounds allow.
+    """
+
+    certificate: CodeCertificate
+    folder: Path
+    rows: Sequence[RowVerdict]
+    parameters: Sequence[Parameter]
+    left_out: Mapping[str, str]
+    change: float
+    tasks: Mapping[tuple[str, str, int], ChangeTask] = field(repr=False)
+
+    @property
+    def seconds(self) -> float:
+        """Processor time of all tasks [s], as long as each takes what its row took."""
+        return sum(self.certificate.results[row].seconds for row, *_ in self.tasks)
+
+
+def plan_changes(
+    certificate: CodeCertificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
+    change: float = CHANGE,
+) -> ChangePlan:  # fmt: skip
+    """Find what is to be run; nothing is run yet.
+
+    Parameters
+    ----------
+    certificate
+        With the rows that fail.
+    folder
+        Of the certificate, with the rows' case files.
+    patterns
+        Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without patterns all
+        tunable ones are taken.
+    fixed
+        Without patterns, take the fixed ones as well.
+    change
+        By which part of itself a parameter is changed to either side.
+
+    Raises
+    ------
+    InputError
+        If a pattern fits no parameter of the converter, or one that the rows give it.
+    """
+    rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
+    if not rows:
+        return ChangePlan(certificate, folder, (), (), {}, change, {})
+    plan = _prepared(folder, rows[0].row.name).system.components[PLANT]
+    given = (*GIVEN, STEP_PARAMETER, INTERNAL_STEP)
+    described = {PLANT: plan.description}
+
+    def value_of(_: str, variable: str) -> float:  # an FMU need not answer for all of its parameters: it is not asked
+        return plan.number(variable)
+
+    asked = parameters_in(described, value_of, [f"{PLANT}.{pattern}" for pattern in patterns], fixed=fixed)
+    unknown = [p.variable for p in asked if plan.value(p.variable) is None]
+    chosen = [p for p in asked if p.variable not in (*given, *unknown)]
+    if not chosen:
+        raise InputError(
+            f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} parameter that the "
+            "rows do not give it themselves; name one by --parameter, or take the fixed ones too by --fixed"
+        )
+    every = [info for info in plan.description.variables.values() if info.causality == "parameter"]
+    names = {p.variable for p in chosen}
+    left_out = {info.name: _why_not(info, unknown, bool(patterns))
+                for info in every if info.name not in (*names, *given)}  # fmt: skip
+    tasks = {
+        (v.row.name, p.name, sign): _task(certificate, folder, v.row.name, p, sign * change)
+        for v in rows for p in chosen for sign in (-1, 1) if p.allows(sign * change * p.scale)
+    }  # fmt: skip
+    return ChangePlan(certificate, folder, rows, chosen, left_out, change, tasks)
+
+
+def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
+    """Why a parameter is not changed."""
+    if info.type != "Real":
+        return f"of type {info.type}"
+    if info.name in unknown:
+        return "without a start value"
+    return "not asked for" if named or info.variability == "tunable" else "fixed: --fixed takes it"
+
+
+def run_changes(
+    plan: ChangePlan, executor: Executor, report: CountReport = lambda done, total: None
+) -> list[CriterionNeeds]:
+    """Run the changed rows and work out the slopes; runs are kept as they come.
+
+    Parameters
+    ----------
+    plan
+        What is run.
+    executor
+        Where it is computed.
+    report
+        Called with the number of runs done and the total number.
+    """
+    results = _computed(plan, plan.tasks, executor, report)
+    found = []
+    for v in plan.rows:
+        base = plan.certificate.results[v.row.name]
+        mark = mark_of(base)
+        for criterion in margins_with_time(v, base.findings, plan.certificate.f_n):
+            if not criterion.accepted:
+                rows = [
+                    sensitivity_of(p, criterion, mark,
+                                   {s: results[k] for s in (-1, 1) if (k := (v.row.name, p.name, s)) in results},
+                                   plan.change)
+                    for p in plan.parameters
+                ]  # fmt: skip
+                rows.sort(key=lambda s: (-s.effect, s.parameter.name))
+                found.append(CriterionNeeds(v.row.name, criterion, rows))
+    return found
+
+
+def confirm_changes(
+    plan: ChangePlan, needs: Sequence[CriterionNeeds], executor: Executor,
+    report: CountReport = lambda done, total: None,
+) -> None:  # fmt: skip
+    """Run for each failed criterion the change of one parameter that the straight line asks for.
+
+    Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to
+    move least.
+
+    Parameters
+    ----------
+    plan
+        What was run.
+    needs
+        The slopes; each takes its confirmed change.
+    executor
+        Where it is computed.
+    report
+        Called with the number of runs done and the total number.
+    """
+    wanted: dict[int, tuple[MarginSensitivity, float]] = {}
+    tasks: dict[int, ChangeTask] = {}
+    for k, need in enumerate(needs):
+        tried = [(s, change) for s in need.sensitivities if (change := s.change_to_meet()) is not None]
+        if tried:
+            best = max(tried, key=lambda entry: (min(_expected(*entry), 0.0), -abs(entry[1])))
+            wanted[k] = best
+            tasks[k] = _task(plan.certificate, plan.folder, need.row, best[0].parameter, best[1])
+    results = _computed(plan, tasks, executor, report)
+    for k, (sensitivity, change) in wanted.items():
+        needs[k].confirmed = _confirmed(needs[k], sensitivity, change, results[k])
+
+
+def _expected(sensitivity: MarginSensitivity, change: float) -> float:
+    return (sensitivity.margin or 0.0) + (sensitivity.slope or 0.0) * change
+
+
+def _confirmed(
+    need: CriterionNeeds, sensitivity: MarginSensitivity, change: float, result: ChangeResult
+) -> ConfirmedChange:
+    again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
+    reason = result.failure or ("" if again else "; ".join(c.text for c in result.criteria))
+    return ConfirmedChange(
+        sensitivity.parameter, change, _expected(sensitivity, change), again.margin if again else None,
+        again.accepted if again else None, tuple(c.criterion for c in result.criteria if not c.accepted), reason,
+    )  # fmt: skip
+
+
+Place = TypeVar("Place")
+
+
+def _computed(
+    plan: ChangePlan, tasks: Mapping[Place, ChangeTask], executor: Executor, report: CountReport
+) -> dict[Place, ChangeResult]:
+    places, store = list(tasks), PointStore(plan.folder / POINTS)
+    done = kept_or_computed(ChangeResult, compute_change, list(tasks.values()), executor, store, report)
+    return {places[index]: result for index, result, _ in done}
+
+
+def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
+    """A row with a relative change of one parameter, in the duplicate as well."""
+    prepared = _prepared(folder, row)
+    value = parameter.value + change * parameter.scale
+    places = [name for name in (PLANT, DUPLICATE) if name in prepared.system.components]
+    changes = tuple((f"{name}.{parameter.variable}", value) for name in places)
+    declared = tuple(sorted(certificate.code.declared.items()))
+    content = {"bench": row, "code table": certificate.code.key, "f_n": certificate.f_n, "text": prepared.case.text,
+               **scenario_content(prepared), "changes": changes, "declared": declared}  # fmt: skip
+    bench = BenchTask(row, reference_to(prepared.case), fingerprint(prepared.case), key_of(content), changes)
+    return ChangeTask(certificate.code.key, certificate.f_n, bench, declared)
+
+
+@lru_cache(maxsize=32)
+def _prepared_once(path: Path, mtime_ns: int) -> PreparedScenario:
+    (prepared,) = load_case(path).prepare()
+    return prepared
+
+
+def _prepared(folder: Path, row: str) -> PreparedScenario:
+    path = folder / case_name(row)
+    return _prepared_once(path, path.stat().st_mtime_ns)

@@ -1,0 +1,138 @@
+"""The devices that one command certifies: a name, a file, a binding and values for each."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+
+_NAME = re.compile(r"[\w+-][\w.+-]*")
+"""What a device may be called: its name is that of a folder."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """One device.
+
+    Attributes
+    ----------
+    name
+        By which reports and folders call it; no two devices of a command share one, whatever the case of its letters.
+    file
+        An FMU, a vendor's DLL or a device's file.
+    values
+        Of its own variables, by name.
+    """
+
+    name: str
+    file: Path
+    binding: Path | None = None
+    values: Mapping[str, Value] = field(default_factory=dict)
+
+
+def devices_of(
+    files: Sequence[str], bindings: Sequence[str] = (), settings: Sequence[tuple[str, Value]] = ()
+) -> list[Device]:
+    """What a command line says of its devices.
+
+    Parameters
+    ----------
+    files
+        ``FILE`` or ``NAME=FILE``. Without a name a device is called by its file, and where several files have one
+        name by their folders as well.
+    bindings
+        ``FILE`` of the only device, or ``NAME=FILE``.
+    settings
+        ``VARIABLE`` or ``NAME:VARIABLE`` with a value. The last one counts; a device's own counts before one of all.
+
+    Raises
+    ------
+    InputError
+        If two devices have one name, a binding does not say whose it is, or a device has two.
+    """
+    named = [_split(text) for text in files]
+    names = _names(named)
+    own = _bindings(names, bindings)
+    values: dict[str, dict[str, Value]] = {name: {} for name in names}
+    for_one = [(whose, name, value) for text, value in settings for whose, name in [_whose(text, names)]]
+    for whose, name, value in sorted(for_one, key=lambda entry: entry[0] is not None):
+        for device in names if whose is None else [whose]:
+            values[device].pop(name, None)
+            values[device][name] = value
+    return [Device(name, path, own.get(name), values[name]) for name, (_, path) in zip(names, named, strict=True)]
+
+
+def _split(text: str) -> tuple[str | None, Path]:
+    """The name that is given, and the file; a file whose own name holds the sign stays whole."""
+    name, sign, rest = text.partition("=")
+    if not sign or Path(text).exists() or "/" in name or "\\" in name:
+        return None, Path(text)
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"{text}: a device cannot be called {name!r}, since its folder gets that name; take letters, digits and "
+            "._+- with no point in front"
+        )
+    if not rest:
+        raise InputError(f"{text}: the file of {name} is missing; write {name}=FILE.fmu")
+    return name, Path(rest)
+
+
+def _names(named: Sequence[tuple[str | None, Path]]) -> list[str]:
+    """Names of all devices, all of them different."""
+    paths = [path.parent.resolve() / path.name for _, path in named]
+    found = [given or path.stem for (given, _), path in zip(named, paths, strict=True)]
+    unnamed = [k for k, (given, _) in enumerate(named) if given is None]
+    for stem in {name.casefold() for name in _doubles([found[k] for k in unnamed])}:
+        alike = [k for k in unnamed if paths[k].stem.casefold() == stem]
+        for depth in range(1, max(len(paths[k].parts) for k in alike)):
+            longer = [_called(paths[k], depth) for k in alike]
+            if not _doubles(longer):
+                for k, name in zip(alike, longer, strict=True):
+                    found[k] = name
+                break
+    if twice := _doubles(found):
+        which = ", ".join(str(path) for name, (_, path) in zip(found, named, strict=True) if name in twice)
+        raise InputError(
+            f"{which}: they would share the folder {twice[0]} for their results; give each a name of its own, as in "
+            "box=FILE.fmu"
+        )
+    return found
+
+
+def _called(path: Path, depth: int) -> str:
+    """The file's name without its ending, after those of so many folders around it."""
+    folders = [part for part in path.parts[:-1] if part != path.anchor]
+    return "_".join([*folders[max(0, len(folders) - depth) :], path.stem])
+
+
+def _doubles(names: Sequence[str]) -> list[str]:
+    """Names that are there more than once; some file systems take capitals for small letters."""
+    count = Counter(name.casefold() for name in names)
+    return [name for name in names if count[name.casefold()] > 1]
+
+
+def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
+    found: dict[str, Path] = {}
+    for text in given:
+        name, sign, rest = text.partition("=")
+        if sign and name in names:
+            path = Path(rest)
+        elif len(names) == 1:
+            name, path = names[0], Path(text)
+        else:
+            raise InputError(
+                f"--binding {text}: it does not say whose it is; with several devices write NAME=FILE.toml, with NAME "
+                f"one of {', '.join(names)}"
+            )
+        if name in found:
+            raise InputError(f"--binding {text}: {name} has {found[name]} already; a device has one binding")
+        found[name] = path
+    return found
+
+
+def _whose(text: str, names: Sequence[str]) -> tuple[str | None, str]:
+    name, sign, rest = text.partition(":")
+    return (name, rest) if sign and name in names else (None, text)

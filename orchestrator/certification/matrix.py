@@ -1,0 +1,119 @@
+"""Several devices under several codes: a verdict and the narrowest margin for each pair."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.margins import CriterionMargin, margins_of, narrowest
+from orchestrator.certification.study import Certification
+from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
+from orchestrator.errors import InputError
+
+NOT_TESTED = "not tested"
+"""In place of a verdict, where a device could not be tested at all."""
+
+
+@dataclass
+class MatrixCell:
+    """One device under one code.
+
+    Attributes
+    ----------
+    folder
+        Of the certificate, relative to the matrix.
+    failure
+        Why the device could not be tested; None where there is a certificate.
+    margins
+        Of all criteria that count towards the verdict.
+    judged
+        Number of rows or reactances that were judged.
+    missing
+        Number of parts of the code that were not tested.
+    refused
+        Whether an acceptance test of the FMU failed.
+    has_needs
+        Whether what the failed criteria would take lies beside the certificate.
+    """
+
+    device: str
+    code: str
+    folder: str
+    failure: str | None = None
+    verdict: str = NOT_TESTED
+    sentence: str = ""
+    margins: Sequence[CriterionMargin] = ()
+    judged: int = 0
+    missing: int = 0
+    refused: bool = False
+    has_needs: bool = False
+
+    def take(self, found: Certification | CodeCertificate) -> None:
+        """Take the figures of a certificate."""
+        self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
+        self.margins, self.missing = margins_of(found), len(found.missing)
+        self.judged = sum(1 for v in found.verdicts if v.judged)
+
+    @property
+    def narrowest(self) -> CriterionMargin | None:
+        """The criterion with the least margin."""
+        return narrowest(self.margins)
+
+    @property
+    def without_figure(self) -> list[CriterionMargin]:
+        """Criteria that are not met and have no figure, such as a loss of synchronism."""
+        return [m for m in self.margins if not m.accepted and m.margin is None]
+
+    @property
+    def failed(self) -> list[CriterionMargin]:
+        """Criteria that are not met, least margin first; those without a figure before all."""
+        bad = [m for m in self.margins if not m.accepted]
+        return sorted(bad, key=lambda m: float("-inf") if m.margin is None else m.margin)
+
+    @property
+    def exit_code(self) -> int:
+        """As `gfor certify` of this device and code alone ends."""
+        return InputError.exit_code if self.failure is not None else exit_code(self.verdict, refused=self.refused)
+
+
+@dataclass(frozen=True)
+class CertificateMatrix:
+    """All cells.
+
+    Attributes
+    ----------
+    devices, codes
+        In the order in which they were asked for.
+    cells
+        By device and code.
+    left_out
+        Codes that were asked for and need values that nobody declared.
+    """
+
+    devices: tuple[str, ...]
+    codes: tuple[str, ...]
+    cells: dict[tuple[str, str], MatrixCell]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def exit_code(self) -> int:
+        """Of the worst cell: one that fails, one that could not be tested, one that is incomplete, one whose FMU an
+        acceptance test refuses; 0 where all pass. A code that is left out makes the whole incomplete.
+        """
+        found = {cell.exit_code for cell in self.cells.values()}
+        found |= {exit_code(INCOMPLETE, refused=False)} if self.left_out else set()
+        return next((code for code in WORST_FIRST if code in found), 0)
+
+    def sentence(self) -> str:
+        """The matrix in a sentence."""
+        verdicts = [cell.verdict for cell in self.cells.values()]
+        said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
+        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
+        refused = [name for name in self.devices if any(self.cells[name, code].refused for code in self.codes)]
+        text = f"Of {len(verdicts)} certificates: {counted}."
+        if self.left_out:
+            text += f" Left out, as it needs --declare: {', '.join(self.left_out)}."
+        return f"{text} Acceptance tests failed: {', '.join(refused)}." if refused else text
+
+
+WORST_FIRST = (exit_code(FAILS, refused=False), InputError.exit_code, exit_code(INCOMPLETE, refused=False), NOT_TRUSTED)
+"""Exit codes of cells, the one that counts most first."""

@@ -1,0 +1,142 @@
+"""The files of a matrix of codes and devices: JSON and a page, beside the certificates that it sums up."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
+from orchestrator.certification.devices import Device
+from orchestrator.certification.environment import environment
+from orchestrator.certification.files import HTML, JSON
+from orchestrator.certification.margins import CriterionMargin, margin_text
+from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
+from orchestrator.certification.request import shown
+from orchestrator.certification.verdict import FAILS, PASSES
+from orchestrator.report.html.document import document
+from orchestrator.report.html.elements import table
+from orchestrator.safe_files import write_text
+
+FORMAT = "matrix-1"
+"""Form of the JSON."""
+
+MATRIX_HTML, MATRIX_JSON = "matrix.html", "matrix.json"
+
+READING = (
+    "A margin is the distance from a criterion's limit in parts of that limit, negative on the bad side. Criteria ask "
+    "for different things: margins order the criteria of one device, and compare devices at one criterion."
+)
+
+
+def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Path) -> list[Path]:
+    """Write ``matrix.html`` and ``matrix.json``.
+
+    Parameters
+    ----------
+    matrix
+        All cells.
+    devices
+        What was compared, in the order of the matrix.
+    folder
+        That holds the certificates' folders.
+    """
+    made = datetime.now(UTC).replace(microsecond=0)
+    content = {"made": made.isoformat(), **matrix_json(matrix, devices)}
+    write_text(folder / MATRIX_HTML, matrix_page(matrix, devices, made))
+    write_text(folder / MATRIX_JSON, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    return [folder / MATRIX_HTML, folder / MATRIX_JSON]
+
+
+def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[str, Any]:
+    """All figures as JSON's types."""
+    return {
+        "format": FORMAT, "sentence": matrix.sentence(), "exit_code": matrix.exit_code,
+        "devices": [{"name": d.name, "file": d.file.name, "binding": d.binding.name if d.binding else None,
+                     "values": dict(d.values)} for d in devices],
+        "codes": list(matrix.codes), "left_out": list(matrix.left_out),
+        "cells": [_cell_json(cell) for cell in matrix.cells.values()],
+        "environment": environment(),
+    }  # fmt: skip
+
+
+def _cell_json(cell: MatrixCell) -> dict[str, Any]:
+    least = cell.narrowest
+    return {
+        "device": cell.device, "code": cell.code, "verdict": cell.verdict, "exit_code": cell.exit_code,
+        "sentence": cell.sentence, "failure": cell.failure, "judged": cell.judged, "missing": cell.missing,
+        "acceptance_failed": cell.refused, "narrowest": None if least is None else asdict(least),
+        "failed": [asdict(m) for m in cell.failed],
+        "certificate": None if cell.failure is not None else f"{cell.folder}/{JSON}",
+        "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
+    }  # fmt: skip
+
+
+def in_words(cell: MatrixCell) -> list[str]:
+    """What a cell of the matrix shows, line by line: verdict, narrowest margin, and what has no figure."""
+    if cell.failure is not None:
+        return [cell.verdict]
+    lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in cell.without_figure)]
+    if (least := cell.narrowest) is not None:
+        lines.append(f"{margin_text(least.margin)} {least.place}: {least.criterion}")
+    return lines
+
+
+def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: datetime) -> str:
+    """The page.
+
+    Parameters
+    ----------
+    matrix
+        All cells.
+    devices
+        What was compared.
+    made
+        When [UTC].
+    """
+    whole = [[escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
+             for code in matrix.codes]  # fmt: skip
+    tried = [[escape(text) for text in _given(device)] for device in devices]
+    bad = [
+        [escape(cell.device), escape(cell.code.upper()), *_failed_html(m)]
+        for cell in matrix.cells.values() for m in cell.failed
+    ]  # fmt: skip
+    lost = [[escape(c.device), escape(c.code.upper()), escape(c.failure).replace("\n", "<br>")]
+            for c in matrix.cells.values() if c.failure is not None]  # fmt: skip
+    columns = ["Device", "Code", "Where", "Criterion", "Found", "Margin"]
+    width = 1 + len(matrix.devices)
+    sections = [
+        ("Verdict and narrowest margin",
+         table("Codes and devices", ["", *matrix.devices], whole, left=width) + f"<p>{escape(READING)}</p>"),
+        ("What is not met", table("Criteria, least margin first", columns, bad, left=5) if bad else "<p>Nothing.</p>"),
+        *([("Not tested", table("Why", ["Device", "Code", "Reason"], lost, left=3))] if lost else []),
+        ("The devices", table("As they were given", ["Device", "File", "Binding", "Values set"], tried, left=4)),
+    ]  # fmt: skip
+    kind = "Grid codes for grid-forming converters"
+    return document("Codes and devices", kind, f"<p><b>{escape(matrix.sentence())}</b></p>", sections, made)
+
+
+def _given(device: Device) -> list[str]:
+    values = ", ".join(f"{name} = {shown(value)}" for name, value in device.values.items())
+    return [device.name, device.file.name, device.binding.name if device.binding else "none", values or "none"]
+
+
+def _cell_html(cell: MatrixCell) -> str:
+    verdict, *rest = in_words(cell)
+    style = "good" if cell.exit_code == 0 else "bad" if verdict == FAILS or cell.failure is not None else "soft"
+    word = f'<span class="{style}">{escape(verdict)}</span>'
+    if cell.failure is None:
+        word = f'<a href="{quote(f"{cell.folder}/{HTML}")}">{word}</a>'
+    if verdict == PASSES and cell.refused:
+        rest = ["acceptance tests failed", *rest]
+    lines = [word, *(escape(line) for line in rest)]
+    if cell.has_needs:
+        lines.append(f'<a href="{quote(f"{cell.folder}/{NEEDS_HTML}")}">what it would take</a>')
+    return "<br>".join(lines)
+
+
+def _failed_html(m: CriterionMargin) -> list[str]:
+    return [escape(m.place), escape(m.criterion), escape(m.text), margin_text(m.margin)]

@@ -1,0 +1,152 @@
+"""``gfor certify`` with several devices or all codes: a certificate for each pair, and one matrix of them."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.certification.acceptance import KEPT
+from orchestrator.certification.codes.all_codes import BY_DECLARATION
+from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.devices import Device
+from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
+from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix
+from orchestrator.cli.certify_codes import ALL, NTS631, certified_code, check_code_options, codes_of, show_code
+from orchestrator.cli.certify_norm import certified_norm, show_norm
+from orchestrator.cli.certify_sensitivities import find_needs
+from orchestrator.cli.terminal import make_console, make_errors
+from orchestrator.errors import InputError
+from orchestrator.points.failure import failure_kept
+from orchestrator.report.tables import PlainTable, make_table
+from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
+
+
+def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
+    """Test every device by every code that is asked for, and write and print the matrix.
+
+    Parameters
+    ----------
+    options
+        Of the command.
+    devices
+        What is tested.
+
+    Returns
+    -------
+    As `CertificateMatrix.exit_code`.
+
+    Raises
+    ------
+    InputError
+        If nothing at all could be tested, with the reasons.
+    """
+    codes, left_out = codes_of(options.code), tuple[str, ...]()
+    if options.code == ALL and not options.declare:
+        left_out = tuple(BY_DECLARATION)
+        codes = tuple(key for key in codes if key not in left_out)
+    several = len(devices) > 1
+    if set(codes) - {NTS631}:
+        check_code_options(options, devices)
+    if several and options.check:
+        raise InputError(
+            f"--check {options.check}: a report of `gfor check` is of one FMU, and there are {len(devices)}; leave it "
+            "out to have the tests run, or give --no-check"
+        )
+    folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
+    made_folder(folder, "--out")
+    console = make_console(stderr=options.json)
+    with held(folder):
+        cells = {}
+        for device in devices:
+            own = argparse.Namespace(**vars(options))
+            for key in codes:
+                own.declare = options.declare if options.code != ALL or key in BY_DECLARATION else []
+                place = f"{device.name}/{key}" if several else key
+                cells[device.name, key] = _tested(own, device, key, folder, place, console, several=several)
+        matrix = CertificateMatrix(tuple(d.name for d in devices), codes, cells, left_out)
+        _check_any(matrix)
+        files = save_matrix(matrix, devices, folder)
+    for lost in (cell for cell in cells.values() if cell.failure is not None):
+        make_errors().print(f"[yellow]not tested:[/] {escape(f'{lost.device}, {lost.code}: {lost.failure}')}")
+    if options.json:
+        print(json.dumps(matrix_json(matrix, devices), indent=1, ensure_ascii=False))
+    else:
+        console.print(matrix_table(matrix), "")
+        console.print(READING, soft_wrap=True, highlight=False)
+        colour = "green" if matrix.exit_code == 0 else "red"
+        console.print(f"[bold {colour}]{escape(matrix.sentence())}[/]", soft_wrap=True)
+        console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+    return matrix.exit_code
+
+
+def _tested(
+    options: argparse.Namespace, device: Device, key: str, folder: Path, place: str, console: Console, *, several: bool
+) -> MatrixCell:
+    """One device under one code; what cannot be tested says why, and the others go on.
+
+    The acceptance tests of a device are run for its first certificate; ``options`` of the device remember them.
+    """
+    cell = MatrixCell(device.name, key, place)
+    with failure_kept(cell):
+        own = folder / place
+        if key == NTS631:
+            result, files = certified_norm(options, device, own, console)
+            cell.take(result)
+            if not (options.json or several):
+                show_norm(result, files, own, console)
+        else:
+            found, files = certified_code(options, device, key, own, console)
+            cell.take(found)
+            if not (options.json or several):
+                show_code(found, files, own, console)
+            if options.sensitivities:
+                _take_needs(options, found, cell, own, console)
+        if not options.no_check:
+            options.check = own / KEPT
+    if cell.failure is None and several and not options.json:
+        console.print(escape(f"{device.name}, {key}: {cell.sentence}"), soft_wrap=True, highlight=False)
+    return cell
+
+
+def _take_needs(
+    options: argparse.Namespace, found: CodeCertificate, cell: MatrixCell, folder: Path, console: Console
+) -> None:
+    """What the failed criteria would take; where that cannot be found, the certificate stands."""
+    if not options.json:
+        console.print(escape(f"{cell.device}, {cell.code}:"), highlight=False)
+    note = _Note()
+    with failure_kept(note):
+        cell.has_needs = find_needs(options, found, folder, console) is not None
+    if note.failure is not None:
+        make_errors().print(f"[yellow]no sensitivities:[/] {escape(f'{cell.device}, {cell.code}: {note.failure}')}")
+
+
+@dataclass
+class _Note:
+    failure: str | None = None
+
+
+def _check_any(matrix: CertificateMatrix) -> None:
+    """Raise an error where no cell was tested; reasons that several cells share are told once."""
+    if any(cell.failure is None for cell in matrix.cells.values()):
+        return
+    reasons: dict[str, list[str]] = {}
+    for cell in matrix.cells.values():
+        reasons.setdefault(str(cell.failure), []).append(f"{cell.device}, {cell.code}")
+    if len(reasons) == 1:
+        raise InputError(next(iter(reasons)))
+    listed = "\n".join(f"  - {'; '.join(cells)}: {reason}" for reason, cells in reasons.items())
+    raise InputError(f"nothing could be tested\n{listed}")
+
+
+def matrix_table(matrix: CertificateMatrix) -> PlainTable:
+    """The matrix for a terminal: a row for each code, a column for each device."""
+    table = make_table("Codes and devices: verdict, and narrowest margin", "", *matrix.devices, left=99)
+    for code in matrix.codes:
+        table.add_row(code, *("\n".join(in_words(matrix.cells[name, code])) for name in matrix.devices))
+    return table

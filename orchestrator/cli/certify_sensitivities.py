@@ -1,0 +1,144 @@
+"""``gfor certify --sensitivities``: what the failed criteria of a certificate would take."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.needs_record import (
+    confirmed_text,
+    left_out_text,
+    needs_json,
+    needs_table,
+    plan_text,
+    remarks_of,
+    save_needs,
+)
+from orchestrator.certification.codes.what_it_takes import (
+    CHANGE,
+    confirm_changes,
+    plan_changes,
+    run_changes,
+)
+from orchestrator.cli.executors import choose_executor
+from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.points import Progressing
+from orchestrator.errors import InputError
+from orchestrator.results.lock import held
+
+_WORKER = ["orchestrator.certification.codes.change_point"]
+
+
+def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options."""
+    group = parser.add_argument_group("what a failed criterion would take")
+    group.add_argument("--sensitivities", action="store_true",
+                       help="run every failed row again with each tunable parameter changed to either side, and say "
+                       "how each moves the margin of each failed criterion")  # fmt: skip
+    group.add_argument(
+        "--parameter", action="append", default=[], metavar="PARAMETER",
+        help="only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
+    )  # fmt: skip
+    group.add_argument("--fixed", action="store_true", help="fixed parameters too")
+    group.add_argument(
+        "--change", type=relative_change, metavar="PERCENT",
+        help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
+    )  # fmt: skip
+    group.add_argument("--confirm", action="store_true",
+                       help="run the one change that a straight line lets expect most of")  # fmt: skip
+
+
+def relative_change(text: str) -> float:
+    """A part above 0 and at most a half, in percent."""
+    try:
+        value = float(text.removesuffix("%"))
+    except ValueError:
+        value = 0.0
+    if not 0.01 <= value <= 50:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a change in percent from 0.01 to 50, such as 5")
+    return value / 100
+
+
+def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:
+    """Refuse options that would do nothing.
+
+    Parameters
+    ----------
+    options
+        Of the command.
+    codes
+        That are asked for.
+    norm
+        The one among them that has no rows on a test bench.
+
+    Raises
+    ------
+    InputError
+        With the first such option.
+    """
+    others = {"--parameter": options.parameter, "--fixed": options.fixed, "--change": options.change,
+              "--confirm": options.confirm}  # fmt: skip
+    if not options.sensitivities:
+        if idle := [name for name, value in others.items() if value]:
+            raise InputError(f"{idle[0]}: it belongs to --sensitivities, which is not given; add it, or leave this out")
+        return
+    if set(codes) <= {norm}:
+        raise InputError(
+            f"--sensitivities: --code {norm} has no rows that can be run again with another parameter; `gfor "
+            "sensitivities` on the certificate's case file says how each parameter moves a mode"
+        )
+
+
+def find_needs(
+    options: argparse.Namespace, certificate: CodeCertificate, folder: Path, console: Console
+) -> dict[str, Any] | None:
+    """Run what failed rows would take, and write and print it.
+
+    Parameters
+    ----------
+    options
+        Of the command.
+    certificate
+        With the rows that fail.
+    folder
+        Of the certificate.
+    console
+        Where to.
+
+    Returns
+    -------
+    All figures; None where no row fails.
+    """
+    change = CHANGE if options.change is None else options.change
+    plan = plan_changes(certificate, folder, options.parameter, fixed=options.fixed, change=change)
+    if not plan.rows:
+        console.print("No row fails: there is nothing that a criterion would take.", highlight=False)
+        return None
+    console.print(escape(plan_text(plan)), soft_wrap=True, highlight=False)
+    progress = Progressing(folder)
+
+    def computed(study: Any) -> Any:
+        executor = choose_executor(options, _WORKER)
+        return progress.compute(lambda report: study(executor, report), executor, console)
+
+    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
+        needs = computed(lambda executor, report: run_changes(plan, executor, report))
+        if options.confirm:
+            computed(lambda executor, report: confirm_changes(plan, needs, executor, report))
+        files = save_needs(plan, needs, folder)
+    if not options.json:
+        for need in needs:
+            console.print(needs_table(need))
+            for text in remarks_of(need):
+                console.print(escape(text), soft_wrap=True, highlight=False)
+            if options.confirm:
+                console.print(escape(confirmed_text(need)), soft_wrap=True, highlight=False)
+            console.print("")
+        if text := left_out_text(plan):
+            console.print(escape(f"Not changed: {text}"), soft_wrap=True, highlight=False)
+        console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+    return needs_json(plan, needs)
