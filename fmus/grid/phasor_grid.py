@@ -104,8 +104,8 @@ def _settle(
     """Give every bus its voltage."""
     currents = {name: bus.injected for name, bus in buses.items()}
     voltages: dict[str, Phasor] = {}
-    if solution == "code":
-        voltages = solve(Y, currents, checked=any(line.is_equivalent for line in network.lines))
+    if solution == "code":  # X_C may be set above X in the FMU, and the branch is an equivalent then
+        voltages = solve(Y, currents, checked=any(line.is_equivalent or line.X_C for line in network.lines))
     elif solution == "data":
         voltages = solved_as_data(m, Y, currents, partial(_phasor_grid, network, "code"))
     for name, bus in buses.items():
