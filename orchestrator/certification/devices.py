@@ -51,7 +51,8 @@ def devices_of(
     Raises
     ------
     InputError
-        If two devices have one name, a binding does not say whose it is, or a device has two.
+        If two devices have one name, a binding does not say whose it is, a device has two, or a value is of a device
+        that is not there.
     """
     named = [_split(text) for text in files]
     names = _names(named)
@@ -135,4 +136,6 @@ def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
 
 def _whose(text: str, names: Sequence[str]) -> tuple[str | None, str]:
     name, sign, rest = text.partition(":")
+    if sign and len(names) > 1 and name not in names:
+        raise InputError(f"--set {text}: there is no device {name!r}; the devices are {', '.join(names)}")
     return (name, rest) if sign and name in names else (None, text)

@@ -67,3 +67,8 @@ def test_a_devices_own_value_counts_before_one_of_all_wherever_it_stands():
     a, b = devices_of(["a.fmu", "b.fmu"], (), settings)
     assert a.values == {"T": 5.0, "K": 3.0, "d:K": 4.0}  # there is no device d: the FMUs will refuse the name
     assert b.values == {"K": 2.0, "T": 5.0, "d:K": 4.0}
+
+
+def test_a_value_of_a_device_that_is_not_there_is_one_error():
+    with pytest.raises(InputError, match=r"--set three:K: there is no device 'three'; the devices are one, two"):
+        devices_of(["one=a.fmu", "two=b.fmu"], settings=[("three:K", 2.0)])
