@@ -63,10 +63,10 @@ def test_a_binding_of_nobody_or_a_second_one_is_refused(files, bindings, said):
 
 
 def test_a_devices_own_value_counts_before_one_of_all_wherever_it_stands():
-    settings = [("b:K", 2.0), ("K", 1.0), ("T", 5.0), ("K", 3.0), ("d:K", 4.0)]
+    settings = [("b:K", 2.0), ("K", 1.0), ("T", 5.0), ("K", 3.0)]
     a, b = devices_of(["a.fmu", "b.fmu"], (), settings)
-    assert a.values == {"T": 5.0, "K": 3.0, "d:K": 4.0}  # there is no device d: the FMUs will refuse the name
-    assert b.values == {"K": 2.0, "T": 5.0, "d:K": 4.0}
+    assert a.values == {"T": 5.0, "K": 3.0}
+    assert b.values == {"K": 2.0, "T": 5.0}
 
 
 def test_a_value_of_a_device_that_is_not_there_is_one_error():
