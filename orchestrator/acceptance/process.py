@@ -74,6 +74,7 @@ class FmuProcess:
         self.time = 0.0
         self.protections: tuple[Protection, ...] = ()
         self._ended: ProcessEndedError | None = None
+        self._interrupted: BaseException | None = None
         self._number, self._patience = 0, TO_BEGIN
         self._library = unlocked_library()
         fmu = description.path.resolve()
@@ -208,7 +209,20 @@ class FmuProcess:
             raise self._tampered(f"{error}") from error
 
     def _ask(self, kind: int, call: str) -> int:
-        """Ask and wait; the status, or an error that says how the process ended."""
+        """Ask and wait; the status, or an error that says how the process ended.
+
+        After an interrupt nothing more is asked: the answer to the question before would be taken for one that nobody
+        asked for.
+        """
+        if self._interrupted is not None:
+            raise self._interrupted
+        try:
+            return self._answer(kind, call)
+        except (KeyboardInterrupt, SystemExit) as interrupt:
+            self._interrupted = interrupt
+            raise
+
+    def _answer(self, kind: int, call: str) -> int:
         self._number += 1
         box, wait, begin, steps = self.box, self._library.mailbox_wait, monotonic(), self.box.head.steps
         self._library.mailbox_post(box.address, kind, self._number)

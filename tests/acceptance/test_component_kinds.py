@@ -1,7 +1,8 @@
 """One FMU as each of the four kinds of component: every method of `Component` answers or refuses in words."""
 
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from shutil import rmtree
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,3 +88,27 @@ def test_a_refused_call_names_the_component_and_the_call(component):
     with pytest.raises(ComponentError, match="component 'box' at t = 0 s: fmi2DoStep returned fmi2") as caught:
         component.step(0.0, -1.0)
     assert "step" in caught.value.log
+
+
+def test_an_interrupt_while_it_is_asked_stays_an_interrupt(fmu_path):
+    """The next question, as where a saved state is freed on the way out, takes no late answer for a forged one."""
+    description = read_description(fmu_path("gfor", native=True))
+    directory = extract(description.path)
+
+    def interrupted(*_):
+        process._library = library
+        raise KeyboardInterrupt
+
+    def asked():
+        with HostedComponent("box", process) as opened:
+            process._library = SimpleNamespace(mailbox_post=library.mailbox_post, mailbox_wait=interrupted)
+            try:
+                opened.set(START)
+            finally:
+                opened.get(["i_re"])
+
+    with closing(FmuProcess(description, directory, Limits())) as process:
+        library = process._library
+        with pytest.raises(KeyboardInterrupt):
+            asked()
+    rmtree(directory)
