@@ -85,6 +85,24 @@ def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -
         raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
 
 
+def bench_request(device: Device) -> CertificationRequest:
+    """A checked request for a device on the test bench.
+
+    Parameters
+    ----------
+    device
+        What is tested.
+
+    Raises
+    ------
+    InputError
+        If its files cannot be used.
+    """
+    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
+    request.check()
+    return request
+
+
 def certified_code(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[CodeCertificate, list[Path]]:
@@ -104,8 +122,7 @@ def certified_code(
         Shows the progress.
     """
     code = code_for(key, dict(options.declare))
-    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
-    request.check()
+    request = bench_request(device)
     return certified(
         options, request, folder, "orchestrator.certification.codes.bench_point",
         lambda executor, report: certify_code(request, code, executor, folder, report=report), save_certificate,

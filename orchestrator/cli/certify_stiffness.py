@@ -11,11 +11,9 @@ from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.codes.frequency_domain import figures_of_stiffness, measure_stiffness, save_stiffness
 from orchestrator.certification.devices import Device
-from orchestrator.certification.request import CertificationRequest
-from orchestrator.cli.certify_codes import GB, check_code_options
+from orchestrator.cli.certify_codes import GB, bench_request, check_code_options
 from orchestrator.cli.terminal import make_console, said_stages
 from orchestrator.errors import InputError
-from orchestrator.fmi.devices import as_device
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
@@ -44,8 +42,7 @@ def run_stiffness(options: argparse.Namespace, devices: Sequence[Device]) -> int
     (device,) = devices
     checked((), dict(options.declare), GB)
     check_code_options(options, devices)
-    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
-    request.check()
+    request = bench_request(device)
     folder = made_folder(options.out or Path("results") / f"certify_{device.name}_{GB}", "--out")
     console = make_console(stderr=options.json)
     with held(folder), said_stages() as report:
