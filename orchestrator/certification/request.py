@@ -16,8 +16,8 @@ PODS = ("none", "p", "q", "pq")
 STUDY = ("sg1", "sg2", "grid")
 """Components of the study that are not the converter."""
 
-_FIXED = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
-"""Values of the converter that the norm's study gives it."""
+GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
+"""Values of the converter that a study gives it: that of the norm, and the bench of the other codes."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class CertificationRequest:
     @property
     def departures(self) -> tuple[str, ...]:
         """Changes of the study itself, by which it departs from the norm."""
-        changed = {f"converter.{name}": self.values[name] for name in _FIXED if name in self.values}
+        changed = {f"converter.{name}": self.values[name] for name in GIVEN if name in self.values}
         return tuple(f"{name} = {shown(value)}" for name, value in {**self.study_values, **changed}.items())
 
 

@@ -13,7 +13,7 @@ from orchestrator.certification.codes.bench_point import BenchResult, BenchTask,
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.row import CodeRow, GridCode, RowFinding
 from orchestrator.certification.details import Details
-from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.certification.request import GIVEN, CertificationRequest, shown
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.errors import CaseError
 from orchestrator.fmi.description import FmuDescription
@@ -21,9 +21,6 @@ from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import POINTS, PointStore
-
-GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
-"""Values of the converter that the rows give it."""
 
 
 @dataclass(frozen=True)
