@@ -32,6 +32,7 @@ class _Calls:
         self._depth = 0
         self._asked = ctypes.c_int(0)  # C that waits for another process looks at it as well
         self._kind: type[BaseException] = KeyboardInterrupt
+        self._hook: Callable[[Any], None] | None = None
         self.terminated = self.over = False
 
     @property
@@ -40,10 +41,16 @@ class _Calls:
         return ctypes.addressof(self._asked)
 
     def watch(self) -> None:
-        """Take Ctrl-C over from Python, where nobody else has; between calls it works as before."""
+        """Take Ctrl-C over from Python, where nobody else has; between calls it works as before.
+
+        Where Python would swallow it, as in a weak reference's end, it is asked for again.
+        """
         here = threading.current_thread() is threading.main_thread()
         if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, self._take)
+        if here and sys.unraisablehook is not self._hook:
+            self._hook = self._swallowed(sys.unraisablehook)
+            sys.unraisablehook = self._hook
 
     @property
     def how(self) -> str:
@@ -66,9 +73,9 @@ class _Calls:
             finally:
                 self.over = False
             return
+        unraisable = sys.unraisablehook
         self.watch()
-        before, unraisable = signal.signal(signal.SIGTERM, self._take), sys.unraisablehook
-        sys.unraisablehook = self._swallowed(unraisable)
+        before = signal.signal(signal.SIGTERM, self._take)
         try:
             yield
         finally:

@@ -205,10 +205,20 @@ def test_the_command_line_ends_with_the_code_of_sigterm(gfor, monkeypatch):
     assert gfor("info", "a.fmu") == (143, "", "ended by SIGTERM\n")
 
 
-def test_an_interrupt_that_python_swallows_is_asked_for_again():
+@pytest.fixture(params=["a command", "a run in Python"])
+def taken_over(request, taken):
+    if request.param == "a command":
+        with calls.terminable():
+            yield
+    else:
+        calls.watch()
+        yield
+
+
+def test_an_interrupt_that_python_swallows_is_asked_for_again(taken_over):
     class Ending:
         def __del__(self):
-            signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGINT)
 
     def command():
         Ending()  # Python lets no error out of its end
@@ -217,6 +227,6 @@ def test_an_interrupt_that_python_swallows_is_asked_for_again():
             reached.append("in a call")
 
     reached = []
-    with calls.terminable(), pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt):
         command()
     assert reached == ["after it", "in a call"]
