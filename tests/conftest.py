@@ -1,8 +1,12 @@
 """Fixtures shared by all tests."""
 
+import os
 from functools import cache
 
 import pytest
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # before NumPy: threads of BLAS in every worker would wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
