@@ -115,10 +115,13 @@ def _factorise_nodes(u, p, c):
         for q in range(ROW[i], ROW[i + 1]):
             lu[q] = row[COL[q]]
         inverse[i] = 1 / row[i] if row[i] else complex(nan, nan)
-    s = _through_factors([1.0] * buses + [0.0] * buses, lu, inverse)
+    b = [math.cos(i) for i in range(buses)] + [math.sin(i) for i in range(buses)]
+    s = _through_factors(b, lu, inverse)
     for i in range(buses):
         terms = [complex(values[q], values[count + q]) * s[MCOL[q]] for q in range(MROW[i], MROW[i + 1])]
-        if abs(sum(terms, -1)) > LARGEST_REST * sum(map(abs, terms), 1.0):
+        terms.append(-complex(b[PERM[i]], b[buses + PERM[i]]))
+        rest = sum(terms)
+        if fabs(rest.real) + fabs(rest.imag) > LARGEST_REST * sum(fabs(t.real) + fabs(t.imag) for t in terms):
             inverse = [complex(nan, nan)] * buses
     return lu, inverse
 

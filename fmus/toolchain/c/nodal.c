@@ -43,13 +43,17 @@ static void through_factors(const double *b, double *s) {
     }
 }
 
-/* Whether a trial solution leaves hardly anything over. A network that is not passive may need pivoting. */
+/* Whether a trial solution leaves hardly anything over. A network that is not passive may need pivoting. The currents
+   follow no pattern that the network could have as well. */
 static int accurate(const double *m) {
     static double b[2 * NB], s[2 * NB];
-    for (int i = 0; i < NB; ++i) b[i] = 1;
+    for (int i = 0; i < NB; ++i) {
+        b[i] = cos(i);
+        b[NB + i] = sin(i);
+    }
     through_factors(b, s);
     for (int i = 0; i < NB; ++i) {
-        double re = -1, im = 0, size = 1;
+        double re = -b[PERM[i]], im = -b[NB + PERM[i]], size = fabs(re) + fabs(im);
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) {
             const double a = m[q] * s[2 * MCOL[q]] - m[NM + q] * s[2 * MCOL[q] + 1];
             const double c = m[q] * s[2 * MCOL[q] + 1] + m[NM + q] * s[2 * MCOL[q]];
