@@ -38,7 +38,7 @@ def test_clear_modes_are_not_in_doubt():
     assert not any("short" in text or "doubtful" in text for text in modes.remarks)
 
 
-@pytest.mark.parametrize(("stop", "told"), [(2.5, True), (4.5, False)])
+@pytest.mark.parametrize(("stop", "told"), [(2.6, True), (4.5, False)])
 def test_a_window_needs_two_periods(stop, told):
     modes = found(lambda t: swing(t, 0.5, 5), stop=stop)
     assert ("periods of it" in doubts(modes, 0.5)) is told
