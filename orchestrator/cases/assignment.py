@@ -67,6 +67,7 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
         return  # done when the connections are made
     pattern, _, variable = key.partition(".")
     fitting = fnmatch.filter(draft.tables, pattern) if variable else []
+    fitting = [name for name in fitting if name not in draft.exchanged]
     having = [name for name in fitting if _has(draft, name, variable)]
     if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
         if fitting and not having:

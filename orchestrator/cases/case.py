@@ -17,7 +17,7 @@ from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
-from orchestrator.cases.schema import CaseTable, Value
+from orchestrator.cases.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
@@ -118,11 +118,23 @@ class Case(CaseDefinition):
         CaseError
             With every problem of the components and of the values.
         """
+        return {name: plan for name, (_, plan) in self.placed(scenario, overrides, parameters).items()}
+
+    def placed(
+        self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
+    ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
+        """The same with the table of each component, which says where it stands and what it is made of.
+
+        Raises
+        ------
+        CaseError
+            As `components_of`.
+        """
         preparer = self._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
         if problems := [*self.problems, *preparer.problems]:
             raise CaseError(str(self.path), problems)
-        return components
+        return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
 
     def _preparer(
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]

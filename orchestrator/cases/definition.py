@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import CaseTable, ScenarioTable
+from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
 from orchestrator.errors import Problem
 
 
@@ -33,6 +33,9 @@ class CaseDefinition:
         Folder of the file itself; that of an SSP is another one than ``directory``.
     parameter_files
         The parameter files that its scenarios name, as they were read with the case; text says why one cannot be read.
+    exchanged
+        Devices that take the place of the file's own, by component. Of parameter files, scenarios and the command line
+        no value reaches them: those were meant for the device that was there.
     """
 
     table: CaseTable
@@ -44,6 +47,7 @@ class CaseDefinition:
     trust_fmus: bool = False
     home: Path = field(default_factory=Path.cwd)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    exchanged: Mapping[str, ComponentTable] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -72,6 +72,8 @@ class Draft:
         The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
     misfits
         Components whose form the network cannot take, each with its model; what follows from that is not noted.
+    exchanged
+        Components whose device is another than the file's own, which no layer's value reaches.
     whole
         Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     """
@@ -97,6 +99,7 @@ class Draft:
     questions: list[Problem] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     misfits: dict[str, str] = field(default_factory=dict)
+    exchanged: frozenset[str] = frozenset()
     whole: bool = True
     _missed: set[tuple[str, str]] = field(default_factory=set)
 

@@ -132,7 +132,8 @@ class Preparer:
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)
-        draft.tables = {n: t for n, t in self._everything.items() if n not in scenario.remove}
+        draft.tables = {n: case.exchanged.get(n, t) for n, t in self._everything.items() if n not in scenario.remove}
+        draft.exchanged = frozenset(case.exchanged)
 
     @property
     def problems(self) -> list[Problem]:

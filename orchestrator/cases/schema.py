@@ -53,13 +53,16 @@ class SolverTable(Table):
 
 
 class ComponentTable(Table):
-    """An FMU file or a vendor's DLL, behind a binding or not, or a model of the catalogue, with its values."""
+    """An FMU file or a vendor's DLL, behind a binding or not, or a model of the catalogue, with its values; ``vendor``
+    is whose make it is.
+    """
 
     model: str | None = None
     fmu: str | None = None
     dll: str | None = None
     binding: str | None = None
     isolated: bool | None = None
+    vendor: str | None = Field(default=None, min_length=1)
     bus: str | None = None
     native: bool = False
     machine: str | None = None
