@@ -13,6 +13,9 @@ from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoi
 from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.executors import choose_executor
+from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
+from orchestrator.api.interactions import Interactions
+from orchestrator.api.interactions import compute as interacting
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
@@ -39,6 +42,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
+from orchestrator.interactions.request import InteractionsRequest
+from orchestrator.interactions.study import plan_interactions
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import CriticalRegion
@@ -344,6 +349,53 @@ class Case:
         question([planned.prepared])
         with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
             return screened(planned, executor, kept, report)
+
+    def interactions(
+        self,
+        request: InteractionsRequest | None = None,
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        step: Time | None = None,
+        parameters: Paths = (),
+        workers: int | None = 1,
+        folder: str | Path | None = None,
+        progress: bool = False,
+    ) -> Interactions:
+        """Who takes part in which mode, and which vendors' converters do not agree.
+
+        Parameters
+        ----------
+        request
+            Threshold, frequencies, stand-in, and what is swapped; the usual ones where None.
+        scenario
+            Its name; may be left out where the case has one only.
+        values, step, parameters
+            As for `scenario`.
+        workers, folder, progress
+            As for `sweep`.
+
+        Raises
+        ------
+        InputError
+            If a scenario, value or device cannot be used, or there are too many systems.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> found = gfor.load("infinite_bus").interactions(scenario="dip")
+        >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
+        [0.0, 0.0, 0.0]
+        """
+        kept = None if folder is None else _folder(folder)
+        executor = choose_executor(workers, None, INTERACTIONS_IMPORT)
+        planned = plan_interactions(
+            self.file, request or InteractionsRequest(), scenario, case_values(values), in_seconds(step, "step"),
+            parameter_files(parameters),
+        )  # fmt: skip
+        question([planned.prepared])
+        with shown_progress("Systems", shown=progress) as report, nullcontext() if kept is None else held(kept):
+            return interacting(planned, executor, kept, report)
 
     def design(
         self,

@@ -26,6 +26,7 @@ COMMANDS = {
     "steps": "the largest communication step within a given error, for each schedule",
     "sweep": "modes over a grid of parameters, followed from point to point",
     "sensitivities": "how each parameter of each FMU moves a mode",
+    "interactions": "modes that several vendors' converters share, and the pair that does not agree",
     "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
     "identify": "the modes in a recorded signal (matrix pencil)",
@@ -54,6 +55,7 @@ examples:
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
   gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
+  gfor interactions my_case.toml                 which vendors' converters do not agree with each other
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor steps two_area --error 0.001:0.1          the largest step for 1 mHz and 0.1 points of damping
   gfor compare results/two_area/gfor results/two_area/pod_p

@@ -1,0 +1,133 @@
+"""Interactions of several vendors' converters. `Case.interactions` makes them."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.api.show import page
+from orchestrator.interactions.judgement import Judgement
+from orchestrator.interactions.study import InteractionsPlan, InteractionsResult, run_interactions
+from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
+from orchestrator.interactions.words import sentences
+from orchestrator.late import Late
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport
+from orchestrator.points.store import POINTS, PointStore
+from orchestrator.safe_files import made_folder
+
+if TYPE_CHECKING:
+    import pandas as pd
+else:
+    pd = Late("pandas")
+
+WORKERS_IMPORT = ("orchestrator.interactions.worker",)
+"""Modules that a process of such a study imports once, before its first system."""
+
+
+class Interactions:
+    """Who takes part in which mode, and which vendors' converters do not agree. `Case.interactions` makes it.
+
+    Attributes
+    ----------
+    result
+        All systems.
+    judgement
+        What they come to.
+    """
+
+    def __init__(self, result: InteractionsResult) -> None:
+        self.result = result
+        self.judgement = Judgement(result)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether nothing grows in the system as it is; None where that is not known."""
+        return self.judgement.whole.stable
+
+    @property
+    def worst_pair(self) -> tuple[str, str] | None:
+        """The vendors whose joint damping falls most below that of each alone; None where none falls."""
+        worst = self.judgement.worst_pair
+        return None if worst is None else worst.vendors
+
+    @property
+    def worst_assignment(self) -> dict[str, str] | None:
+        """The device at each place where the system is damped least; None without a swap, or without a verdict."""
+        worst = self.judgement.worst_assignment
+        return None if worst is None else dict(zip(self.result.plan.swapped, worst[0].names, strict=True))
+
+    @property
+    def sentences(self) -> list[str]:
+        """What was found, the verdict on the system as it is first."""
+        return sentences(self.judgement)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is to be borne in mind, with the systems that it is of."""
+        return warnings_of(self.judgement)
+
+    def modes(self) -> pd.DataFrame:
+        """One row for each mode of the system as it is: figures, participation of each group, who shares it."""
+        return pd.DataFrame(mode_rows(self.judgement))
+
+    def pairs(self) -> pd.DataFrame:
+        """One row for each pair of vendors, the worst first."""
+        return pd.DataFrame(pair_rows(self.judgement))
+
+    def assignments(self) -> pd.DataFrame:
+        """One row for each assignment of devices to places, the worst first; empty without a swap."""
+        return pd.DataFrame(assignment_rows(self.judgement))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor interactions --json`` prints, as JSON's types."""
+        return as_json(self.judgement)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write tables, ``interactions.json`` and the page ``interactions.html``; give their paths.
+
+        Parameters
+        ----------
+        folder
+            Folder for the files; it is made where it is missing.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made.
+        """
+        from orchestrator.interactions.files import save  # noqa: PLC0415 - imports what only pages need
+
+        return save(self.judgement, made_folder(Path(folder)))
+
+    def __repr__(self) -> str:
+        plan = self.result.plan
+        return f"<Interactions of {', '.join(plan.vendors)} in {plan.case.name}>"
+
+    def _repr_html_(self) -> str:
+        return page(repr(self).strip("<>"), self.sentences, self.pairs())
+
+
+def compute(
+    planned: InteractionsPlan,
+    executor: Executor,
+    folder: str | Path | None = None,
+    report: CountReport = lambda done, total: None,
+) -> Interactions:
+    """Compute a planned study, as `Case.interactions` does; the executor is closed afterwards.
+
+    Parameters
+    ----------
+    planned
+        A checked study.
+    executor
+        Computes the systems.
+    folder
+        Folder whose subfolder ``points`` keeps them. Without a folder they are forgotten.
+    report
+        Called with the number of systems done and their total.
+    """
+    with TemporaryDirectory() as passing, closing(executor):
+        return Interactions(run_interactions(planned, executor, PointStore(Path(folder or passing) / POINTS), report))

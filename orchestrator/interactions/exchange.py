@@ -1,0 +1,164 @@
+"""A case with other devices at its converters' places, at the same operating point."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.power_flow import PowerFlow
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import AnalysisTable, ComponentTable, EventTable, GridEventBase, Value
+from orchestrator.errors import InputError
+from orchestrator.interactions.places import Place
+
+SAME_FLOW = 1e-6
+"""Largest difference of a bus voltage [pu] between two systems at the same operating point."""
+
+STAND_IN = "static_generation"
+"""The neutral device: the current of the operating point, which turns with the voltage, and no other dynamics."""
+
+_OF_PLACE = ("S_n", "P_0", "Q_0", "v_0", "theta_0", "f_n", "connected")
+"""Values that belong to the place and not to the device: rating, start values, frequency, breaker."""
+
+
+def stand_in_at(place: Place, model: str) -> ComponentTable:
+    """A model of the catalogue with its defaults, at a place.
+
+    Parameters
+    ----------
+    place
+        Where.
+    model
+        Its name.
+    """
+    return ComponentTable(model=model, bus=place.table.bus, parameters=_of_place(place))
+
+
+def vendors_device_at(place: Place, template: Place) -> ComponentTable:
+    """A vendor's device with its settings from another place, at a place.
+
+    Parameters
+    ----------
+    place
+        Where, which gives rating and operating point.
+    template
+        Where the vendor's device stands in the case.
+    """
+    own = settings_of(template)
+    return template.table.model_copy(
+        update={
+            "bus": place.table.bus,
+            "parameters": own | _of_place(place),
+            "inputs": dict(template.plan.inputs),
+        }
+    )
+
+
+def settings_of(place: Place) -> dict[str, Value]:
+    """The values of the device at a place that are its own and not the place's."""
+    return {name: value for name, value in place.plan.parameters.items() if name not in _OF_PLACE}
+
+
+def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]) -> ComponentTable:
+    """An FMU, a vendor's DLL or a device's file, at a place.
+
+    Parameters
+    ----------
+    place
+        Where, which gives rating and operating point.
+    file, binding
+        Of the device.
+    values
+        Of its own variables, by name.
+    """
+    if wrong := [name for name in values if name in _OF_PLACE]:
+        raise InputError(f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's")
+    return ComponentTable(
+        fmu=str(file.absolute()),
+        binding=None if binding is None else str(binding.absolute()),
+        bus=place.table.bus,
+        parameters={**values, **_of_place(place)},
+    )
+
+
+def _of_place(place: Place) -> dict[str, Value]:
+    """What the power flow reads of the device there: any device with these values gives the same power flow."""
+    plan = place.plan
+    known = plan.description.variables
+    found: dict[str, Value] = {name: plan.number(name) for name in ("S_n", "P_0")}
+    found |= {"Q_0": plan.number("Q_0")} if "Q_0" in plan.parameters else {"v_0": plan.number("v_0")}
+    if place.table.bus is None:  # no power flow computes the rest
+        found |= {name: plan.number(name) for name in ("Q_0", "v_0", "theta_0")}
+    if "f_n" in known and place.table.file is None:
+        found["f_n"] = plan.number("f_n")
+    if "connected" in plan.parameters:
+        found["connected"] = bool(plan.parameters["connected"])
+    return found
+
+
+def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
+    """The case with other devices; the same object where nothing is exchanged.
+
+    What may name a variable of a device that is gone is left out: names of modes, plots, and events but those of the
+    network, for which its FMU is made.
+
+    Parameters
+    ----------
+    case
+        The case.
+    exchanged
+        What takes the place of which component.
+    """
+    if not exchanged:
+        return case
+    table = case.table
+    scenarios = {
+        name: scenario if scenario.events is None else scenario.model_copy(update={"events": _kept(scenario.events)})
+        for name, scenario in table.scenarios.items()
+    }
+    changed = table.model_copy(
+        update={
+            "analysis": AnalysisTable(),
+            "plots": [],
+            "reference": None,
+            "events": _kept(table.events),
+            "scenarios": scenarios,
+            "solver": table.solver.model_copy(update={"record": ["*"]}),
+        }
+    )
+    return replace(case, table=changed, exchanged=dict(exchanged))
+
+
+def _kept(events: list[EventTable]) -> list[EventTable]:
+    return [event for event in events if isinstance(event, GridEventBase)]
+
+
+def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario) -> None:
+    """Refuse a system whose power flow is another one.
+
+    Parameters
+    ----------
+    wanted
+        Voltages of all buses [pu]; empty for a case without a power flow.
+    prepared
+        The system with other devices.
+
+    Raises
+    ------
+    InputError
+        If a voltage differs by more than `SAME_FLOW`.
+    """
+    found = voltages_of(prepared.power_flow)
+    apart = {bus: abs(found.get(bus, 0j) - voltage) for bus, voltage in wanted.items()}
+    worst = max(apart, key=lambda bus: apart[bus], default=None)
+    if worst is not None and not apart[worst] <= SAME_FLOW:
+        raise InputError(
+            f"with other devices the power flow is another one: the voltage of bus {worst!r} differs by "
+            f"{apart[worst]:.3g} pu, where {SAME_FLOW:g} is allowed; a device must take S_n, P_0 and Q_0 or v_0 as "
+            "they are given"
+        )
+
+
+def voltages_of(flow: PowerFlow | None) -> dict[str, complex]:
+    """Voltages of all buses [pu]; empty without a power flow."""
+    return {} if flow is None else dict(flow.voltages)

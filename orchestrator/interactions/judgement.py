@@ -1,0 +1,261 @@
+"""What a study of interactions says: the modes that vendors share, the worst pair, the worst assignment.
+
+A mode is one of interaction between two subsystems where both take part in it by more than a threshold: J. Beerten,
+S. D'Arco and J. A. Suul, "Identification and small-signal analysis of interaction modes in VSC MTDC systems", IEEE
+Trans. Power Delivery 31(2), 2016. The participation of a subsystem is the sum of its states' factors, and all of them
+sum to 1.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from orchestrator.interactions.exchange import settings_of
+from orchestrator.interactions.places import NOT_VENDORS, by_group, first_of
+from orchestrator.interactions.point import SharedMode, SystemRecord
+from orchestrator.interactions.study import InteractionsResult
+from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+
+SAME = 0.01
+"""A damping that falls by no more than this [points] is the same: what a perturbation leaves open."""
+
+
+@dataclass(frozen=True)
+class JudgedMode:
+    """A mode of the system as it is, with who takes part in it.
+
+    Attributes
+    ----------
+    groups
+        Participation of every group, largest first.
+    vendors
+        Vendors that take part by at least the threshold, largest first.
+    """
+
+    mode: SharedMode
+    groups: dict[str, float]
+    vendors: tuple[str, ...]
+
+    @property
+    def is_interaction(self) -> bool:
+        """Whether two vendors or more take part."""
+        return len(self.vendors) > 1
+
+
+@dataclass(frozen=True)
+class JudgedPair:
+    """Two vendors together, and each alone.
+
+    Attributes
+    ----------
+    vendors
+        Their names.
+    joint
+        The system with the converters of both.
+    alone
+        The system with those of each.
+    """
+
+    vendors: tuple[str, str]
+    joint: SystemRecord
+    alone: tuple[SystemRecord, SystemRecord]
+
+    @property
+    def fall(self) -> float | None:
+        """How far [points] the least damping of both lies below the lesser one of each alone; None if not known."""
+        joint, each = self.joint.least_damping, [one.least_damping for one in self.alone]
+        if joint is None or each[0] is None or each[1] is None:
+            return None
+        return min(each[0], each[1]) - joint
+
+    @property
+    def fights(self) -> bool | None:
+        """Whether both are stable alone and not together; None if a verdict that decides it is not known."""
+        verdicts = (*(one.stable for one in self.alone), self.joint.stable)
+        if verdicts[0] is False or verdicts[1] is False or verdicts[2] is True:
+            return False
+        return None if None in verdicts else True
+
+    @property
+    def is_known(self) -> bool:
+        """Whether all three systems have a verdict and a damping."""
+        return self.fall is not None and all(one.stable is not None for one in (self.joint, *self.alone))
+
+    @property
+    def text(self) -> str:
+        """``A + B``."""
+        return " + ".join(self.vendors)
+
+    def sentence(self) -> str:
+        """What the pair does, with figures."""
+        if self.fall is None or not self.is_known:
+            return f"{self.text}: not known: {self._missing()}"
+        joint, least = self.joint.least_damping, min(one.least_damping or 0.0 for one in self.alone)
+        figures = f"least damping {joint:.2f} % together, {least:.2f} % alone at worst"
+        if self.fights:
+            return f"{self.text}: UNSTABLE together, though stable alone; {figures}{_where(self.joint)}"
+        if self.joint.stable is False:
+            those = " and ".join(v for v, one in zip(self.vendors, self.alone, strict=True) if one.stable is False)
+            return f"{self.text}: UNSTABLE together, and {those} alone as well; {figures}{_where(self.joint)}"
+        word = "lower together" if self.fall > SAME else "no lower together"
+        return f"{self.text}: stable, {word}: {figures}{_where(self.joint)}"
+
+    def _missing(self) -> str:
+        systems = zip((self.text, *(f"{v} alone" for v in self.vendors)), (self.joint, *self.alone), strict=True)
+        return "; ".join(f"{name}: {why_unknown(one)}" for name, one in systems if _unknown(one))
+
+
+def _unknown(record: SystemRecord) -> bool:
+    return record.stable is None or record.least_damping is None
+
+
+def why_unknown(record: SystemRecord) -> str:
+    """Why a system has no verdict."""
+    return record.error or str(record.stability.get("reason") or "no verdict")
+
+
+def _where(record: SystemRecord) -> str:
+    critical = record.critical
+    return "" if critical is None else f", at {place_of(critical)}"
+
+
+def place_of(mode: SharedMode) -> str:
+    """The frequency of a mode in words."""
+    return f"{mode.frequency_hz:.4g} Hz" if mode.imag else "no oscillation"
+
+
+class Judgement:
+    """What a study's systems come to.
+
+    Attributes
+    ----------
+    modes
+        Of the system as it is, least damped first.
+    pairs
+        All pairs of vendors, the worst first; those of which something is not known come last.
+    """
+
+    def __init__(self, result: InteractionsResult) -> None:
+        self.result = result
+        self.modes = [self._judged(mode) for mode in self.whole.modes]
+        records = result.records
+        found = [
+            JudgedPair((a, b), record, (records[_alone(a)], records[_alone(b)]))
+            for name, record in records.items()
+            if name.kind is Kind.PAIR
+            for a, b in [name.names]
+        ]
+        self.pairs = sorted(found, key=lambda pair: (not pair.is_known, not pair.fights, -(pair.fall or 0.0)))
+
+    @property
+    def whole(self) -> SystemRecord:
+        """The system as the case has it."""
+        return self.result.records[WHOLE]
+
+    @property
+    def none(self) -> SystemRecord:
+        """The system with the stand-in at all places."""
+        return self.result.records[NONE]
+
+    @property
+    def alone(self) -> dict[str, SystemRecord]:
+        """By vendor: the system with its converters alone."""
+        return {vendor: self.result.records[_alone(vendor)] for vendor in self.result.plan.vendors}
+
+    @property
+    def interaction_modes(self) -> list[JudgedMode]:
+        """The modes in which two vendors or more take part."""
+        return [mode for mode in self.modes if mode.is_interaction]
+
+    @property
+    def worst_pair(self) -> JudgedPair | None:
+        """The known pair that is unstable though each is stable alone, else the one whose damping falls most.
+
+        None where none falls by more than `SAME`.
+        """
+        first = next((pair for pair in self.pairs if pair.is_known), None)
+        if first is None or first.fall is None:
+            return None
+        return first if first.fights or first.fall > SAME else None
+
+    @property
+    def unknown_pairs(self) -> list[JudgedPair]:
+        """Pairs of which something is not known."""
+        return [pair for pair in self.pairs if not pair.is_known]
+
+    @property
+    def assignments(self) -> list[tuple[SystemName, SystemRecord]]:
+        """All assignments, the worst first: unstable ones, then the least damped; those without a verdict come last."""
+        found = [(name, one) for name, one in self.result.records.items() if name.kind is Kind.ASSIGNMENT]
+        return sorted(found, key=_rank)
+
+    @property
+    def worst_assignment(self) -> tuple[SystemName, SystemRecord] | None:
+        """The worst of those that have a verdict; None where none has."""
+        return next(((name, one) for name, one in self.assignments if not _unknown(one)), None)
+
+    @property
+    def unknown_assignments(self) -> list[tuple[SystemName, SystemRecord]]:
+        """Assignments without a verdict."""
+        return [(name, one) for name, one in self.assignments if _unknown(one)]
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether no system of the study grows; None where one has no verdict and none grows."""
+        verdicts = [record.stable for record in self.result.records.values()]
+        return False if False in verdicts else None if None in verdicts else True
+
+    def participation(self, mode: SharedMode) -> dict[str, float]:
+        """Participation of every group in a mode of any system of the study."""
+        return by_group(mode.components, self.result.plan.groups)
+
+    def _judged(self, mode: SharedMode) -> JudgedMode:
+        groups = self.participation(mode)
+        threshold = self.result.plan.request.threshold
+        vendors = tuple(name for name, share in groups.items() if name not in NOT_VENDORS and share >= threshold)
+        return JudgedMode(mode, groups, vendors)
+
+
+def _alone(vendor: str) -> SystemName:
+    return SystemName(Kind.ALONE, (vendor,))
+
+
+def _rank(entry: tuple[SystemName, SystemRecord]) -> tuple[bool, bool, float]:
+    record = entry[1]
+    damping = record.least_damping
+    return _unknown(record), record.stable is not False, 0.0 if damping is None else damping
+
+
+def doubts_of(result: InteractionsResult) -> Sequence[str]:
+    """What is to be borne in mind of a study as a whole."""
+    plan, found = result.plan, []
+    whole = result.records[WHOLE]
+    if whole.identified:
+        found.append(
+            f"{', '.join(whole.identified)} was identified from outside: its share in a mode rests on the states of "
+            "the model that was fitted to it"
+        )
+    found += [f"the system {plan_text(plan.swapped, name)} was not computed: {record.error}"
+              for name, record in result.records.items() if record.error is not None]  # fmt: skip
+    if plan.swapped:
+        found += [
+            f"{vendor}'s converters have other settings at {name} than at {first.name}; where it is swapped to a place "
+            f"of another vendor it has those at {first.name}"
+            for vendor, first in first_of({name: plan.places[name] for name in plan.swapped}).items()
+            for name, place in plan.places.items()
+            if place.vendor == vendor and settings_of(place) != settings_of(first)
+        ]
+    none = result.records[NONE]
+    if none.stable is not True:
+        why = "is UNSTABLE" if none.stable is False else f"has no verdict ({why_unknown(none)})"
+        found.append(
+            f"the network with {plan.stand_in} at all places {why}: what is found of a vendor alone or of a pair may "
+            "come from the places of the others; give another model by --stand-in"
+        )
+    return tuple(dict.fromkeys(found))
+
+
+def plan_text(swapped: Sequence[str], name: SystemName) -> str:
+    """A system in words; of an assignment with the places: ``west: A, east: B``."""
+    if name.kind is not Kind.ASSIGNMENT:
+        return name.text
+    return ", ".join(f"{place}: {device}" for place, device in zip(swapped, name.names, strict=True))

@@ -1,0 +1,150 @@
+"""Whose converter stands where, and what each other component of a system is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.cases.schema import ComponentTable
+from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import InputError
+
+GENERATORS, GRID, OTHERS = "generators", "grid", "others"
+"""Groups of components that are nobody's converter. ``others`` are components without a port, such as a controller."""
+
+NOT_VENDORS = (GENERATORS, GRID, OTHERS)
+
+_IN, _OUT = ("v_re", "v_im"), ("i_re", "i_im")
+"""A device takes the voltage of its bus and gives its current."""
+
+_OF_MACHINES = "machine."
+"""Begin of a generator's variables."""
+
+_OF_THE_GRID = ("external_grid", "static_generation")
+"""Begins of models with a port that stand for a part of the network."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a converter stands.
+
+    Attributes
+    ----------
+    name
+        Of the component.
+    vendor
+        Whose converter it is.
+    table, plan
+        What the case says of the component, and its values before the power flow.
+    """
+
+    name: str
+    vendor: str
+    table: ComponentTable
+    plan: ComponentPlan
+
+
+def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], grid: str | None) -> dict[str, Place]:
+    """The converters of a scenario, by their component.
+
+    A converter's vendor is the ``vendor`` of its table, else the name of its file, else its model.
+
+    Parameters
+    ----------
+    components
+        Tables and values of all components.
+    grid
+        Name of the network's component, if the case names one.
+
+    Raises
+    ------
+    InputError
+        If a vendor has the name of a group that is nobody's converter.
+    """
+    found = {}
+    for name, (table, plan) in components.items():
+        if name == grid or not _is_converter(table, plan):
+            continue
+        vendor = table.vendor or (Path(table.file).stem if table.file is not None else table.model or "")
+        if vendor in NOT_VENDORS:
+            raise InputError(
+                f"components.{name}: its vendor is {vendor!r}, which is what a group of other components is called; "
+                "give another name by its key 'vendor'"
+            )
+        found[name] = Place(name, vendor, table, plan)
+    return found
+
+
+def _is_converter(table: ComponentTable, plan: ComponentPlan) -> bool:
+    if not _has_port(plan):
+        return False
+    if table.vendor is not None:
+        return True
+    if table.model is not None and table.model.startswith(_OF_THE_GRID):
+        return False
+    return not _is_machine(plan)
+
+
+def _has_port(plan: ComponentPlan) -> bool:
+    description = plan.description
+    return {*_IN} <= {*description.inputs} and {*_OUT} <= {*description.outputs}
+
+
+def _is_machine(plan: ComponentPlan) -> bool:
+    return any(name.startswith(_OF_MACHINES) for name in plan.description.variables)
+
+
+def groups_of(
+    components: Mapping[str, tuple[ComponentTable, ComponentPlan]], places: Mapping[str, Place], grid: str | None
+) -> dict[str, str]:
+    """The group of every component: its vendor, or what else it is.
+
+    Parameters
+    ----------
+    components
+        Tables and values of all components.
+    places
+        The converters among them.
+    grid
+        Name of the network's component, if the case names one.
+    """
+
+    def group(name: str, table: ComponentTable, plan: ComponentPlan) -> str:
+        if name in places:
+            return places[name].vendor
+        if _has_port(plan) and _is_machine(plan):
+            return GENERATORS
+        gives_voltage = {*_OUT} <= {*plan.description.inputs}
+        of_grid = table.model is not None and table.model.startswith(_OF_THE_GRID)
+        return GRID if name == grid or of_grid or gives_voltage else OTHERS
+
+    return {name: group(name, table, plan) for name, (table, plan) in components.items()}
+
+
+def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str, float]:
+    """The participation of every group in a mode, largest first; it sums to 1 as the components' does.
+
+    Parameters
+    ----------
+    shares
+        Of every component.
+    groups
+        Of every component; one that is not there counts to `OTHERS`.
+    """
+    found: dict[str, float] = {}
+    for name, share in shares.items():
+        group = groups.get(name, OTHERS)
+        found[group] = found.get(group, 0.0) + share
+    return dict(sorted(found.items(), key=lambda entry: -entry[1]))
+
+
+def vendors_of(places: Mapping[str, Place]) -> tuple[str, ...]:
+    """The vendors, in the order of their first places."""
+    return tuple(dict.fromkeys(place.vendor for place in places.values()))
+
+
+def first_of(places: Mapping[str, Place]) -> dict[str, Place]:
+    """The first place of every vendor."""
+    found: dict[str, Place] = {}
+    for place in places.values():
+        found.setdefault(place.vendor, place)
+    return found

@@ -1,0 +1,218 @@
+"""One system of a study of interactions: its task, and its modes with the participation of every component.
+
+Everything here can be sent to another process or another machine.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Self
+
+from orchestrator.analysis.linear_model import IDENTIFIED
+from orchestrator.analysis.modes import Mode, damping_percent
+from orchestrator.analysis.threads import alone
+from orchestrator.black_box.coupled_modes import modes_with_boxes
+from orchestrator.cases.case import Case
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.schema import ComponentTable
+from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
+from orchestrator.interactions.exchange import exchanged_case, require_same_flow
+from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.key import same_case
+from orchestrator.points.store import Arrays
+from orchestrator.study.modes import ModesResult, compute_modes, running
+
+
+@dataclass(frozen=True)
+class SystemTask:
+    """A scenario with the devices of one system.
+
+    Attributes
+    ----------
+    case, fingerprint, scenario, layers, step_size, frequency_range, trust_fmus
+        As in `orchestrator.sweep.point.SweepPointTask`.
+    exchanged
+        Tables of the devices that are other than the case's, by component, as their keys and values.
+    voltages
+        Real and imaginary part [pu] of every bus voltage of the power flow.
+    black_box
+        Whether components that hide their states are identified.
+    key
+        Name of the point's file.
+    """
+
+    case: str
+    fingerprint: str
+    scenario: str
+    layers: tuple[ParameterFile, ...]
+    step_size: float | None
+    frequency_range: tuple[float, float]
+    exchanged: dict[str, dict[str, Any]]
+    voltages: dict[str, tuple[float, float]]
+    black_box: bool
+    key: str
+    trust_fmus: bool = False
+
+
+@dataclass(frozen=True)
+class SharedMode:
+    """A mode with who takes part in it.
+
+    Attributes
+    ----------
+    real, imag
+        Of the eigenvalue [1/s, rad/s].
+    components
+        Participation of every component; the shares sum to 1.
+    """
+
+    real: float
+    imag: float
+    components: dict[str, float]
+
+    @classmethod
+    def of(cls, mode: Mode) -> Self:
+        """Of a mode of the linear model."""
+        return cls(mode.eigenvalue.real, mode.eigenvalue.imag, dict(mode.by_component))
+
+    @property
+    def eigenvalue(self) -> complex:
+        """λ [rad/s]."""
+        return complex(self.real, self.imag)
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ/2π."""
+        return self.imag / (2 * math.pi)
+
+    @property
+    def damping_percent(self) -> float:
+        """Damping ratio [%]."""
+        return damping_percent(self.eigenvalue)
+
+
+@dataclass(frozen=True)
+class SystemRecord:
+    """What was found of one system.
+
+    Attributes
+    ----------
+    modes
+        Oscillations of the range, least damped first.
+    growing
+        The mode that grows fastest, at any frequency; None where nothing is known to grow.
+    stability
+        The verdict over the whole spectrum, as `Stability.as_json` gives it; empty where it failed.
+    warnings
+        What is to be borne in mind of it.
+    identified
+        Components that hide their states and were identified.
+    states
+        Their number.
+    residual
+        Of the steady state, as in `OperatingPoint`.
+    error
+        Why there are no modes; None where there are.
+    lasting
+        Whether computing it again would give the same.
+    """
+
+    modes: tuple[SharedMode, ...] = ()
+    growing: SharedMode | None = None
+    stability: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    identified: tuple[str, ...] = ()
+    states: int = 0
+    residual: float = float("nan")
+    error: str | None = None
+    lasting: bool = True
+
+    @property
+    def stable(self) -> bool | None:
+        """The verdict; None where it is not known."""
+        found: bool | None = self.stability.get("stable")
+        return found
+
+    @property
+    def critical(self) -> SharedMode | None:
+        """The least damped of the modes of the range and of what grows anywhere; None where nothing swings or grows."""
+        candidates = [*self.modes, *([self.growing] if self.growing is not None else [])]
+        return min(candidates, key=lambda mode: mode.damping_percent, default=None)
+
+    @property
+    def least_damping(self) -> float | None:
+        """Damping [%] of the critical mode, 100 where nothing swings or grows; None where it was not computed."""
+        if self.error is not None:
+            return None
+        return 100.0 if self.critical is None else self.critical.damping_percent
+
+    @classmethod
+    def lost(cls, _: SystemTask, error: WorkerLostError) -> Self:
+        """The record of a system whose worker died."""
+        return cls(error=str(error), lasting=False)
+
+    def stored(self) -> tuple[dict[str, Any], Arrays]:
+        """Header for a `PointStore`; there are no arrays."""
+        return asdict(self), {}
+
+    @classmethod
+    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
+        """The record that was stored in this form; None if the file has another form."""
+        try:
+            growing = header["growing"]
+            lists = {name: tuple(header[name]) for name in ("warnings", "identified")}
+            modes = tuple(SharedMode(**mode) for mode in header["modes"])
+            own = lists | {"modes": modes, "growing": None if growing is None else SharedMode(**growing)}
+            return None if arrays else cls(**header | own)
+        except (KeyError, TypeError, ValueError):
+            return None
+
+
+def compute_system(task: SystemTask) -> SystemRecord:
+    """Prepare, compare the power flow, find the modes; a failure becomes a record as well.
+
+    Raises
+    ------
+    InputError
+        If this worker's case file or code differs from those that the study was started with.
+    """
+    case = same_case(task.case, task.fingerprint, task.trust_fmus)
+    with alone():
+        try:
+            return _record(_modes(case, task))
+        except CaseError as error:
+            of_fmu = isinstance(error.__cause__, ComponentError)  # which may start another time
+            return SystemRecord(error="; ".join(str(problem) for problem in error.problems), lasting=not of_fmu)
+        except CosimError as error:
+            return SystemRecord(error=str(error), lasting=isinstance(error, AnalysisError))
+        except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other systems
+            return SystemRecord(error=f"{type(error).__name__}: {error}", lasting=False)
+
+
+def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:
+    """The tables of a task's devices."""
+    return {name: ComponentTable.model_validate(values) for name, values in exchanged.items()}
+
+
+def _modes(case: Case, task: SystemTask) -> ModesResult:
+    changed = exchanged_case(case, tables_of(task.exchanged))
+    (prepared,) = changed.prepare([task.scenario], {}, task.step_size, None, task.layers)
+    require_same_flow({bus: complex(*parts) for bus, parts in task.voltages.items()}, prepared)
+    if not task.black_box:
+        return compute_modes(prepared, task.frequency_range)
+    with running(prepared) as master:
+        return modes_with_boxes(prepared, master, task.frequency_range)
+
+
+def _record(result: ModesResult) -> SystemRecord:
+    stability = result.stability
+    grows = stability.stable is False and stability.mode is not None
+    return SystemRecord(
+        modes=tuple(SharedMode.of(mode) for mode in result.modes if mode.is_oscillation),
+        growing=SharedMode.of(stability.mode) if grows and stability.mode is not None else None,
+        stability=stability.as_json(),
+        warnings=result.warnings,
+        identified=tuple(name for name, source in result.linearised.items() if source == IDENTIFIED),
+        states=result.model.number_of_states,
+        residual=result.operating_point.residual,
+    )

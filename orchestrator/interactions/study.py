@@ -1,0 +1,254 @@
+"""A study of interactions: its systems planned, and computed at the same operating point."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fmus.toolchain.catalogue import model_names
+from orchestrator.cases.case import Case
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import ComponentTable, Value
+from orchestrator.errors import CaseError, InputError, Problem
+from orchestrator.interactions.exchange import STAND_IN, exchanged_case, require_same_flow, voltages_of
+from orchestrator.interactions.places import Place, groups_of, places_of, vendors_of
+from orchestrator.interactions.point import SystemRecord, SystemTask, compute_system
+from orchestrator.interactions.request import InteractionsRequest
+from orchestrator.interactions.systems import Exchanged, Kind, SystemName, assignments, systems_of_vendors
+from orchestrator.points.executor import Executor
+from orchestrator.points.key import component_content, fingerprint, key_of, reference_to, scenario_content
+from orchestrator.points.points import CountReport, kept_or_computed
+from orchestrator.points.store import PointStore
+
+Placed = Mapping[str, tuple[ComponentTable, Any]]
+
+
+@dataclass(frozen=True)
+class InteractionsPlan:
+    """What a study computes.
+
+    Attributes
+    ----------
+    prepared
+        The scenario as it is.
+    layers
+        Parameter files, and after them the values of the command line; weakest first.
+    step_size
+        Communication step [s]; None for the case's.
+    places
+        The converters, by component.
+    groups
+        Group of every component: its vendor, or what else it is.
+    stand_in
+        Model at the places of the vendors that a system does without.
+    swapped
+        Places that are swapped; none without a swap.
+    systems
+        Devices that are other than the case's, of every system.
+    files
+        What stands for the files of such devices in keys, by model or file.
+    """
+
+    case: Case
+    prepared: PreparedScenario
+    layers: tuple[ParameterFile, ...]
+    step_size: float | None
+    request: InteractionsRequest
+    places: dict[str, Place]
+    groups: dict[str, str]
+    stand_in: str
+    swapped: tuple[str, ...]
+    systems: dict[SystemName, Exchanged]
+    files: dict[str, list[str]]
+
+    @property
+    def vendors(self) -> tuple[str, ...]:
+        """The vendors, in the order of their first places."""
+        return vendors_of(self.places)
+
+    def task(self, exchanged: Exchanged) -> SystemTask:
+        """The task of one system."""
+        tables = {name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()}
+        content = {
+            "case": self.case.text,
+            **scenario_content(self.prepared),
+            "layers": [list(layer.values.items()) for layer in self.layers],
+            "step": self.step_size,
+            "range": list(self.request.frequency_range),
+            "exchanged": tables,
+            "files": {name: self.files[_content_name(table)] for name, table in exchanged.items()},
+            "black_box": self.request.black_box,
+        }
+        voltages = {bus: (v.real, v.imag) for bus, v in voltages_of(self.prepared.power_flow).items()}
+        return SystemTask(
+            reference_to(self.case), fingerprint(self.case), self.prepared.name, self.layers, self.step_size,
+            self.request.frequency_range, tables, voltages, self.request.black_box, key_of(content),
+            self.case.trust_fmus,
+        )  # fmt: skip
+
+
+@dataclass
+class InteractionsResult:
+    """All systems of a study.
+
+    Attributes
+    ----------
+    computed, stored
+        Number of systems computed now, and number read from an earlier start. Systems of the same devices count once.
+    """
+
+    plan: InteractionsPlan
+    records: dict[SystemName, SystemRecord] = field(default_factory=dict)
+    computed: int = 0
+    stored: int = 0
+
+
+def plan_interactions(
+    case: Case,
+    request: InteractionsRequest,
+    scenario: str | None = None,
+    overrides: Mapping[str, Value] | None = None,
+    step_size: float | None = None,
+    parameters: Sequence[ParameterFile] = (),
+) -> InteractionsPlan:
+    """Check a study, and build the FMUs that it needs.
+
+    Parameters
+    ----------
+    case
+        The case.
+    request
+        What is studied.
+    scenario
+        Name of the scenario; None for the only one.
+    overrides
+        Values by ``component.variable``; they go before the parameter files.
+    step_size
+        Communication step [s]; the case's where None.
+    parameters
+        Parameter files; a later one goes before an earlier one.
+
+    Raises
+    ------
+    InputError
+        If the scenario, a place or a device is unknown, there are too many systems, or another device gives another
+        power flow.
+    """
+    name = _scenario(case, scenario)
+    (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
+    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
+    components = case.placed(name, {}, layers)
+    grid = None if case.table.power_flow is None else case.table.power_flow.grid
+    places = places_of(components, grid)
+    if not places:
+        raise InputError(
+            f"{case.path}: scenario {name!r} has no converter: no component with the inputs v_re, v_im and the outputs "
+            "i_re, i_im that is no generator; a converter of a make of its own is told by the key 'vendor' of its table"
+        )
+    stand_in = request.stand_in or (f"{STAND_IN}_phasor" if _of_phasors(prepared, places) else STAND_IN)
+    if stand_in not in model_names():
+        raise InputError(f"--stand-in {stand_in}: there is no such model; there are: {', '.join(model_names())}")
+    systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()
+    if request.swap:
+        swapped = _swapped(places, request.swapped)
+        systems |= assignments(places, swapped, request.devices)
+    files = _tried(case, prepared, layers, step_size, systems)
+    groups = groups_of(components, places, grid)
+    return InteractionsPlan(
+        case, prepared, layers, step_size, request, places, groups, stand_in, swapped, systems, files
+    )
+
+
+def run_interactions(
+    plan: InteractionsPlan,
+    executor: Executor,
+    store: PointStore,
+    report: CountReport = lambda done, total: None,
+) -> InteractionsResult:
+    """Compute the systems that are not stored yet; systems of the same devices are computed once.
+
+    Parameters
+    ----------
+    plan
+        A plan that `plan_interactions` has checked.
+    executor
+        Where they are computed.
+    store
+        Keeps every system as soon as it is computed.
+    report
+        Progress.
+    """
+    result = InteractionsResult(plan)
+    tasks: dict[str, SystemTask] = {}
+    named: dict[str, list[SystemName]] = {}
+    for name, exchanged in plan.systems.items():
+        task = plan.task(exchanged)
+        tasks[task.key] = task
+        named.setdefault(task.key, []).append(name)
+    wanted, found = list(tasks.values()), dict[SystemName, SystemRecord]()
+    for index, record, stored in kept_or_computed(SystemRecord, compute_system, wanted, executor, store, report):
+        found |= dict.fromkeys(named[wanted[index].key], record)
+        result.stored += stored
+        result.computed += not stored
+    result.records = {name: found[name] for name in plan.systems}
+    return result
+
+
+def _scenario(case: Case, wanted: str | None) -> str:
+    known = list(case.scenarios)
+    if wanted is None and len(known) > 1:
+        raise InputError(
+            f"{case.path}: the case has several scenarios, and interactions are those of one; choose it with "
+            f"--scenario: {', '.join(known)}"
+        )
+    return known[0] if wanted is None else wanted
+
+
+def _of_phasors(prepared: PreparedScenario, places: Mapping[str, Place]) -> bool:
+    """Whether the network takes an emf behind an admittance from its devices."""
+    return any(c.source.component in places and c.source.variable == "y_re" for c in prepared.system.connections)
+
+
+def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, ...]:
+    if unknown := [name for name in wanted if name not in places]:
+        raise InputError(
+            f"--place {unknown[0]}: no converter stands there; the places of converters are: {', '.join(places)}"
+        )
+    return tuple(dict.fromkeys(wanted)) or tuple(places)
+
+
+def _tried(
+    case: Case,
+    prepared: PreparedScenario,
+    layers: Sequence[ParameterFile],
+    step_size: float | None,
+    systems: Mapping[SystemName, Exchanged],
+) -> dict[str, list[str]]:
+    """Prepare one system for each device that is other than the case's: this finds what cannot stand there, and builds
+    its FMU. What stands for its file in keys, by `_content_name`.
+    """
+    voltages, files = voltages_of(prepared.power_flow), dict[str, list[str]]()
+    seen: set[tuple[str, str]] = set()
+    for name, exchanged in systems.items():
+        new = {(place, _content_name(table)) for place, table in exchanged.items()} - seen
+        if not new:
+            continue
+        seen |= new
+        try:
+            (changed,) = exchanged_case(case, exchanged).prepare([prepared.name], {}, step_size, None, layers)
+        except CaseError as error:
+            what = ", ".join(f"{_content_name(exchanged[place])} at {place}" for place in sorted({p for p, _ in new}))
+            head = "assignment" if name.kind is Kind.ASSIGNMENT else "stand-in"
+            raise CaseError(
+                str(case.path), [Problem(f"{head}: {what}", str(problem)) for problem in error.problems]
+            ) from error
+        require_same_flow(voltages, changed)
+        for place, table in exchanged.items():
+            files[_content_name(table)] = component_content(changed.system.components[place].description)
+    return files
+
+
+def _content_name(table: ComponentTable) -> str:
+    """What a device is made of, by its model, or its file and binding."""
+    return f"{table.model or table.file or ''}{'' if table.binding is None else f' ({table.binding})'}"

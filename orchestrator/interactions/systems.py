@@ -1,0 +1,142 @@
+"""The systems that a study of interactions compares, each by the devices that stand at its places."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations, product
+
+from orchestrator.cases.schema import ComponentTable
+from orchestrator.errors import InputError
+from orchestrator.interactions.exchange import file_at, stand_in_at, vendors_device_at
+from orchestrator.interactions.places import Place, first_of, vendors_of
+from orchestrator.interactions.request import GivenDevice
+
+MOST_ASSIGNMENTS = 64
+"""So many assignments of devices to places are computed at most: all of three devices at three places, with room."""
+
+MOST_VENDORS = 12
+"""So many vendors are compared at most: 66 pairs."""
+
+
+class Kind(StrEnum):
+    """What a system of a study is."""
+
+    WHOLE = "as in the case"
+    NONE = "no vendor"
+    ALONE = "alone"
+    PAIR = "pair"
+    ASSIGNMENT = "assignment"
+
+
+@dataclass(frozen=True)
+class SystemName:
+    """A system: of which vendors it has the converters, or which device stands at each of the places that are swapped.
+
+    Attributes
+    ----------
+    kind
+        What it is.
+    names
+        Its vendors; of an assignment the device at each place, in the order of the places.
+    """
+
+    kind: Kind
+    names: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """In words: ``A + B``, ``A alone``."""
+        match self.kind:
+            case Kind.ALONE:
+                return f"{self.names[0]} alone"
+            case Kind.PAIR | Kind.ASSIGNMENT:
+                return " + ".join(self.names)
+            case _:
+                return str(self.kind)
+
+
+WHOLE, NONE = SystemName(Kind.WHOLE), SystemName(Kind.NONE)
+
+Exchanged = dict[str, ComponentTable]
+"""What stands at a place in place of the case's own device, by component."""
+
+
+def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
+    """The case as it is, without any vendor, with each alone and with each pair.
+
+    Parameters
+    ----------
+    places
+        All converters.
+    model
+        What stands in at the places of the vendors that a system does without.
+
+    Raises
+    ------
+    InputError
+        If there are more than `MOST_VENDORS`.
+    """
+    vendors = vendors_of(places)
+    if len(vendors) > MOST_VENDORS:
+        count = len(vendors)
+        raise InputError(
+            f"the scenario has converters of {count} vendors, which make {count * (count - 1) // 2} pairs; at most {MOST_VENDORS} are compared: give converters of one make one name by the key 'vendor'"
+        )
+
+    def only(kept: tuple[str, ...]) -> Exchanged:
+        return {name: stand_in_at(place, model) for name, place in places.items() if place.vendor not in kept}
+
+    found = {WHOLE: Exchanged(), NONE: only(())}
+    found |= {SystemName(Kind.ALONE, (vendor,)): only((vendor,)) for vendor in vendors}
+    return found | {SystemName(Kind.PAIR, pair): only(pair) for pair in combinations(vendors, 2)}
+
+
+def assignments(
+    places: Mapping[str, Place], at: Sequence[str], given: Sequence[GivenDevice]
+) -> dict[SystemName, Exchanged]:
+    """Each device at each of some places, in all ways.
+
+    Parameters
+    ----------
+    places
+        All converters; those that are not swapped stay.
+    at
+        Names of the places that are swapped.
+    given
+        Devices beside those of the case.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to swap, two devices have one name, or there are more than `MOST_ASSIGNMENTS`.
+    """
+    templates = first_of({name: places[name] for name in at})
+    if twice := [device.name for device in given if device.name in templates]:
+        raise InputError(
+            f"--device {twice[0]}: a vendor of the case has this name already; give another one, as in NAME=FILE"
+        )
+    devices = [*templates, *(device.name for device in given)]
+    if len(devices) < 2:
+        raise InputError(
+            f"there is nothing to swap: the only device at {', '.join(at)} is of {devices[0]}; give others by --device"
+        )
+    count = len(devices) ** len(at)
+    if count > MOST_ASSIGNMENTS:
+        raise InputError(
+            f"{len(devices)} devices at {len(at)} places make {count} assignments, more than the {MOST_ASSIGNMENTS} "
+            f"that are computed; name fewer places by --place (there are: {', '.join(at)}), or give fewer devices"
+        )
+    files = {device.name: device for device in given}
+
+    def at_place(place: Place, device: str) -> ComponentTable | None:
+        if device in files:
+            one = files[device]
+            return file_at(place, one.file, one.binding, one.values)
+        return None if device == place.vendor else vendors_device_at(place, templates[device])
+
+    found = {}
+    for chosen in product(devices, repeat=len(at)):
+        tables = {name: at_place(places[name], device) for name, device in zip(at, chosen, strict=True)}
+        kept = {name: table for name, table in tables.items() if table is not None}
+        found[SystemName(Kind.ASSIGNMENT, chosen)] = kept
+    return found

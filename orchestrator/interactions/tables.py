@@ -1,0 +1,185 @@
+"""A study of interactions as tables for a terminal, as rows for files, and as JSON."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from orchestrator.interactions.judgement import JudgedMode, JudgedPair, Judgement, doubts_of, plan_text
+from orchestrator.interactions.places import by_group
+from orchestrator.interactions.point import SharedMode, SystemRecord
+from orchestrator.interactions.words import damping_text, frequency_text, verdict_word
+from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
+from orchestrator.results.mode_json import eigenvalue_json
+
+_LEAST_SHARE = 0.005
+
+
+def modes_table(judgement: Judgement) -> PlainTable:
+    """The modes of the system as it is, with the participation of every group."""
+    groups = groups_shown(judgement)
+    table = make_table("As in the case", "Mode [rad/s]", "f [Hz]", "Damping [%]", *groups, "Shared by", left=1)
+    for judged in judgement.modes:
+        mode = judged.mode
+        table.add_row(
+            eigenvalue_text(mode.eigenvalue),
+            f"{mode.frequency_hz:.4f}",
+            f"{mode.damping_percent:.2f}",
+            *(_share(judged.groups.get(group, 0.0)) for group in groups),
+            ", ".join(judged.vendors) if judged.is_interaction else "",
+        )
+    return table
+
+
+def groups_shown(judgement: Judgement) -> list[str]:
+    """The vendors, and then the other groups that the system has."""
+    plan = judgement.result.plan
+    return [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
+
+
+def _share(share: float) -> str:
+    return f"{share:.0%}" if share >= _LEAST_SHARE else ""
+
+
+def systems_table(judgement: Judgement) -> PlainTable:
+    """Nobody, each vendor alone, and each pair, at the same power flow."""
+    columns = ("System", "Verdict", "Least damping [%]", "Mode", "Falls by [points]")
+    table = make_table("Vendors alone and in pairs", *columns, left=2)
+    table.add_row("no vendor", *_figures(judgement.none), "")
+    for vendor, record in judgement.alone.items():
+        table.add_row(f"{vendor} alone", *_figures(record), "")
+    for pair in judgement.pairs:
+        table.add_row(pair.text, *_figures(pair.joint), "–" if pair.fall is None else f"{pair.fall:+.2f}")
+    return table
+
+
+def assignments_table(judgement: Judgement) -> PlainTable:
+    """All assignments, the worst first."""
+    swapped = judgement.result.plan.swapped
+    table = make_table(
+        "Each device at each place", *swapped, "Verdict", "Least damping [%]", "Mode", left=len(swapped) + 1
+    )
+    for name, record in judgement.assignments:
+        table.add_row(*name.names, *_figures(record))
+    return table
+
+
+def _figures(record: SystemRecord) -> tuple[str, str, str]:
+    return verdict_word(record), damping_text(record), frequency_text(record)
+
+
+def warnings_of(judgement: Judgement) -> list[str]:
+    """Doubts of the study, and the warnings of its systems, each once with the systems that have it."""
+    result = judgement.result
+    having: dict[str, list[str]] = {}
+    for name, record in result.records.items():
+        for text in record.warnings:
+            systems = having.setdefault(text, [])
+            if (called := plan_text(result.plan.swapped, name)) not in systems:
+                systems.append(called)
+    return [*doubts_of(result), *(f"{first_few(systems, str)}: {text}" for text, systems in having.items())]
+
+
+def mode_rows(judgement: Judgement) -> list[dict[str, Any]]:
+    """A row for each mode of the system as it is: figures, participation by group, and who shares it."""
+    groups = groups_shown(judgement)
+    return [
+        eigenvalue_json(judged.mode.eigenvalue, judged.mode.damping_percent)
+        | {f"share.{group}": judged.groups.get(group, 0.0) for group in groups}
+        | {"interaction": judged.is_interaction, "shared_by": ", ".join(judged.vendors)}
+        for judged in judgement.modes
+    ]
+
+
+def pair_rows(judgement: Judgement) -> list[dict[str, Any]]:
+    """A row for each pair, the worst first."""
+    return [_pair(pair) for pair in judgement.pairs]
+
+
+def _pair(pair: JudgedPair) -> dict[str, Any]:
+    each = zip(("first", "second"), pair.vendors, pair.alone, strict=True)
+    return {
+        "vendors": pair.text,
+        "stable": pair.joint.stable,
+        "least_damping_percent": pair.joint.least_damping,
+        "frequency_hz": None if pair.joint.critical is None else pair.joint.critical.frequency_hz,
+        "falls_by_points": pair.fall,
+        "unstable_though_stable_alone": pair.fights,
+        **{f"{which}_alone_{key}": value for which, _, record in each
+           for key, value in (("stable", record.stable), ("damping_percent", record.least_damping))},
+    }  # fmt: skip
+
+
+def assignment_rows(judgement: Judgement) -> list[dict[str, Any]]:
+    """A row for each assignment, the worst first."""
+    swapped = judgement.result.plan.swapped
+    return [
+        {f"at.{place}": device for place, device in zip(swapped, name.names, strict=True)}
+        | {
+            "stable": record.stable,
+            "least_damping_percent": record.least_damping,
+            "frequency_hz": None if record.critical is None else record.critical.frequency_hz,
+        }
+        for name, record in judgement.assignments
+    ]
+
+
+def as_json(judgement: Judgement) -> dict[str, Any]:
+    """All of it as JSON's types."""
+    plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
+    groups = plan.groups
+    found: dict[str, Any] = {
+        "case": plan.case.name,
+        "scenario": plan.prepared.name,
+        "stand_in": plan.stand_in,
+        "threshold_percent": 100 * plan.request.threshold,
+        "range_hz": list(plan.request.frequency_range),
+        "vendors": list(plan.vendors),
+        "places": {name: place.vendor for name, place in plan.places.items()},
+        "groups": groups,
+        "as_in_the_case": _system(judgement.whole, groups),
+        "interaction_modes": [_shared(judged) for judged in judgement.interaction_modes],
+        "no_vendor": _system(judgement.none, groups),
+        "alone": {vendor: _system(record, groups) for vendor, record in judgement.alone.items()},
+        "pairs": [
+            _pair(pair) | {"vendors": list(pair.vendors), "sentence": pair.sentence()} | _system(pair.joint, groups)
+            for pair in judgement.pairs
+        ],
+        "worst_pair": None if worst is None else list(worst.vendors),
+        "unknown_pairs": [list(pair.vendors) for pair in judgement.unknown_pairs],
+    }
+    if plan.swapped:
+        found["assignments"] = [
+            {"at": dict(zip(plan.swapped, name.names, strict=True))} | _system(record, groups, modes=False)
+            for name, record in judgement.assignments
+        ]
+        found["worst_assignment"] = None if swap is None else dict(zip(plan.swapped, swap[0].names, strict=True))
+    return found | {"warnings": warnings_of(judgement)}
+
+
+def _shared(judged: JudgedMode) -> dict[str, Any]:
+    mode = judged.mode
+    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"vendors": list(judged.vendors)}
+
+
+def _system(record: SystemRecord, groups: dict[str, str], *, modes: bool = True) -> dict[str, Any]:
+    critical = record.critical
+    found: dict[str, Any] = {
+        "stable": record.stable,
+        "stability": record.stability,
+        "least_damping_percent": record.least_damping,
+        "critical": None if critical is None else eigenvalue_json(critical.eigenvalue, critical.damping_percent),
+        "error": record.error,
+    }
+    return found | ({"modes": [_mode(mode, groups) for mode in record.modes]} if modes else {})
+
+
+def _mode(mode: SharedMode, groups: dict[str, str]) -> dict[str, Any]:
+    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {
+        "groups": by_group(mode.components, groups),
+        "components": mode.components,
+    }
+
+
+def largest_shares(shares: dict[str, float], count: int = 3) -> str:
+    """The groups that take part most."""
+    entries: Sequence[tuple[str, float]] = list(shares.items())[:count]
+    return ", ".join(map(share_text, entries))
