@@ -1,14 +1,17 @@
-"""Static generation: the current of the operating point, which turns with the bus voltage behind a lag.
+"""Static generation: the current of the operating point, which turns with the bus voltage.
 
-It is what a negative load is in the network's own models, as a device with a port. In steady state magnitude and power
-factor of the current are constant, so that nothing holds the angle of the grid. Above 1/τ the current does not move at
-all: an admittance of zero, neither damping nor the negative conductance of a constant power.
+It is what a negative load is in the network's own models, as a device with a port. The current follows the voltage's
+angle as a phase-locked loop would, (2ω_0·s + ω_0²)/(s + ω_0)². For swings that is 1 − s²/ω_0²: without a lag, which
+would be a damping torque. Well above ω_0 the current stands still: an admittance of zero, neither damping nor the
+negative conductance of a constant power.
 """
+
+from dataclasses import dataclass
 
 import casadi as ca
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
-from fmus.toolchain.frames import Phasor
+from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, phasor_builder
@@ -17,23 +20,42 @@ from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes."""
 
-LAG = 1e-2
-"""Default of τ [s]: 16 Hz, above electromechanical modes, which it follows, and below the resonances of networks."""
+F_0 = 10.0
+"""Default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below resonances of networks."""
 
 LEAST_VOLTAGE = 0.05
 """Voltage [pu] below which the current shrinks with it: at zero it has no angle to turn with."""
+
+
+@dataclass(frozen=True)
+class Following:
+    """The current into the bus [pu, S_n], and its rate per ω_0 at which it goes on turning [pu]."""
+
+    current: Phasor
+    turning: Phasor
+    omega_0: ca.SX
+
+    def rate(self, port: DevicePort, v: Phasor) -> Phasor:
+        """di/dt [pu/s] at a bus voltage [pu]."""
+        return (_wanted(port, v) - self.current) * (2 * self.omega_0) + self.turning * self.omega_0
+
+    def follow(self, m: ModelBuilder, port: DevicePort, v: Phasor) -> None:
+        """Give the equations at a bus voltage [pu]; behind an open breaker the current fades."""
+        rate = port.through_breaker(self.rate(port, v), self.current * (-1 / BREAKER_TIME))
+        error = (_wanted(port, v) - self.current) * self.omega_0
+        turning = port.through_breaker(error, self.turning * (-1 / BREAKER_TIME))
+        for state, its in ((self.current, rate), (self.turning, turning)):
+            m.derivative(ca.SX(state.re), its.re)
+            m.derivative(ca.SX(state.im), its.im)
 
 
 def static_generation() -> Model:
     """The device, EMT type."""
     m = ModelBuilder("static_generation", "Static generation: a constant current at a constant power factor (EMT type)")
     port = device_port(m, S_n=S_N, P_0=P_0)
-    tau = _declare_lag(m)
-    i = _declare_current(m, port)
-    rate = port.through_breaker((_wanted(port, port.v) - i) / tau, i * (-1 / BREAKER_TIME))
-    m.derivative(ca.SX(i.re), rate.re)
-    m.derivative(ca.SX(i.im), rate.im)
-    declare_port_outputs(m, port, i)
+    following = _declare_current(m, port)
+    following.follow(m, port, port.v)
+    declare_port_outputs(m, port, following.current)
     return m.build()
 
 
@@ -43,33 +65,36 @@ def static_generation_phasor() -> Model:
         "static_generation_phasor", "Static generation: a constant current at a constant power factor (phasor type)"
     )
     port = device_port(m, S_n=S_N, P_0=P_0)
-    tau = _declare_lag(m)
-    X = m.parameter("X", 0.15, "pu", "Reactance of the port, across which the current is fed", base="S_n", minimum=0.01)
+    X = m.parameter("X", 0.5, "pu", "Reactance of the port, across which the current is fed", base="S_n", minimum=0.01)
     Z = Phasor(0.0, X)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)
-    i = _declare_current(m, port)
-    rate = (_wanted(port, seen.value) - i) / tau
+    following = _declare_current(m, port)
     seen.follow(m, port.v)
-    m.derivative(ca.SX(i.re), rate.re)
-    m.derivative(ca.SX(i.im), rate.im)
+    following.follow(m, port, seen.value)
+    moving = following.rate(port, seen.value)
 
     def emf(time: ca.SX) -> Phasor:
-        return seen.after(time) + Z * (i + rate * time)
+        return seen.after(time) + Z * (following.current + moving * time)
 
     declare_phasor_outputs(m, port, SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next)), Z)
     return m.build()
 
 
-def _declare_lag(m: ModelBuilder) -> ca.SX:
-    return m.parameter("tau", LAG, "s", "Lag with which the current turns with the bus voltage", minimum=1e-3)
-
-
-def _declare_current(m: ModelBuilder, port: DevicePort) -> Phasor:
-    return Phasor(
-        m.state("i_x", port.i_0.re, "pu", "Current into the bus, real part", base="S_n"),
-        m.state("i_y", port.i_0.im, "pu", "Current into the bus, imaginary part", base="S_n"),
+def _declare_current(m: ModelBuilder, port: DevicePort) -> Following:
+    f_0 = m.parameter("f_0", F_0, "Hz", "Natural frequency with which the current follows the voltage's angle",
+                      minimum=0.1, maximum=50.0)  # fmt: skip
+    current, turning = (
+        Phasor(
+            m.state(f"{name}_x", start.re, "pu", f"{text}, real part", base="S_n"),
+            m.state(f"{name}_y", start.im, "pu", f"{text}, imaginary part", base="S_n"),
+        )
+        for name, start, text in (
+            ("i", port.i_0, "Current into the bus"),
+            ("turning", ZERO, "Rate at which the current goes on turning, per ω_0"),
+        )
     )
+    return Following(current, turning, 2 * ca.pi * f_0)
 
 
 def _wanted(port: DevicePort, v: Phasor) -> Phasor:

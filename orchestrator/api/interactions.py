@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.api.show import page
-from orchestrator.interactions.judgement import Judgement
+from orchestrator.interactions.judgement import JudgedInteractions
 from orchestrator.interactions.study import InteractionsPlan, InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
@@ -40,7 +40,7 @@ class Interactions:
 
     def __init__(self, result: InteractionsResult) -> None:
         self.result = result
-        self.judgement = Judgement(result)
+        self.judgement = JudgedInteractions(result)
 
     @property
     def stable(self) -> bool | None:
@@ -57,7 +57,7 @@ class Interactions:
     def worst_assignment(self) -> dict[str, str] | None:
         """The device at each place where the system is damped least; None without a swap, or without a verdict."""
         worst = self.judgement.worst_assignment
-        return None if worst is None else dict(zip(self.result.plan.swapped, worst[0].names, strict=True))
+        return None if worst is None else dict(zip(self.result.plan.swapped, worst.name.names, strict=True))
 
     @property
     def sentences(self) -> list[str]:

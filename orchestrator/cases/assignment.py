@@ -66,11 +66,11 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     if sets_imperfection(key):
         return  # done when the connections are made
     pattern, _, variable = key.partition(".")
-    fitting = fnmatch.filter(draft.tables, pattern) if variable else []
-    fitting = [name for name in fitting if name not in draft.exchanged]
+    meant = fnmatch.filter(draft.tables, pattern) if variable else []
+    fitting = [name for name in meant if name not in draft.exchanged]
     having = [name for name in fitting if _has(draft, name, variable)]
     if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
-        if fitting and not having:
+        if fitting == meant and fitting and not having:
             settable = {v for name in fitting for v in _settable(draft, name)}
             hint = close_names(variable, settable, f"{', '.join(fitting[:5])} are what fits the pattern")
             draft.note(where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}")

@@ -10,7 +10,7 @@ from rich.markup import escape
 from orchestrator.api.interactions import WORKERS_IMPORT, Interactions, compute
 from orchestrator.cases.case import load_case
 from orchestrator.certification.devices import devices_of
-from orchestrator.cli.arguments import frequency_range, percent
+from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     parser.add_argument(
         "--threshold",
-        type=percent,
+        type=_share,
         default=THRESHOLD,
         metavar="PERCENT",
         help="share of a mode from which on a vendor takes part in it (default: 5)",
@@ -97,8 +97,19 @@ def run(options: argparse.Namespace) -> int:
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
         found = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
         _present(found, folder, console, as_json=options.json)
-    failed = found.judgement.whole.error is not None
+    failed = found.judgement.whole.record.error is not None
     return int(failed or (options.fail_unstable and not found.judgement.stable))
+
+
+def _share(text: str) -> float:
+    """A share of a mode [%], as a ratio; a bare number below 1 looks like a ratio and is refused."""
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = float("nan")
+    if not 0 < number <= 50 or (number < 1 and not text.endswith("%")):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a share in percent up to 50, such as 5 (or 0.5% below 1)")
+    return number / 100
 
 
 def _request(options: argparse.Namespace) -> InteractionsRequest:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestrator.interactions.judgement import Judgement
+from orchestrator.interactions.judgement import JudgedInteractions
 from orchestrator.interactions.report import write_page
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows
 from orchestrator.results.staging import new_run_id, staged
@@ -12,7 +12,7 @@ MODES, PAIRS, ASSIGNMENTS = "modes.csv", "pairs.csv", "assignments.csv"
 SUMMARY, PAGE = "interactions.json", "interactions.html"
 
 
-def save(judgement: Judgement, folder: Path) -> list[Path]:
+def save(judgement: JudgedInteractions, folder: Path) -> list[Path]:
     """Write all files of a study into a folder, and give their paths.
 
     Parameters

@@ -19,6 +19,10 @@ SAME = 0.01
 """A damping that falls by no more than this [points] is the same: what a perturbation leaves open."""
 
 
+_HIDES = "--black-box"
+"""In the reason why a component that hides its states cannot be linearised."""
+
+
 @dataclass(frozen=True)
 class JudgedMode:
     """A mode of the system as it is, with who takes part in it.
@@ -42,6 +46,65 @@ class JudgedMode:
 
 
 @dataclass(frozen=True)
+class JudgedSystem:
+    """A system with the modes that count for its converters.
+
+    A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
+    damped. A mode that grows counts in any case.
+
+    Attributes
+    ----------
+    name
+        Of the system.
+    record
+        What was found of it.
+    converters
+        Components that are converters of vendors, and no stand-ins.
+    threshold
+        Share that they have together in a mode that counts.
+    """
+
+    name: SystemName
+    record: SystemRecord
+    converters: frozenset[str]
+    threshold: float
+
+    @property
+    def stable(self) -> bool | None:
+        """The verdict over the whole spectrum; None where it is not known."""
+        return self.record.stable
+
+    @property
+    def critical(self) -> SharedMode | None:
+        """The least damped of the modes that count; None where none does. Without any converter all modes count."""
+        counting = [mode for mode in self.record.modes if self._share(mode) >= self.threshold]
+        growing = [] if self.record.growing is None else [self.record.growing]
+        return min([*counting, *growing], key=lambda mode: mode.damping_percent, default=None)
+
+    @property
+    def least_damping(self) -> float | None:
+        """Damping [%] of the critical mode, 100 where none counts; None where the system was not computed."""
+        if self.record.error is not None:
+            return None
+        return 100.0 if self.critical is None else self.critical.damping_percent
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a verdict and a damping."""
+        return self.stable is not None and self.least_damping is not None
+
+    @property
+    def why_unknown(self) -> str:
+        """Why there is no verdict."""
+        return self.record.error or str(self.record.stability.get("reason") or "no verdict")
+
+    def _share(self, mode: SharedMode) -> float:
+        if not self.converters:
+            return 1.0
+        return sum(share for name, share in mode.components.items() if name in self.converters)
+
+
+@dataclass(frozen=True)
 class JudgedPair:
     """Two vendors together, and each alone.
 
@@ -56,8 +119,8 @@ class JudgedPair:
     """
 
     vendors: tuple[str, str]
-    joint: SystemRecord
-    alone: tuple[SystemRecord, SystemRecord]
+    joint: JudgedSystem
+    alone: tuple[JudgedSystem, JudgedSystem]
 
     @property
     def fall(self) -> float | None:
@@ -78,7 +141,7 @@ class JudgedPair:
     @property
     def is_known(self) -> bool:
         """Whether all three systems have a verdict and a damping."""
-        return self.fall is not None and all(one.stable is not None for one in (self.joint, *self.alone))
+        return all(one.is_known for one in (self.joint, *self.alone))
 
     @property
     def text(self) -> str:
@@ -101,20 +164,11 @@ class JudgedPair:
 
     def _missing(self) -> str:
         systems = zip((self.text, *(f"{v} alone" for v in self.vendors)), (self.joint, *self.alone), strict=True)
-        return "; ".join(f"{name}: {why_unknown(one)}" for name, one in systems if _unknown(one))
+        return "; ".join(f"{name}: {one.why_unknown}" for name, one in systems if not one.is_known)
 
 
-def _unknown(record: SystemRecord) -> bool:
-    return record.stable is None or record.least_damping is None
-
-
-def why_unknown(record: SystemRecord) -> str:
-    """Why a system has no verdict."""
-    return record.error or str(record.stability.get("reason") or "no verdict")
-
-
-def _where(record: SystemRecord) -> str:
-    critical = record.critical
+def _where(system: JudgedSystem) -> str:
+    critical = system.critical
     return "" if critical is None else f", at {place_of(critical)}"
 
 
@@ -123,11 +177,15 @@ def place_of(mode: SharedMode) -> str:
     return f"{mode.frequency_hz:.4g} Hz" if mode.imag else "no oscillation"
 
 
-class Judgement:
+class JudgedInteractions:
     """What a study's systems come to.
 
     Attributes
     ----------
+    result
+        All systems.
+    systems
+        The same, with the modes that count for their converters.
     modes
         Of the system as it is, least damped first.
     pairs
@@ -136,30 +194,35 @@ class Judgement:
 
     def __init__(self, result: InteractionsResult) -> None:
         self.result = result
-        self.modes = [self._judged(mode) for mode in self.whole.modes]
-        records = result.records
+        plan = result.plan
+        self.systems = {
+            name: JudgedSystem(name, record, plan.converters(name), plan.request.threshold)
+            for name, record in result.records.items()
+        }
+        self.modes = [self._judged(mode) for mode in self.whole.record.modes]
+        alone = self.alone
         found = [
-            JudgedPair((a, b), record, (records[_alone(a)], records[_alone(b)]))
-            for name, record in records.items()
+            JudgedPair((a, b), system, (alone[a], alone[b]))
+            for name, system in self.systems.items()
             if name.kind is Kind.PAIR
             for a, b in [name.names]
         ]
-        self.pairs = sorted(found, key=lambda pair: (not pair.is_known, not pair.fights, -(pair.fall or 0.0)))
+        self.pairs = sorted(found, key=_rank)
 
     @property
-    def whole(self) -> SystemRecord:
+    def whole(self) -> JudgedSystem:
         """The system as the case has it."""
-        return self.result.records[WHOLE]
+        return self.systems[WHOLE]
 
     @property
-    def none(self) -> SystemRecord:
+    def none(self) -> JudgedSystem:
         """The system with the stand-in at all places."""
-        return self.result.records[NONE]
+        return self.systems[NONE]
 
     @property
-    def alone(self) -> dict[str, SystemRecord]:
+    def alone(self) -> dict[str, JudgedSystem]:
         """By vendor: the system with its converters alone."""
-        return {vendor: self.result.records[_alone(vendor)] for vendor in self.result.plan.vendors}
+        return {vendor: self.systems[SystemName(Kind.ALONE, (vendor,))] for vendor in self.result.plan.vendors}
 
     @property
     def interaction_modes(self) -> list[JudgedMode]:
@@ -183,20 +246,20 @@ class Judgement:
         return [pair for pair in self.pairs if not pair.is_known]
 
     @property
-    def assignments(self) -> list[tuple[SystemName, SystemRecord]]:
+    def assignments(self) -> list[JudgedSystem]:
         """All assignments, the worst first: unstable ones, then the least damped; those without a verdict come last."""
-        found = [(name, one) for name, one in self.result.records.items() if name.kind is Kind.ASSIGNMENT]
-        return sorted(found, key=_rank)
+        found = [system for name, system in self.systems.items() if name.kind is Kind.ASSIGNMENT]
+        return sorted(found, key=lambda one: (not one.is_known, one.stable is not False, one.least_damping or 0.0))
 
     @property
-    def worst_assignment(self) -> tuple[SystemName, SystemRecord] | None:
+    def worst_assignment(self) -> JudgedSystem | None:
         """The worst of those that have a verdict; None where none has."""
-        return next(((name, one) for name, one in self.assignments if not _unknown(one)), None)
+        return next((one for one in self.assignments if one.is_known), None)
 
     @property
-    def unknown_assignments(self) -> list[tuple[SystemName, SystemRecord]]:
+    def unknown_assignments(self) -> list[JudgedSystem]:
         """Assignments without a verdict."""
-        return [(name, one) for name, one in self.assignments if _unknown(one)]
+        return [one for one in self.assignments if not one.is_known]
 
     @property
     def stable(self) -> bool | None:
@@ -215,27 +278,27 @@ class Judgement:
         return JudgedMode(mode, groups, vendors)
 
 
-def _alone(vendor: str) -> SystemName:
-    return SystemName(Kind.ALONE, (vendor,))
+def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
+    known = pair.is_known and pair.fall is not None
+    return not known, not (known and pair.fights), -(pair.fall or 0.0) if known else 0.0
 
 
-def _rank(entry: tuple[SystemName, SystemRecord]) -> tuple[bool, bool, float]:
-    record = entry[1]
-    damping = record.least_damping
-    return _unknown(record), record.stable is not False, 0.0 if damping is None else damping
-
-
-def doubts_of(result: InteractionsResult) -> Sequence[str]:
+def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
     """What is to be borne in mind of a study as a whole."""
-    plan, found = result.plan, []
-    whole = result.records[WHOLE]
+    result, found = judgement.result, []
+    plan, whole = result.plan, judgement.whole.record
     if whole.identified:
         found.append(
             f"{', '.join(whole.identified)} was identified from outside: its share in a mode rests on the states of "
             "the model that was fitted to it"
         )
-    found += [f"the system {plan_text(plan.swapped, name)} was not computed: {record.error}"
-              for name, record in result.records.items() if record.error is not None]  # fmt: skip
+    found += [
+        f"the system {plan_text(plan.swapped, name)} was not computed: {record.error}"
+        for name, record in result.records.items()
+        if record.error is not None
+    ]
+    if not plan.request.black_box and any(_HIDES in (record.error or "") for record in result.records.values()):
+        found.append("here too --black-box identifies the components that hide their states")
     if plan.swapped:
         found += [
             f"{vendor}'s converters have other settings at {name} than at {first.name}; where it is swapped to a place "
@@ -244,9 +307,9 @@ def doubts_of(result: InteractionsResult) -> Sequence[str]:
             for name, place in plan.places.items()
             if place.vendor == vendor and settings_of(place) != settings_of(first)
         ]
-    none = result.records[NONE]
+    none = judgement.none
     if none.stable is not True:
-        why = "is UNSTABLE" if none.stable is False else f"has no verdict ({why_unknown(none)})"
+        why = "is UNSTABLE" if none.stable is False else f"has no verdict ({none.why_unknown})"
         found.append(
             f"the network with {plan.stand_in} at all places {why}: what is found of a vendor alone or of a pair may "
             "come from the places of the others; give another model by --stand-in"

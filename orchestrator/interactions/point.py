@@ -133,19 +133,6 @@ class SystemRecord:
         found: bool | None = self.stability.get("stable")
         return found
 
-    @property
-    def critical(self) -> SharedMode | None:
-        """The least damped of the modes of the range and of what grows anywhere; None where nothing swings or grows."""
-        candidates = [*self.modes, *([self.growing] if self.growing is not None else [])]
-        return min(candidates, key=lambda mode: mode.damping_percent, default=None)
-
-    @property
-    def least_damping(self) -> float | None:
-        """Damping [%] of the critical mode, 100 where nothing swings or grows; None where it was not computed."""
-        if self.error is not None:
-            return None
-        return 100.0 if self.critical is None else self.critical.damping_percent
-
     @classmethod
     def lost(cls, _: SystemTask, error: WorkerLostError) -> Self:
         """The record of a system whose worker died."""

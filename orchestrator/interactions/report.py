@@ -3,8 +3,7 @@
 from html import escape
 from pathlib import Path
 
-from orchestrator.interactions.judgement import Judgement
-from orchestrator.interactions.point import SystemRecord
+from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem
 from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.tables import groups_shown, warnings_of
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
@@ -18,7 +17,7 @@ _FULL = 20.0
 """Damping [%] with the full colour of good ones; −20 % has that of bad ones."""
 
 
-def write_page(judgement: Judgement, path: Path) -> None:
+def write_page(judgement: JudgedInteractions, path: Path) -> None:
     """Write the page as one file that needs no other.
 
     Parameters
@@ -44,7 +43,7 @@ def write_page(judgement: Judgement, path: Path) -> None:
     write_text(path, document(title, kind, findings, content))
 
 
-def _modes(judgement: Judgement) -> str:
+def _modes(judgement: JudgedInteractions) -> str:
     groups = groups_shown(judgement)
     rows = [
         [
@@ -60,13 +59,13 @@ def _modes(judgement: Judgement) -> str:
     return table("Modes of the system as it is, with the participation of each vendor", columns, rows)
 
 
-def _pairs(judgement: Judgement, figures: Figures) -> str:
-    vendors, records = judgement.result.plan.vendors, judgement.result.records
+def _pairs(judgement: JudgedInteractions, figures: Figures) -> str:
+    vendors, systems = judgement.result.plan.vendors, judgement.systems
 
-    def at(row: int, column: int) -> SystemRecord:
+    def at(row: int, column: int) -> JudgedSystem:
         a, b = sorted((row, column))
         name = SystemName(Kind.ALONE, (vendors[a],)) if a == b else SystemName(Kind.PAIR, (vendors[a], vendors[b]))
-        return records[name]
+        return systems[name]
 
     cells = [[at(row, column) for column in range(len(vendors))] for row in range(len(vendors))]
     picture = heat_picture("Least damping of vendors alone and in pairs", vendors, vendors, cells)
@@ -89,11 +88,11 @@ def _pairs(judgement: Judgement, figures: Figures) -> str:
     return figures.add(picture, text)[0] + table("Pairs, the worst first", columns, rows, left=2)
 
 
-def _swap(judgement: Judgement, figures: Figures) -> str:
-    swapped, found = judgement.result.plan.swapped, dict(judgement.assignments)
+def _swap(judgement: JudgedInteractions, figures: Figures) -> str:
+    swapped, found = judgement.result.plan.swapped, {system.name: system for system in judgement.assignments}
     rows = [
-        [*map(escape, name.names), verdict_word(record), damping_text(record), escape(frequency_text(record))]
-        for name, record in found.items()
+        [*map(escape, name.names), verdict_word(system), damping_text(system), escape(frequency_text(system))]
+        for name, system in found.items()
     ]
     columns = [*swapped, "Verdict", "Least damping [%]", "Mode"]
     text = table("All assignments, the worst first", columns, rows, left=len(swapped) + 1)
@@ -107,7 +106,7 @@ def _swap(judgement: Judgement, figures: Figures) -> str:
 
 
 def heat_picture(
-    name: str, rows: tuple[str, ...] | list[str], columns: tuple[str, ...] | list[str], cells: list[list[SystemRecord]]
+    name: str, rows: tuple[str, ...] | list[str], columns: tuple[str, ...] | list[str], cells: list[list[JudgedSystem]]
 ) -> str:
     """A square for each system, coloured by its least damping; the figure, and U where it is unstable, stand in it.
 
@@ -126,15 +125,15 @@ def heat_picture(
     for i, label in enumerate(rows):
         middle = 30 + (i + 0.5) * _CELL
         parts.append(_text(_MARGIN - 8, middle + 4, label, "end"))
-        for k, record in enumerate(cells[i]):
+        for k, system in enumerate(cells[i]):
             x, y = _MARGIN + k * _CELL, 30 + i * _CELL
-            told = f"{label}, {columns[k]}: {verdict_word(record)}, {damping_text(record)} %"
+            told = f"{label}, {columns[k]}: {verdict_word(system)}, {damping_text(system)} %"
             parts.append(
-                f'<rect x="{x + 1}" y="{y + 1}" width="{_CELL - 2}" height="{_CELL - 2}" fill="{_colour(record)}" '
+                f'<rect x="{x + 1}" y="{y + 1}" width="{_CELL - 2}" height="{_CELL - 2}" fill="{_colour(system)}" '
                 f'stroke="#888"><title>{escape(told)}</title></rect>'
             )
-            sign = {True: "", False: "U", None: "?"}[record.stable]
-            parts.append(_text(x + _CELL / 2, y + _CELL / 2, damping_text(record)))
+            sign = {True: "", False: "U", None: "?"}[system.stable]
+            parts.append(_text(x + _CELL / 2, y + _CELL / 2, damping_text(system)))
             parts.append(_text(x + _CELL / 2, y + _CELL / 2 + 18, sign))
     width, height = _MARGIN + len(columns) * _CELL + 8, 38 + len(rows) * _CELL
     return (
@@ -147,11 +146,11 @@ def _text(x: float, y: float, text: str, anchor: str = "middle") -> str:
     return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" fill="#000">{escape(text)}</text>'
 
 
-def _colour(record: SystemRecord) -> str:
+def _colour(system: JudgedSystem) -> str:
     """Grey without a verdict; the bad colour in full where it is unstable, else between it and the good one."""
-    if record.stable is None or record.least_damping is None:
+    if system.stable is None or system.least_damping is None:
         return _UNKNOWN
-    share = -1.0 if record.stable is False else max(-1.0, min(1.0, record.least_damping / _FULL))
+    share = -1.0 if system.stable is False else max(-1.0, min(1.0, system.least_damping / _FULL))
     end = _GOOD if share > 0 else _BAD
     mixed = (round(m + (e - m) * abs(share)) for m, e in zip(_MIDDLE, end, strict=True))
     return "#" + "".join(f"{value:02x}" for value in mixed)

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.case import Case
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
@@ -66,6 +65,12 @@ class InteractionsPlan:
     def vendors(self) -> tuple[str, ...]:
         """The vendors, in the order of their first places."""
         return vendors_of(self.places)
+
+    def converters(self, name: SystemName) -> frozenset[str]:
+        """The places of a system at which a vendor's converter stands, and no stand-in."""
+        if name.kind is Kind.ASSIGNMENT:
+            return frozenset(self.places)
+        return frozenset(self.places) - frozenset(self.systems[name])
 
     def task(self, exchanged: Exchanged) -> SystemTask:
         """The task of one system."""
@@ -147,8 +152,6 @@ def plan_interactions(
             "i_re, i_im that is no generator; a converter of a make of its own is told by the key 'vendor' of its table"
         )
     stand_in = request.stand_in or (f"{STAND_IN}_phasor" if _of_phasors(prepared, places) else STAND_IN)
-    if stand_in not in model_names():
-        raise InputError(f"--stand-in {stand_in}: there is no such model; there are: {', '.join(model_names())}")
     systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()
     if request.swap:
         swapped = _swapped(places, request.swapped)

@@ -80,7 +80,8 @@ def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemNa
     if len(vendors) > MOST_VENDORS:
         count = len(vendors)
         raise InputError(
-            f"the scenario has converters of {count} vendors, which make {count * (count - 1) // 2} pairs; at most {MOST_VENDORS} are compared: give converters of one make one name by the key 'vendor'"
+            f"the scenario has converters of {count} vendors, which make {count * (count - 1) // 2} pairs; at most "
+            f"{MOST_VENDORS} are compared: give converters of one make one name by the key 'vendor'"
         )
 
     def only(kept: tuple[str, ...]) -> Exchanged:

@@ -1,19 +1,25 @@
 """A study of interactions as tables for a terminal, as rows for files, and as JSON."""
 
-from collections.abc import Sequence
 from typing import Any
 
-from orchestrator.interactions.judgement import JudgedMode, JudgedPair, Judgement, doubts_of, plan_text
+from orchestrator.interactions.judgement import (
+    JudgedInteractions,
+    JudgedMode,
+    JudgedPair,
+    JudgedSystem,
+    doubts_of,
+    plan_text,
+)
 from orchestrator.interactions.places import by_group
-from orchestrator.interactions.point import SharedMode, SystemRecord
+from orchestrator.interactions.point import SharedMode
 from orchestrator.interactions.words import damping_text, frequency_text, verdict_word
-from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
+from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table
 from orchestrator.results.mode_json import eigenvalue_json
 
 _LEAST_SHARE = 0.005
 
 
-def modes_table(judgement: Judgement) -> PlainTable:
+def modes_table(judgement: JudgedInteractions) -> PlainTable:
     """The modes of the system as it is, with the participation of every group."""
     groups = groups_shown(judgement)
     table = make_table("As in the case", "Mode [rad/s]", "f [Hz]", "Damping [%]", *groups, "Shared by", left=1)
@@ -29,7 +35,7 @@ def modes_table(judgement: Judgement) -> PlainTable:
     return table
 
 
-def groups_shown(judgement: Judgement) -> list[str]:
+def groups_shown(judgement: JudgedInteractions) -> list[str]:
     """The vendors, and then the other groups that the system has."""
     plan = judgement.result.plan
     return [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
@@ -39,34 +45,34 @@ def _share(share: float) -> str:
     return f"{share:.0%}" if share >= _LEAST_SHARE else ""
 
 
-def systems_table(judgement: Judgement) -> PlainTable:
+def systems_table(judgement: JudgedInteractions) -> PlainTable:
     """Nobody, each vendor alone, and each pair, at the same power flow."""
     columns = ("System", "Verdict", "Least damping [%]", "Mode", "Falls by [points]")
     table = make_table("Vendors alone and in pairs", *columns, left=2)
     table.add_row("no vendor", *_figures(judgement.none), "")
-    for vendor, record in judgement.alone.items():
-        table.add_row(f"{vendor} alone", *_figures(record), "")
+    for vendor, system in judgement.alone.items():
+        table.add_row(f"{vendor} alone", *_figures(system), "")
     for pair in judgement.pairs:
         table.add_row(pair.text, *_figures(pair.joint), "–" if pair.fall is None else f"{pair.fall:+.2f}")
     return table
 
 
-def assignments_table(judgement: Judgement) -> PlainTable:
+def assignments_table(judgement: JudgedInteractions) -> PlainTable:
     """All assignments, the worst first."""
     swapped = judgement.result.plan.swapped
     table = make_table(
         "Each device at each place", *swapped, "Verdict", "Least damping [%]", "Mode", left=len(swapped) + 1
     )
-    for name, record in judgement.assignments:
-        table.add_row(*name.names, *_figures(record))
+    for system in judgement.assignments:
+        table.add_row(*system.name.names, *_figures(system))
     return table
 
 
-def _figures(record: SystemRecord) -> tuple[str, str, str]:
-    return verdict_word(record), damping_text(record), frequency_text(record)
+def _figures(system: JudgedSystem) -> tuple[str, str, str]:
+    return verdict_word(system), damping_text(system), frequency_text(system)
 
 
-def warnings_of(judgement: Judgement) -> list[str]:
+def warnings_of(judgement: JudgedInteractions) -> list[str]:
     """Doubts of the study, and the warnings of its systems, each once with the systems that have it."""
     result = judgement.result
     having: dict[str, list[str]] = {}
@@ -75,10 +81,10 @@ def warnings_of(judgement: Judgement) -> list[str]:
             systems = having.setdefault(text, [])
             if (called := plan_text(result.plan.swapped, name)) not in systems:
                 systems.append(called)
-    return [*doubts_of(result), *(f"{first_few(systems, str)}: {text}" for text, systems in having.items())]
+    return [*doubts_of(judgement), *(f"{first_few(systems, str)}: {text}" for text, systems in having.items())]
 
 
-def mode_rows(judgement: Judgement) -> list[dict[str, Any]]:
+def mode_rows(judgement: JudgedInteractions) -> list[dict[str, Any]]:
     """A row for each mode of the system as it is: figures, participation by group, and who shares it."""
     groups = groups_shown(judgement)
     return [
@@ -89,7 +95,7 @@ def mode_rows(judgement: Judgement) -> list[dict[str, Any]]:
     ]
 
 
-def pair_rows(judgement: Judgement) -> list[dict[str, Any]]:
+def pair_rows(judgement: JudgedInteractions) -> list[dict[str, Any]]:
     """A row for each pair, the worst first."""
     return [_pair(pair) for pair in judgement.pairs]
 
@@ -108,21 +114,21 @@ def _pair(pair: JudgedPair) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def assignment_rows(judgement: Judgement) -> list[dict[str, Any]]:
+def assignment_rows(judgement: JudgedInteractions) -> list[dict[str, Any]]:
     """A row for each assignment, the worst first."""
     swapped = judgement.result.plan.swapped
     return [
-        {f"at.{place}": device for place, device in zip(swapped, name.names, strict=True)}
+        {f"at.{place}": device for place, device in zip(swapped, system.name.names, strict=True)}
         | {
-            "stable": record.stable,
-            "least_damping_percent": record.least_damping,
-            "frequency_hz": None if record.critical is None else record.critical.frequency_hz,
+            "stable": system.stable,
+            "least_damping_percent": system.least_damping,
+            "frequency_hz": None if system.critical is None else system.critical.frequency_hz,
         }
-        for name, record in judgement.assignments
+        for system in judgement.assignments
     ]
 
 
-def as_json(judgement: Judgement) -> dict[str, Any]:
+def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
     """All of it as JSON's types."""
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
@@ -138,7 +144,7 @@ def as_json(judgement: Judgement) -> dict[str, Any]:
         "as_in_the_case": _system(judgement.whole, groups),
         "interaction_modes": [_shared(judged) for judged in judgement.interaction_modes],
         "no_vendor": _system(judgement.none, groups),
-        "alone": {vendor: _system(record, groups) for vendor, record in judgement.alone.items()},
+        "alone": {vendor: _system(system, groups) for vendor, system in judgement.alone.items()},
         "pairs": [
             _pair(pair) | {"vendors": list(pair.vendors), "sentence": pair.sentence()} | _system(pair.joint, groups)
             for pair in judgement.pairs
@@ -148,10 +154,10 @@ def as_json(judgement: Judgement) -> dict[str, Any]:
     }
     if plan.swapped:
         found["assignments"] = [
-            {"at": dict(zip(plan.swapped, name.names, strict=True))} | _system(record, groups, modes=False)
-            for name, record in judgement.assignments
+            {"at": dict(zip(plan.swapped, system.name.names, strict=True))} | _system(system, groups, modes=False)
+            for system in judgement.assignments
         ]
-        found["worst_assignment"] = None if swap is None else dict(zip(plan.swapped, swap[0].names, strict=True))
+        found["worst_assignment"] = None if swap is None else dict(zip(plan.swapped, swap.name.names, strict=True))
     return found | {"warnings": warnings_of(judgement)}
 
 
@@ -160,16 +166,16 @@ def _shared(judged: JudgedMode) -> dict[str, Any]:
     return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"vendors": list(judged.vendors)}
 
 
-def _system(record: SystemRecord, groups: dict[str, str], *, modes: bool = True) -> dict[str, Any]:
-    critical = record.critical
+def _system(system: JudgedSystem, groups: dict[str, str], *, modes: bool = True) -> dict[str, Any]:
+    critical = system.critical
     found: dict[str, Any] = {
-        "stable": record.stable,
-        "stability": record.stability,
-        "least_damping_percent": record.least_damping,
+        "stable": system.stable,
+        "stability": system.record.stability,
+        "least_damping_percent": system.least_damping,
         "critical": None if critical is None else eigenvalue_json(critical.eigenvalue, critical.damping_percent),
-        "error": record.error,
+        "error": system.record.error,
     }
-    return found | ({"modes": [_mode(mode, groups) for mode in record.modes]} if modes else {})
+    return found | ({"modes": [_mode(mode, groups) for mode in system.record.modes]} if modes else {})
 
 
 def _mode(mode: SharedMode, groups: dict[str, str]) -> dict[str, Any]:
@@ -177,9 +183,3 @@ def _mode(mode: SharedMode, groups: dict[str, str]) -> dict[str, Any]:
         "groups": by_group(mode.components, groups),
         "components": mode.components,
     }
-
-
-def largest_shares(shares: dict[str, float], count: int = 3) -> str:
-    """The groups that take part most."""
-    entries: Sequence[tuple[str, float]] = list(shares.items())[:count]
-    return ", ".join(map(share_text, entries))

@@ -1,37 +1,36 @@
 """What a study of interactions says, in sentences."""
 
-from orchestrator.interactions.judgement import Judgement, place_of, plan_text, why_unknown
-from orchestrator.interactions.point import SystemRecord
+from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem, place_of, plan_text
 
 _SHOWN = 3
 
 
-def verdict_word(record: SystemRecord) -> str:
+def verdict_word(system: JudgedSystem) -> str:
     """``stable``, ``UNSTABLE`` or ``not known``."""
-    return {True: "stable", False: "UNSTABLE", None: "not known"}[record.stable]
+    return {True: "stable", False: "UNSTABLE", None: "not known"}[system.stable]
 
 
-def damping_text(record: SystemRecord) -> str:
-    """The least damping of a system [%]: ``7.81``; ``–`` where it was not computed, ``none`` where nothing swings."""
-    if record.least_damping is None:
+def damping_text(system: JudgedSystem) -> str:
+    """The least damping of a system [%]: ``7.81``; ``–`` where it was not computed, ``none`` where no mode counts."""
+    if system.least_damping is None:
         return "–"
-    return "none" if record.critical is None else f"{record.least_damping:.2f}"
+    return "none" if system.critical is None else f"{system.least_damping:.2f}"
 
 
-def frequency_text(record: SystemRecord) -> str:
+def frequency_text(system: JudgedSystem) -> str:
     """The frequency of the least damped mode."""
-    return "" if record.critical is None else place_of(record.critical)
+    return "" if system.critical is None else place_of(system.critical)
 
 
-def whole_sentence(judgement: Judgement) -> str:
+def whole_sentence(judgement: JudgedInteractions) -> str:
     """The verdict on the system as it is."""
-    whole = judgement.whole
+    whole = judgement.whole.record
     if whole.error is not None:
         return f"not known: {whole.error}"
     return str(whole.stability["sentence"])
 
 
-def modes_sentence(judgement: Judgement) -> str:
+def modes_sentence(judgement: JudgedInteractions) -> str:
     """How many modes vendors share."""
     plan, found = judgement.result.plan, judgement.interaction_modes
     low, high = plan.request.frequency_range
@@ -44,7 +43,7 @@ def modes_sentence(judgement: Judgement) -> str:
     return f"{head}{tail}: {'; '.join(shown)}{'; …' if len(found) > _SHOWN else ''}"
 
 
-def pairs_sentence(judgement: Judgement) -> str:
+def pairs_sentence(judgement: JudgedInteractions) -> str:
     """Which pair is the worst."""
     plan = judgement.result.plan
     if len(plan.vendors) < 2:
@@ -60,29 +59,32 @@ def pairs_sentence(judgement: Judgement) -> str:
     return f"no worst pair: none of {known} is damped less together than each alone{rest}"
 
 
-def swap_sentence(judgement: Judgement) -> str:
+def swap_sentence(judgement: JudgedInteractions) -> str:
     """Which assignment is the worst; empty without a swap."""
     swapped, found = judgement.result.plan.swapped, judgement.assignments
     if not swapped:
         return ""
     worst, unknown = judgement.worst_assignment, judgement.unknown_assignments
     if worst is None:
-        return f"worst assignment: not known: {why_unknown(found[0][1])}"
-    name, record = worst
-    grows = sum(one.stable is False for _, one in found)
+        return f"worst assignment: not known: {found[0].why_unknown}"
+    grows = sum(one.stable is False for one in found)
     counted = f"{grows} of {len(found)} are UNSTABLE" if grows else f"none of {len(found)} is UNSTABLE"
     rest = f", {len(unknown)} have no verdict" if unknown else ""
-    figure = f"least damping {damping_text(record)} %{', ' if record.critical else ''}{frequency_text(record)}"
-    return f"worst assignment: {plan_text(swapped, name)}: {verdict_word(record)}, {figure}; {counted}{rest}"
+    figure = f"least damping {damping_text(worst)} %{', ' if worst.critical else ''}{frequency_text(worst)}"
+    return f"worst assignment: {plan_text(swapped, worst.name)}: {verdict_word(worst)}, {figure}; {counted}{rest}"
 
 
-def stand_in_sentence(judgement: Judgement) -> str:
-    """What stands at the places of the vendors that a system does without."""
+def stand_in_sentence(judgement: JudgedInteractions) -> str:
+    """What the systems are compared by."""
     plan = judgement.result.plan
-    return f"at the places of the vendors that a system does without stands {plan.stand_in}, at the same power flow"
+    return (
+        f"at the places of the vendors that a system does without stands {plan.stand_in}, at the same power flow; of "
+        f"each system those modes count in which its vendors have {100 * plan.request.threshold:g} % together, and "
+        "what grows"
+    )
 
 
-def sentences(judgement: Judgement) -> list[str]:
+def sentences(judgement: JudgedInteractions) -> list[str]:
     """All of them, the verdict on the system as it is first."""
     every = [
         whole_sentence(judgement), modes_sentence(judgement), pairs_sentence(judgement), swap_sentence(judgement),

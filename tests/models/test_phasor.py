@@ -50,7 +50,7 @@ def source(y):
 # -- the electrical side ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [*DEVICES, *ALONE, "gfl_l2ep", "external_grid"])
+@pytest.mark.parametrize("name", [*DEVICES, *ALONE, "gfl_l2ep", "external_grid", "static_generation"])
 def test_emf_and_admittance_give_the_current(name):
     device = Evaluated(f"{name}_phasor", P_0=0.7, Q_0=0.1, v_0=1.02, theta_0=0.4)
     v = 1.02 * np.exp(0.4j)

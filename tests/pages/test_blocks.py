@@ -26,6 +26,7 @@ FMUS = (
     "regfm_a1_phasor",
     "infinite_bus",
     "external_grid",
+    "static_generation",
 )
 """FMUs that the Python blocks of the leaflets open."""
 

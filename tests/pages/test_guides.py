@@ -19,6 +19,7 @@ ANYWHERE = (
     "how-to/black-box",
     "how-to/grid-forming-among-grid-following",
     "how-to/faults-and-outages",
+    "how-to/several-vendors",
 )
 SECONDS = 1800.0
 

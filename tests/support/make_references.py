@@ -68,6 +68,14 @@ REFERENCES = (
         "external_grid", "fmus/external_grid/reference.csv", {"S_n": 17700.0}, *_BUS, ("i_re", "i_im", "p", "q"),
     ),
     Reference(
+        "static_generation", "fmus/static_generation/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS, ("i_re", "i_im", "p", "q"),
+    ),
+    Reference(
+        "static_generation_phasor", "fmus/static_generation/reference_phasor.csv", {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS, ("i_re", "i_im", "e_re", "e_im"),
+    ),
+    Reference(
         "regfm_a1_phasor", "fmus/regfm_a1/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
         *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
     ),

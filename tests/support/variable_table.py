@@ -27,6 +27,8 @@ LEAFLETS = {
     "gfl_l2ep_phasor": ROOT / "fmus" / "gfl_l2ep" / "README.md",
     "external_grid": ROOT / "fmus" / "external_grid" / "README.md",
     "external_grid_phasor": ROOT / "fmus" / "external_grid" / "README.md",
+    "static_generation": ROOT / "fmus" / "static_generation" / "README.md",
+    "static_generation_phasor": ROOT / "fmus" / "static_generation" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
     "test_bench": ROOT / "fmus" / "test_bench" / "README.md",

@@ -1,0 +1,132 @@
+"""What systems come to: ranks, falls and doubts, on figures that are made up."""
+
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.api.interactions import Interactions
+from orchestrator.interactions.judgement import JudgedSystem
+from orchestrator.interactions.point import SharedMode, SystemRecord
+from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+from tests.interactions.park import park, studied, swapped, written
+
+STABLE = {"stable": True, "sentence": "stable: …"}
+UNKNOWN = {"stable": None, "reason": "a limit is close by", "sentence": "not known: a limit is close by"}
+
+
+def mode(percent, hertz=10.0, **components):
+    """A mode of a damping [%]."""
+    imag = 62.83185307 * hertz / 10
+    share = percent / 100
+    return SharedMode(-share * imag / (1 - share**2) ** 0.5, imag, components or {"west": 0.5, "east": 0.5})
+
+
+def system(*modes, stability=STABLE, **more):
+    return SystemRecord(tuple(modes), stability=stability, **more)
+
+
+def judged(**records):
+    """The park's study with other results, by ``WHOLE``, ``A`` or ``A_B``."""
+
+    def name(text):
+        vendors = tuple(text.split("_"))
+        return WHOLE if text == "WHOLE" else NONE if text == "NONE" else SystemName(
+            Kind.ALONE if len(vendors) == 1 else Kind.PAIR, vendors
+        )  # fmt: skip
+
+    result = park().result
+    return Interactions(replace(result, records=result.records | {name(text): one for text, one in records.items()}))
+
+
+ALL = dict.fromkeys(("A", "B", "C"), system(mode(8.0))) | dict.fromkeys(("A_B", "A_C", "B_C"), system(mode(8.0)))
+
+
+def test_without_a_fight_the_worst_pair_is_the_one_that_falls_furthest():
+    found = judged(**ALL | {"A_C": system(mode(7.0)), "B_C": system(mode(5.5)), "B": system(mode(6.0))}).judgement
+    assert found.worst_pair.vendors == ("A", "C")  # by 1 point; B and C fall by 0.5
+    assert found.worst_pair.fall == pytest.approx(1.0, abs=1e-9)
+
+
+def test_where_no_pair_falls_there_is_no_worst_one():
+    found = judged(**ALL | {"A_B": system(mode(8.005)), "A_C": system(mode(7.995))})
+    assert found.worst_pair is None
+    assert "no worst pair: none of 3 is damped less together" in " ".join(found.sentences)
+
+
+def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
+    grows = system(mode(-2.0), stability={"stable": False}, growing=mode(-2.0))
+    found = judged(**ALL | {"A": grows, "A_B": grows}).judgement
+    pair = next(one for one in found.pairs if one.vendors == ("A", "B"))
+    assert pair.fights is False
+    assert pair.fall == pytest.approx(0.0, abs=1e-9)
+    assert "UNSTABLE together, and A alone as well" in pair.sentence()
+
+
+@pytest.mark.parametrize("lost", [system(mode(9.0), stability=UNKNOWN), SystemRecord(error="no steady state found")])
+def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
+    found = judged(**ALL | {"A_B": lost, "A_C": system(mode(7.0))})
+    assert found.worst_pair == ("A", "C")
+    assert found.judgement.pairs[-1].vendors == ("A", "B")
+    assert "worst pair of 2 pairs: A + C" in " ".join(found.sentences)
+    assert "; not known: A + B" in " ".join(found.sentences)
+    assert found.judgement.stable is None
+    alone = judged(**ALL | {"A": lost})
+    assert [pair.vendors for pair in alone.judgement.unknown_pairs] == [("A", "B"), ("A", "C")]
+    assert "A alone: " in alone.judgement.unknown_pairs[0].sentence()
+    assert alone.as_json()["unknown_pairs"] == [["A", "B"], ["A", "C"]]
+
+
+def test_an_assignment_without_a_verdict_is_not_the_worst():
+    result = swapped().result
+    worst = SystemName(Kind.ASSIGNMENT, ("B", "B", "B"))
+    lost = Interactions(replace(result, records=result.records | {worst: SystemRecord(error="lost")}))
+    assert lost.worst_assignment == {"west": "B", "east": "B", "north": "A"}
+    assert lost.judgement.assignments[-1].name == worst
+    assert "1 have no verdict" in " ".join(lost.sentences)
+
+
+def test_a_mode_of_the_network_alone_does_not_count():
+    resonance = mode(0.2, 50.0, grid=0.97, west=0.02, east=0.01)
+    shared = mode(9.0, 5.0, grid=0.5, west=0.3, east=0.2)
+    both = JudgedSystem(WHOLE, system(resonance, shared), frozenset({"west", "east"}), 0.05)
+    assert both.critical == shared
+    assert replace(both, threshold=0.02).critical == resonance
+    assert replace(both, converters=frozenset()).critical == resonance
+    grows = replace(both, record=system(resonance, shared, growing=mode(-1.0, 50.0, grid=1.0)))
+    assert grows.least_damping == pytest.approx(-1.0)
+
+
+def test_a_mode_belongs_to_those_who_take_part_by_the_threshold():
+    record = system(mode(9.0, 5.0, grid=0.43, west=0.5, east=0.05, north=0.02))
+    (one,) = judged(WHOLE=record).judgement.modes
+    assert (one.vendors, one.is_interaction) == (("A", "B"), True)
+    below = system(mode(9.0, 5.0, grid=0.431, west=0.5, east=0.049, north=0.02))
+    (other,) = judged(WHOLE=below).judgement.modes
+    assert (other.vendors, other.is_interaction) == (("A",), False)
+
+
+def test_a_network_that_its_stand_ins_do_not_leave_stable_is_named():
+    assert not park().warnings
+    grows = system(stability={"stable": False, "sentence": "…"}, growing=mode(-2.0))
+    for none, words in ((grows, "is UNSTABLE"), (SystemRecord(error="no steady state"), "has no verdict")):
+        told = " ".join(judged(NONE=none).warnings)
+        assert f"the network with static_generation at all places {words}" in told
+
+
+def test_a_component_that_was_identified_is_named():
+    found = judged(WHOLE=system(mode(9.0), identified=("east",)))
+    assert any("east was identified from outside" in text for text in found.warnings)
+
+
+def test_different_settings_of_one_vendor_are_named():
+    assert not swapped().warnings or not any("other settings" in text for text in swapped().warnings)
+    path = written("same.toml", ('vendor = "B"', 'vendor = "A"'))
+    found = studied(path, swap=True, swapped=("north", "east"))
+    assert any("A's converters have other settings at west than at east" in text for text in found.warnings)
+
+
+def test_a_record_survives_its_file():
+    record = park().judgement.worst_pair.joint.record
+    header, arrays = record.stored()
+    assert SystemRecord.restored(header, arrays) == record
+    assert SystemRecord.restored({"modes": 3}, {}) is None
