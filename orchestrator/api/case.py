@@ -385,7 +385,7 @@ class Case:
         >>> import orchestrator as gfor
         >>> found = gfor.load("infinite_bus").interactions(scenario="dip")
         >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
-        [0.0, 0.0, 0.0]
+        [45.53, 0.4, 0.6]
         """
         kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, None, INTERACTIONS_IMPORT)

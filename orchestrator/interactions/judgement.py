@@ -286,11 +286,11 @@ def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
 def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
     """What is to be borne in mind of a study as a whole."""
     result, found = judgement.result, []
-    plan, whole = result.plan, judgement.whole.record
-    if whole.identified:
+    plan = result.plan
+    if identified := list(dict.fromkeys(name for one in result.records.values() for name in one.identified)):
         found.append(
-            f"{', '.join(whole.identified)} was identified from outside: its share in a mode rests on the states of "
-            "the model that was fitted to it"
+            f"{', '.join(identified)} was identified from outside: its share in a mode rests on the states of the "
+            "model that was fitted to it"
         )
     found += [
         f"the system {plan_text(plan.swapped, name)} was not computed: {record.error}"

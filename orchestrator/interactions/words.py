@@ -69,7 +69,7 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
         return f"worst assignment: not known: {found[0].why_unknown}"
     grows = sum(one.stable is False for one in found)
     counted = f"{grows} of {len(found)} are UNSTABLE" if grows else f"none of {len(found)} is UNSTABLE"
-    rest = f", {len(unknown)} have no verdict" if unknown else ""
+    rest = f", {len(unknown)} {'has' if len(unknown) == 1 else 'have'} no verdict" if unknown else ""
     figure = f"least damping {damping_text(worst)} %{', ' if worst.critical else ''}{frequency_text(worst)}"
     return f"worst assignment: {plan_text(swapped, worst.name)}: {verdict_word(worst)}, {figure}; {counted}{rest}"
 

@@ -82,7 +82,7 @@ def test_an_assignment_without_a_verdict_is_not_the_worst():
     lost = Interactions(replace(result, records=result.records | {worst: SystemRecord(error="lost")}))
     assert lost.worst_assignment == {"west": "B", "east": "B", "north": "A"}
     assert lost.judgement.assignments[-1].name == worst
-    assert "1 have no verdict" in " ".join(lost.sentences)
+    assert "1 has no verdict" in " ".join(lost.sentences)
 
 
 def test_a_mode_of_the_network_alone_does_not_count():

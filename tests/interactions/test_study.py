@@ -1,6 +1,7 @@
 """Studies of whole systems: what a pair does, what a swap does, and where the figures come from."""
 
 import shutil
+import zipfile
 from dataclasses import replace
 
 import pytest
@@ -192,6 +193,24 @@ def test_a_device_that_hides_its_states_is_refused_with_the_remedy():
     error = "component 'east': … `gfor modes CASE --black-box` identifies it from its inputs and outputs"
     lost = replace(found, records={**found.records, WHOLE: SystemRecord(error=error)})
     assert any("here too --black-box identifies" in text for text in Interactions(lost).warnings)
+
+
+@pytest.mark.slow
+def test_a_device_that_is_identified_damps_as_with_its_states(fmu_path, tmp_path):
+    shown, hidden = fmu_path("gfl_l2ep", native=True), tmp_path / "hidden.fmu"
+    with zipfile.ZipFile(shown) as old, zipfile.ZipFile(hidden, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b'settable="true"', b'settable="false"'))
+    devices = (GivenDevice("shown", shown), GivenDevice("hidden", hidden))
+    found = studied(swap=True, devices=devices, swapped=("east",), black_box=True)
+    systems = found.judgement.systems
+    own, same = systems[assigned("shown")], systems[assigned("hidden")]
+    assert (own.record.identified, same.record.identified) == ((), ("east",))
+    assert same.stable is own.stable is True
+    assert same.least_damping == pytest.approx(own.least_damping, abs=0.02)
+    assert any("east was identified from outside" in text for text in found.warnings)
+    assert found.judgement.whole.record.modes == park().judgement.whole.record.modes
 
 
 def test_what_was_kept_is_not_computed_again():
