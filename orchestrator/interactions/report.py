@@ -12,6 +12,9 @@ from orchestrator.report.html.elements import Figures, damping, eigenvalue, numb
 from orchestrator.safe_files import write_text
 
 _CELL, _MARGIN = 96, 120
+_LONGEST = 13
+"""Characters that fit above a square, and left of it."""
+
 _GOOD, _MIDDLE, _BAD, _UNKNOWN = (86, 180, 233), (255, 255, 255), (213, 94, 0), "#d9d9d9"
 _FULL = 20.0
 """Damping [%] with the full colour of good ones; −20 % has that of bad ones."""
@@ -143,7 +146,10 @@ def heat_picture(
 
 
 def _text(x: float, y: float, text: str, anchor: str = "middle") -> str:
-    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" fill="#000">{escape(text)}</text>'
+    """A text; a long one is shortened, and whole under the pointer."""
+    shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    told = "" if shown == text else f"<title>{escape(text)}</title>"
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" fill="#000">{escape(shown)}{told}</text>'
 
 
 def _colour(system: JudgedSystem) -> str:
