@@ -14,8 +14,9 @@ from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.executors import choose_executor
 from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
-from orchestrator.api.interactions import Interactions
+from orchestrator.api.interactions import Interactions, WantedInteractions
 from orchestrator.api.interactions import compute as interacting
+from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
@@ -42,7 +43,6 @@ from orchestrator.cases.case import load_case
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
-from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
@@ -352,7 +352,6 @@ class Case:
 
     def interactions(
         self,
-        request: InteractionsRequest | None = None,
         scenario: str | None = None,
         values: Mapping[str, Any] | None = None,
         *,
@@ -361,19 +360,19 @@ class Case:
         workers: int | None = 1,
         folder: str | Path | None = None,
         progress: bool = False,
+        **wanted: Unpack[WantedInteractions],
     ) -> Interactions:
         """Who takes part in which mode, and which vendors' converters do not agree.
 
         Parameters
         ----------
-        request
-            Threshold, frequencies, stand-in, and what is swapped; the usual ones where None.
-        scenario
-            Its name; may be left out where the case has one only.
-        values, step, parameters
+        scenario, values, step, parameters
             As for `scenario`.
         workers, folder, progress
             As for `sweep`.
+        wanted
+            Any of: ``threshold`` (a share of a mode), ``frequencies`` [Hz], ``stand_in`` (a model), ``swap`` (each
+            device at each place), ``devices`` (files by name), ``bindings``, ``places``, ``black_box``.
 
         Raises
         ------
@@ -383,16 +382,14 @@ class Case:
         Examples
         --------
         >>> import orchestrator as gfor
-        >>> found = gfor.load("infinite_bus").interactions(scenario="dip")
+        >>> found = gfor.load("infinite_bus").interactions("dip")
         >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
         [45.53, 0.4, 0.6]
         """
         kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, None, INTERACTIONS_IMPORT)
-        planned = plan_interactions(
-            self.file, request or InteractionsRequest(), scenario, case_values(values), in_seconds(step, "step"),
-            parameter_files(parameters),
-        )  # fmt: skip
+        own, files = case_values(values), parameter_files(parameters)
+        planned = plan_interactions(self.file, interactions_of(wanted), scenario, own, in_seconds(step, "step"), files)
         question([planned.prepared])
         with shown_progress("Systems", shown=progress) as report, nullcontext() if kept is None else held(kept):
             return interacting(planned, executor, kept, report)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from orchestrator.api.show import page
+from orchestrator.api.values import Names, binding_path, flag, frequency_range, text_or_none
+from orchestrator.api.values import names as names_given
+from orchestrator.api.values import path as path_of
+from orchestrator.errors import InputError
+from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.judgement import JudgedInteractions
+from orchestrator.interactions.request import RANGE_HZ, THRESHOLD, GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import InteractionsPlan, InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
@@ -25,6 +32,60 @@ else:
 
 WORKERS_IMPORT = ("orchestrator.interactions.worker",)
 """Modules that a process of such a study imports once, before its first system."""
+
+
+class WantedInteractions(TypedDict, total=False):
+    """What may be asked of a study of interactions; `InteractionsRequest` says what each means.
+
+    ``devices`` and ``bindings`` are files by the name of a device that is tried beside the case's, at ``places``.
+    """
+
+    threshold: float
+    frequencies: tuple[float, float]
+    stand_in: str
+    swap: bool
+    devices: Mapping[str, str | Path]
+    bindings: Mapping[str, str | Path]
+    places: Names
+    black_box: bool
+
+
+def request_of(wanted: WantedInteractions) -> InteractionsRequest:
+    """A request of checked wishes.
+
+    Parameters
+    ----------
+    wanted
+        What is asked for.
+
+    Raises
+    ------
+    InputError
+        If one of the wishes is unknown, not of its kind or outside of its range; it is named.
+    """
+    known = tuple(WantedInteractions.__annotations__)
+    if unknown := [name for name in wanted if name not in known]:
+        raise InputError(f"interactions cannot be asked for {', '.join(map(repr, unknown))}; they can for "
+                         f"{', '.join(known)}")  # fmt: skip
+    threshold = wanted.get("threshold", THRESHOLD)
+    if isinstance(threshold, bool) or not isinstance(threshold, int | float) or not 0 < threshold <= 0.5:
+        raise InputError(f"threshold = {threshold!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %")
+    bindings, given = wanted.get("bindings", {}), wanted.get("devices", {})
+    if lonely := [name for name in bindings if name not in given]:
+        raise InputError(f"bindings: there is no device {lonely[0]!r}; the devices are: {', '.join(given) or 'none'}")
+    devices = []
+    for name, file in given.items():
+        binding = binding_path(bindings.get(name))
+        devices.append(GivenDevice(name, as_device(path_of(file, "devices"), binding), binding))
+    return InteractionsRequest(
+        threshold,
+        frequency_range(wanted.get("frequencies", RANGE_HZ)),
+        text_or_none(wanted.get("stand_in"), "stand_in", "it must be the name of a model"),
+        flag(wanted.get("swap", False), "swap") or bool(devices),
+        tuple(devices),
+        names_given(wanted.get("places", ()), "places"),
+        flag(wanted.get("black_box", False), "black_box"),
+    )
 
 
 class Interactions:
