@@ -4,11 +4,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import AnalysisTable, ComponentTable, EventTable, GridEventBase, Value
 from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.port import BoundDescription
 from orchestrator.interactions.places import Place
 
 SAME_FLOW = 1e-6
@@ -48,7 +51,7 @@ def vendors_device_at(place: Place, template: Place) -> ComponentTable:
     return template.table.model_copy(
         update={
             "bus": place.table.bus,
-            "parameters": own | _of_place(place),
+            "parameters": own | _of_place(place, template.plan.description),
             "inputs": dict(template.plan.inputs),
         }
     )
@@ -77,23 +80,33 @@ def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str,
         fmu=str(file.absolute()),
         binding=None if binding is None else str(binding.absolute()),
         bus=place.table.bus,
-        parameters={**values, **_of_place(place)},
+        parameters={**values, **_of_place(place, bound_fmu(file, binding))},
     )
 
 
-def _of_place(place: Place) -> dict[str, Value]:
-    """What the power flow reads of the device there: any device with these values gives the same power flow."""
+def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, Value]:
+    """What the power flow reads of the device there: any device with these values gives the same power flow.
+
+    Rated frequency and breaker are left out where the device, if it is not of the catalogue, does not have them.
+    """
     plan = place.plan
-    known = plan.description.variables
     found: dict[str, Value] = {name: plan.number(name) for name in ("S_n", "P_0")}
     found |= {"Q_0": plan.number("Q_0")} if "Q_0" in plan.parameters else {"v_0": plan.number("v_0")}
     if place.table.bus is None:  # no power flow computes the rest
         found |= {name: plan.number(name) for name in ("Q_0", "v_0", "theta_0")}
-    if "f_n" in known and place.table.file is None:
-        found["f_n"] = plan.number("f_n")
+    if (f_n := _rated_frequency(place)) is not None:
+        found["f_n"] = f_n
     if "connected" in plan.parameters:
         found["connected"] = bool(plan.parameters["connected"])
-    return found
+    return found if device is None else {name: value for name, value in found.items() if name in device.variables}
+
+
+def _rated_frequency(place: Place) -> float | None:
+    """Of the device at a place [Hz]; None where it does not say."""
+    description = place.plan.description
+    if isinstance(description, BoundDescription):
+        return description.port.f_n
+    return place.plan.number("f_n") if "f_n" in description.variables else None
 
 
 def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:

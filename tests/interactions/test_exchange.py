@@ -1,14 +1,19 @@
 """Other devices at the places of a case: in phasor networks, among units, and without changing what swings."""
 
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.interactions.exchange import exchanged_case, stand_in_at
+from orchestrator.interactions.exchange import exchanged_case, stand_in_at, vendors_device_at
 from orchestrator.interactions.places import GENERATORS, GRID, places_of
-from orchestrator.interactions.request import InteractionsRequest
+from orchestrator.interactions.point import compute_system
+from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
-from orchestrator.interactions.systems import NONE
+from orchestrator.interactions.systems import NONE, Kind, SystemName
 from orchestrator.study.modes import compute_modes
+from tests.interactions.park import folder
+from tests.support.bindings import GFOR_RATED
 
 
 def test_nothing_exchanged_is_the_case_itself():
@@ -45,3 +50,26 @@ def test_converters_of_units_are_exchanged_as_well():
     )
     assert prepared.system.components["gfor3"].description.model_name == "static_generation"
     assert prepared.power_flow.voltages == pytest.approx(plan.prepared.power_flow.voltages, abs=1e-9)
+
+
+def test_a_device_behind_a_binding_is_given_what_it_knows_and_damps_as_without(fmu_path, tmp_path):
+    (tmp_path / "d.toml").write_text(GFOR_RATED, encoding="utf-8")
+    given = GivenDevice("D", fmu_path("gfor"), tmp_path / "d.toml")
+    request = InteractionsRequest(swap=True, devices=(given,), swapped=("east", "north"))
+    plan = plan_interactions(load_case(folder() / "park.toml"), request)
+    bound, own = (
+        compute_system(plan.task(plan.systems[SystemName(Kind.ASSIGNMENT, (device, "C"))])) for device in "DC"
+    )
+    assert bound.error is None
+    assert [mode.real for mode in bound.modes] == pytest.approx([mode.real for mode in own.modes], rel=1e-4)
+    assert bound.stable is own.stable is True
+
+
+def test_a_device_without_a_rated_frequency_is_given_none():
+    places = plan_interactions(load_case(folder() / "park.toml"), InteractionsRequest()).places
+    plain = places["west"]
+    known = {name: info for name, info in plain.plan.description.variables.items() if name != "f_n"}
+    silent = replace(plain, plan=replace(plain.plan, description=replace(plain.plan.description, variables=known)))
+    assert "f_n" in vendors_device_at(places["east"], plain).parameters
+    assert "f_n" not in vendors_device_at(places["east"], silent).parameters
+    assert "f_n" not in stand_in_at(silent, "static_generation").parameters
