@@ -46,4 +46,5 @@ def studied(path=None, overrides=None, **wanted):
 park = cache(studied)
 """The guide's study, computed once."""
 
-swapped = cache(lambda: studied(swap=True))
+swapped = cache(lambda: studied(swap=True, swapped=("west", "east")))
+"""A and B at both of their places."""

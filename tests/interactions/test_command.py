@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from tests.interactions.park import GUIDE, folder, park, swapped
+from tests.interactions.park import GUIDE, folder, park, studied
 
 MINUS = str.maketrans("−", "-")
 
@@ -94,9 +94,10 @@ def test_the_guides_pairs_are_those_that_are_computed():
         assert fall == ("" if wanted is None else f"{wanted:+.2f}")
 
 
+@pytest.mark.slow
 def test_the_guides_words_on_the_swap_are_right():
     text = GUIDE.read_text(encoding="utf-8")
     assert re.search(r"27 assignments,.*Seven are unstable; the worst is B everywhere", text, re.DOTALL)
-    found = swapped().judgement.assignments
+    found = studied(swap=True).judgement.assignments
     assert (len(found), sum(one.stable is False for one in found)) == (27, 7)
     assert found[0].name.names == ("B", "B", "B")

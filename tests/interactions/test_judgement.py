@@ -78,9 +78,9 @@ def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
 
 def test_an_assignment_without_a_verdict_is_not_the_worst():
     result = swapped().result
-    worst = SystemName(Kind.ASSIGNMENT, ("B", "B", "B"))
+    worst = SystemName(Kind.ASSIGNMENT, ("B", "B"))
     lost = Interactions(replace(result, records=result.records | {worst: SystemRecord(error="lost")}))
-    assert lost.worst_assignment == {"west": "B", "east": "B", "north": "A"}
+    assert lost.worst_assignment in ({"west": "A", "east": "B"}, {"west": "B", "east": "A"})
     assert lost.judgement.assignments[-1].name == worst
     assert "1 has no verdict" in " ".join(lost.sentences)
 

@@ -61,19 +61,19 @@ def test_participations_of_all_groups_sum_to_one_in_every_system():
 
 def test_a_device_that_stands_at_its_own_place_is_the_case_s():
     found = swapped().judgement
-    assert found.systems[assigned("A", "B", "C")].record == found.whole.record
+    assert found.systems[assigned("A", "B")].record == found.whole.record
     assert found.worst_assignment is not None
-    assert found.worst_assignment.name.names == ("B", "B", "B")
-    assert sum(one.stable is False for one in found.assignments) == 7
-    assert len(found.assignments) == 27
+    assert found.worst_assignment.name.names == ("B", "B")
+    assert found.worst_assignment.least_damping == pytest.approx(0.55, abs=0.01)
+    assert len(found.assignments) == 4
 
 
 def test_equal_places_may_change_their_devices():
     """West and east are alike: A west and B east is B west and A east."""
     systems = swapped().judgement.systems
-    one, other = systems[assigned("A", "B", "A")], systems[assigned("B", "A", "A")]
+    one, other = systems[assigned("A", "B")], systems[assigned("B", "A")]
     assert one.least_damping == pytest.approx(other.least_damping, abs=1e-6)
-    assert one.stable is other.stable is False
+    assert one.stable is other.stable is True
 
 
 def test_an_identical_file_gives_the_same_figures(fmu_path, tmp_path):
