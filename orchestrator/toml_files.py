@@ -48,7 +48,14 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
         return text, tomllib.loads(text)
     except OSError as error:
         raise InputError(f"{source}: {subject} cannot be read: {error.strerror}; {remedy}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
+        last = f"at the end of line {len(text.rstrip().splitlines())}, the last one"
+        said = str(error).replace("at end of document", last)
+        raise InputError(
+            f"{source}: it is not a TOML file: {said}; write NAME = VALUE, texts in quotes, and close every bracket "
+            "and quote"
+        ) from error
+    except UnicodeDecodeError as error:
         raise InputError(f"{source}: it is not a TOML file: {error}") from error
     except RecursionError as error:
         raise InputError(f"{source}: its brackets nest too deeply to be read; {subject} nests at most five") from error

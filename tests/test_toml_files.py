@@ -20,6 +20,11 @@ def test_a_file_comes_as_text_and_as_tables(tmp_path):
     [
         (None, "the file cannot be read: No such file or directory; print one"),
         (b"[a", "it is not a TOML file: Expected ']' at the end of a table declaration"),
+        (b"a = 1\nb =\n\n", "it is not a TOML file: Invalid value (at line 2, column 4); write NAME = VALUE"),
+        (
+            b"a = 1\nb = ",
+            "it is not a TOML file: Invalid value (at the end of line 2, the last one); write NAME = VALUE",
+        ),
         (b"\xff\xfe", "it is not a TOML file: 'utf-8' codec can't decode"),
     ],
 )

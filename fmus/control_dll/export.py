@@ -1,7 +1,7 @@
 """Writing a converter's control as IEEE/CIGRE DLL, with the data sheet of the circuit around it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -109,6 +109,7 @@ def write_dll(
     platforms: tuple[str, ...] = tuple(DLL_TARGETS),
     sample_time: float = SAMPLE_TIME,
     values: Mapping[str, float] | None = None,
+    report: Callable[[str], None] = lambda text: None,
 ) -> WrittenDll:
     """Write the libraries, each into the folder of its platform, and the data sheet beside these folders.
 
@@ -124,6 +125,8 @@ def write_dll(
         Between two calls of the control [s].
     values
         Other defaults of the DLL's parameters, by name.
+    report
+        Called with a sentence before each part of the work.
 
     Raises
     ------
@@ -140,9 +143,11 @@ def write_dll(
             "control's fast loops are stable"
         )
     chosen = with_values(part, values or {}, sample_time)
-    code = dll_source(chosen.model, sample_time)
     name, built = chosen.model.name, {}
-    for platform in platforms:
+    report(f"{name}: writing the C code of its control part")
+    code = dll_source(chosen.model, sample_time)
+    for number, platform in enumerate(platforms, 1):
+        report(f"{name}: compiling for {platform} ({number} of {len(platforms)}); minutes where it was never compiled")
         target, ending = DLL_TARGETS[platform]
         built[platform] = (f"{name}{ending}", compile_for(code, target, ending).read_bytes())
     libraries = {platform: folder / platform / file for platform, (file, _) in built.items()}

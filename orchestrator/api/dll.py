@@ -1,6 +1,6 @@
 """IEEE/CIGRE DLLs: FMUs of those that vendors deliver, and our own control as one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -107,6 +107,7 @@ def export_dll(
     platforms: Sequence[str] | None = None,
     sample_time: float = 2e-5,
     values: Mapping[str, float] | None = None,
+    report: Callable[[str], None] = lambda text: None,
 ) -> ExportedDll:
     """Write the control part of a converter as IEEE/CIGRE DLL, for EMT programs.
 
@@ -122,6 +123,8 @@ def export_dll(
         Between two calls of the control [s].
     values
         Other defaults of the DLL's parameters, by name; Booleans as 0 or 1.
+    report
+        Called with a sentence before each part of the work.
 
     Raises
     ------
@@ -136,7 +139,7 @@ def export_dll(
     place = path_of(folder, "folder", "folder")
     chosen = tuple(export.DLL_TARGETS) if platforms is None else names(platforms, "platforms")
     try:
-        written = export.write_dll(export.control_part_of(name), place, chosen, sample_time, values)
+        written = export.write_dll(export.control_part_of(name), place, chosen, sample_time, values, report)
     except export.ControlDllError as error:
         raise InputError(str(error)) from error
     return ExportedDll(written.libraries, written.sheet)

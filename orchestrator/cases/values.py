@@ -1,6 +1,7 @@
 """Values of a case file, brought to the type, unit and range that a variable declares."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -10,6 +11,9 @@ from orchestrator.cases.schema import Value
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.units import to_unit
+
+_CHOICES = re.compile(r"\b0: .*\b1: ")
+"""In the description of a variable that chooses: what its numbers mean."""
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:
@@ -26,19 +30,22 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
         raise ValueError(f"{info.name} = {value!r}; it must be true or false")
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"{info.name} = {value!r}; it must be a number")
+    unit = f" {info.unit}" if info.unit not in ("", "1") else ""
+    choices = f" ({info.description})" if _CHOICES.search(info.description) else ""
     try:
         number = to_unit(value, info.unit)
     except ValueError as error:
+        if choices:
+            raise ValueError(f"{info.name} = {value!r}; it must be one of its numbers{choices}") from error
         raise ValueError(f"{info.name}: {error}") from error
-    unit = f" {info.unit}" if info.unit not in ("", "1") else ""
     if not math.isfinite(number):
         raise ValueError(f"{info.name} = {number}; it must be a finite number")
     if info.type == "Integer" and number != int(number):
-        raise ValueError(f"{info.name} = {number:g}; it must be a whole number")
+        raise ValueError(f"{info.name} = {number:g}; it must be a whole number{choices}")
     if info.minimum is not None and number < info.minimum:
-        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}")
+        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}{choices}")
     if info.maximum is not None and number > info.maximum:
-        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}")
+        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}{choices}")
     return number
 
 

@@ -95,10 +95,12 @@ def _names(named: Sequence[tuple[str | None, Path]]) -> list[str]:
                     found[k] = name
                 break
     if twice := _doubles(found):
-        which = ", ".join(str(path) for name, (_, path) in zip(found, named, strict=True) if name in twice)
+        name = twice[0]
+        files = [path for other, (_, path) in zip(found, named, strict=True) if other.casefold() == name.casefold()]
+        remedy = " ".join(f"{name}_{number}={path}" for number, path in enumerate(files, 1))
         raise InputError(
-            f"{which}: they would share the folder {twice[0]} for their results; give each a name of its own, as in "
-            "box=FILE.fmu"
+            f"{', '.join(map(str, files))}: {len(files)} devices are called {name!r}, so that they would share one "
+            f"folder for their results; give each a name of its own, as in {remedy}"
         )
     return found
 

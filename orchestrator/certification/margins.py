@@ -43,8 +43,8 @@ def margins_of(certificate: Certification | CodeCertificate) -> list[CriterionMa
     """
     if isinstance(certificate, CodeCertificate):
         return [
-            CriterionMargin(v.row.name, f.criterion, f.margin, bool(f.accepted), f.text)
-            for v in certificate.verdicts if v.judged for f in v.findings
+            CriterionMargin(v.row.name, f.criterion, f.margin, f.accepted, f.text)
+            for v in certificate.verdicts if v.judged for f in v.findings if f.accepted is not None
         ]  # fmt: skip
     return [margin for v in certificate.verdicts if v.judged for margin in _of_point(v)]
 

@@ -1,6 +1,5 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,14 +9,15 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.certification.acceptance import Acceptance
-from orchestrator.certification.case_file import BASE, BINDING, FMU, WITH, WITHOUT, write_case
+from orchestrator.certification.case_file import BASE, WITH, WITHOUT, write_case
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.details import Details
 from orchestrator.certification.judgement import PointVerdict, judge, watched
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
+from orchestrator.certification.refusal import refused
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
-from orchestrator.errors import CaseError, Problem
+from orchestrator.errors import CaseError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
@@ -193,27 +193,10 @@ def _laid_case(
         try:
             prepared(Path(trial))
         except CaseError as error:
-            raise _refused(request, error, trial) from error
+            raise refused(
+                request, error, trial, "in the study's case that `gfor certify` makes from the request"
+            ) from error
     return prepared(folder)
-
-
-def _refused(request: CertificationRequest, error: CaseError, trial: str) -> CaseError:
-    """The same problems with places in the user's own files, because the case file that was made from the request is
-    deleted.
-    """
-    own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
-
-    def said(text: str) -> str:
-        for laid, given in own.items():
-            text = text.replace(laid, given)
-        return text
-
-    problems = [Problem(re.sub(r"^line \d+, ", "", p.place), said(p.text)) for p in error.problems]
-    if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
-        problems.append(
-            Problem("", f"if its port has other names, give --binding; `gfor bind {request.fmu}` drafts one")
-        )
-    return CaseError(f"{request.fmu}, in the study's case that `gfor certify` makes from the request", problems)
 
 
 def tasks_of(

@@ -11,6 +11,7 @@ from rich.markup import escape
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
 from orchestrator.certification.codes.record import figures_of, save_certificate
+from orchestrator.certification.codes.row_verdict import NOT_JUDGED
 from orchestrator.certification.devices import Device
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
@@ -126,7 +127,7 @@ def certified_code(
     return certified(
         options, request, folder, "orchestrator.certification.codes.bench_point",
         lambda executor, report: certify_code(request, code, executor, folder, report=report), save_certificate,
-        console,
+        console, (f"{device.name}, {key}", "rows"),
     )  # fmt: skip
 
 
@@ -158,10 +159,8 @@ def _table(found: CodeCertificate) -> PlainTable:
         table.add_column(column)
     for v in found.verdicts:
         if v.unknown:
-            table.add_row(escape(v.row.name), "", escape(v.unknown[:100]), "–", "not judged")
+            table.add_row(escape(v.row.name), "", escape(v.unknown[:160]), "–", NOT_JUDGED)
         for f in v.findings:
             margin = "–" if f.margin is None else f"{100 * f.margin:+.0f} %"
-            word = "accepted" if f.accepted else "not accepted"
-            word = f"{word}, shown only" if v.row.shown_only else word
-            table.add_row(escape(v.row.name), escape(f.criterion), escape(f.text[:100]), margin, word)
+            table.add_row(escape(v.row.name), escape(f.criterion), escape(f.text[:160]), margin, v.word(f))
     return table

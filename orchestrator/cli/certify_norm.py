@@ -77,6 +77,7 @@ def certified_norm(
     return certified(
         options, request, folder, "orchestrator.certification.point",
         lambda executor, report: certify(request, executor, folder, report), partial(save, pdf=options.pdf), console,
+        (f"{device.name}, nts631", "points"),
     )  # fmt: skip
 
 

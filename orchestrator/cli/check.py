@@ -89,12 +89,19 @@ def _print(report: AcceptanceReport) -> None:
     console = Console(soft_wrap=True, highlight=False, emoji=False)
     if report.used_as:
         console.print(f"As {escape(report.used_as)}.", end="\n\n")
+    told: dict[tuple[str, str], str] = {}
+    advised: set[str] = set()
     for result in _each_once(report.results):
         mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
         fault = f"[bold]{result.fault}:[/] " if result.fault else ""
-        console.print(f"{mark} {result.check:<22} {fault}{escape(_in_one_line(result.evidence))}")
-        if result.remedy:
+        evidence = escape(_in_one_line(result.evidence))
+        if result.fault:
+            first = told.setdefault((result.fault, result.evidence), result.check)
+            evidence = evidence if first == result.check else f"the same as in {first!r}"
+        console.print(f"{mark} {result.check:<22} {fault}{evidence}")
+        if result.remedy and result.remedy not in advised:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
+            advised.add(result.remedy)
     console.print("")
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]

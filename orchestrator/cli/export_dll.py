@@ -28,13 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write the libraries and the data sheet, and print their paths."""
     with said_stages() as report:
-        report(f"{options.name}: compiling its control part; minutes where it was never compiled")
         written = export_dll(
             options.name,
             options.dest,
             platforms=options.platform,
             sample_time=options.sample_time,
             values=dict(map(_value, options.set)),
+            report=report,
         )
     for path in (*written.libraries.values(), written.sheet):
         print(path)

@@ -93,6 +93,17 @@ def test_a_faulty_one_ends_with_1_and_says_what_to_do(gfor, gallery, tmp_path):
     assert suite.find("testcase/failure").get("message") == "wrong sign"
 
 
+def test_one_cause_is_told_once(gfor, gallery):
+    """A step that is discarded at 0.3 s ends three checks; what to do about it stands once as well."""
+    code, text, _ = gfor("check", gallery("discards")[0], "--only", "loads", "--only", "runs", "--only", "steady_state")
+    assert code == 1
+    assert text.count("fmi2DoStep returned fmi2Discard") == 1
+    assert "error in a step: the same as in 'runs'" in text
+    (line,) = [number for number, words in enumerate(text.splitlines()) if "fmi2Discard" in words]
+    remedy = text.splitlines()[line + 1].strip()
+    assert text.count(remedy) == 1
+
+
 def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path):
     code, text, _ = gfor("check", entities(tmp_path, gallery("gain")[0]))
     assert code == 1

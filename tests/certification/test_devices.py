@@ -30,6 +30,11 @@ def test_two_devices_with_one_folder_are_refused(files):
         devices_of(files)
 
 
+def test_two_devices_of_one_name_are_told_how_to_be_called():
+    with pytest.raises(InputError, match=r"2 devices are called 'x'.* as in x_1=a\.fmu x_2=b\.fmu"):
+        devices_of(["x=a.fmu", "x=b.fmu", "c.fmu"])
+
+
 @pytest.mark.parametrize("text", ["..=x.fmu", ".hidden=x.fmu", "a:b=x.fmu", "a b=x.fmu"])
 def test_a_name_that_is_no_folder_is_refused(text):
     with pytest.raises(InputError, match="cannot be called"):

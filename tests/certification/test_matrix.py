@@ -10,8 +10,9 @@ import pytest
 import orchestrator as gfor_api
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.certificate import CodeCertificate, RowVerdict
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
+from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.criteria import ModalTest, ModeVerdict
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.margins import CriterionMargin, margins_of, narrowest

@@ -10,9 +10,10 @@ from orchestrator.cases.case import load_case
 from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.codes.bench_case import lay_files, rated_frequency, write_row
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
-from orchestrator.certification.codes.measured import MeasuredRow
-from orchestrator.certification.codes.row import CodeRow, GridCode, RowFinding
+from orchestrator.certification.codes.row import CodeRow, GridCode
+from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.details import Details
+from orchestrator.certification.refusal import refused
 from orchestrator.certification.request import GIVEN, CertificationRequest, shown
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.errors import CaseError
@@ -21,36 +22,6 @@ from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import POINTS, PointStore
-
-
-@dataclass(frozen=True)
-class RowVerdict:
-    """A row's findings.
-
-    Attributes
-    ----------
-    unknown
-        Why the row is not judged; empty where it is.
-    """
-
-    row: CodeRow
-    findings: tuple[RowFinding, ...] = ()
-    unknown: str = ""
-
-    @property
-    def judged(self) -> bool:
-        """Whether it counts towards the verdict."""
-        return not self.unknown and not self.row.shown_only
-
-    @property
-    def accepted(self) -> bool:
-        """Whether every criterion is met."""
-        return not self.unknown and all(finding.accepted for finding in self.findings)
-
-    @property
-    def failed(self) -> list[RowFinding]:
-        """The criteria that are not met."""
-        return [finding for finding in self.findings if not finding.accepted]
 
 
 @dataclass
@@ -99,7 +70,7 @@ class CodeCertificate:
     @property
     def verdict(self) -> str:
         """In one word: ``passes``, ``fails`` or ``incomplete``."""
-        return verdict_of([v.accepted for v in self.verdicts if v.judged], len(self.missing))
+        return verdict_of([bool(v.accepted) for v in self.verdicts if v.judged], len(self.missing))
 
     @property
     def refused(self) -> bool:
@@ -167,7 +138,11 @@ def certify_code(
     f_n = rated_frequency(request, code.f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]
     with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
-        _tasks(request, chosen[:1], f_n, Path(trial))  # a request that is refused leaves existing files as they are
+        try:  # a request that is refused leaves existing files as they are
+            _tasks(request, chosen[:1], f_n, Path(trial))
+        except CaseError as error:
+            raise refused(request, error, trial, "on the test bench of `gfor certify --code`") from error
+    report(0, len(chosen))
     tasks = _tasks(request, chosen, f_n, folder)
     results: dict[str, BenchResult] = {}
     stored, store = 0, PointStore(folder / POINTS)
@@ -185,25 +160,7 @@ def _tasks(request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, f
     for row in rows:
         path = write_row(request, row.name, row.title, row.programme(f_n), f_n, folder)
         case = load_case(path)
-        try:
-            (prepared,) = case.prepare()
-        except CaseError as error:
-            raise CaseError(f"{request.fmu}, on the test bench of `gfor certify --code`", error.problems) from error
+        (prepared,) = case.prepare()
         content = {"bench": row.name, "text": case.text, **scenario_content(prepared)}
         tasks.append(BenchTask(row.name, reference_to(case), fingerprint(case), key_of(content)))
     return tasks
-
-
-def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
-    """Apply a row's criteria to its response."""
-    if result.failure:
-        return RowVerdict(row, unknown=result.failure)
-    programme = row.programme(f_n)
-    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings))
-    short = len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3
-    if short:
-        ended = float(result.times[-1]) if len(result.times) else 0.0
-        text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
-        rule = "the converter runs to the end"
-        return RowVerdict(row, (RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text),))
-    return RowVerdict(row, tuple(judge(measured) for judge in row.criteria))

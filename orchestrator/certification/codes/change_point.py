@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.certification.codes.all_codes import code_for
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
-from orchestrator.certification.codes.certificate import RowVerdict, judge_row
+from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.store import Arrays
 from orchestrator.watch.finding import UNSTABLE
@@ -143,11 +143,13 @@ def margins_with_time(
     faults = [float(f["time"]) for f in findings if f["kind"] in UNSTABLE]
     found = []
     for f in verdict.findings:
+        if f.accepted is None:
+            continue
         margin, timed = f.margin, f.margin is None and f.criterion in _TIMED
         times = [*faults, f.value or 0.0] if f.criterion == ENDED else faults
         if timed and not f.accepted and times:
             margin = min(times) / stop - 1
-        found.append(ChangedCriterion(f.criterion, margin, bool(f.accepted), f.text, timed))
+        found.append(ChangedCriterion(f.criterion, margin, f.accepted, f.text, timed))
     return tuple(found)
 
 

@@ -57,14 +57,15 @@ def _number(value: float) -> float | None:
 
 
 def holds_together() -> Judge:
-    """Neither a loss of synchronism, nor growth, nor a lasting oscillation, as `gfor run` watches for them."""
+    """Neither a loss of synchronism, nor growth, nor a lasting oscillation, as `gfor run` watches for them, nor a trip.
+
+    What the watch could not tell is said; whether the response settles is a criterion of its own.
+    """
 
     def judge(row: MeasuredRow) -> RowFinding:
         faults = row.faults
-        if not all(np.isfinite(values).all() for values in row.signals.values()):
-            faults = ["the response is not finite", *faults]
-        text = "; ".join(faults) or "nothing was found"
-        return RowFinding("stable", "no loss of synchronism, growth or lasting oscillation", READING,
+        text = "; ".join(faults or ["nothing was found", *row.undecided])
+        return RowFinding("stable", "no loss of synchronism, growth, lasting oscillation or trip", READING,
                           float(len(faults)), 0.0, None, not faults, text)  # fmt: skip
 
     return judge

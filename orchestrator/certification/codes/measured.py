@@ -9,7 +9,18 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.point import bus_frequency
-from orchestrator.watch.finding import UNSTABLE
+from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
+
+NOTHING, ALIVE, GONE = 1e-6, 0.1, 0.1
+"""Apparent power below which a plant feeds in nothing [pu], voltage from which on it could [pu], and how long it has to
+last to be a trip [s]."""
+
+SHARE = 1e-4
+"""`NOTHING` is nothing where it is less than this part of the power before."""
+
+_IN_WORDS = {"loss_of_synchronism": "it slips", "growth": "it grows", "growing_oscillation": "it swings ever more",
+             "sustained_oscillation": "it swings for ever", "run_away": "it runs away",
+             "not_finite": "it gives no numbers"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,49 @@ class MeasuredRow:
     @property
     def faults(self) -> list[str]:
         """What the watch found that no stable system does."""
-        return [str(f["message"]) for f in self.findings if f["kind"] in UNSTABLE]
+        watched = [str(f["message"]) for f in self.findings if f["kind"] in UNSTABLE]
+        odd = [] if self.finite else ["the response is not finite"]
+        gone = self.tripped
+        return odd + watched + ([] if gone is None else [_gone(gone)])
+
+    @property
+    def undecided(self) -> list[str]:
+        """What the watch could not tell."""
+        return [str(f["message"]) for f in self.findings if f["kind"] == NOT_JUDGED]
+
+    @property
+    def finite(self) -> bool:
+        """Whether every value of every signal is a number."""
+        return all(bool(np.isfinite(values).all()) for values in self.signals.values())
+
+    @cached_property
+    def tripped(self) -> float | None:
+        """When the plant stops feeding in, at a bus that has a voltage [s]; None where it does not.
+
+        It has stopped where its apparent power is nothing for `GONE`. Of a plant that feeds in nothing before the first
+        event this cannot be told.
+        """
+        if "q" not in self.signals or not self.events or abs(self.before(self.events[0])) < NOTHING / SHARE:
+            return None
+        silent = (np.hypot(self.p, self.signals["q"]) < NOTHING) & (self.signals["v"] > ALIVE)
+        count = round(GONE / float(self.times[1] - self.times[0]))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], silent.astype(int), [0]])))
+        long = [begin for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin >= count]
+        return float(self.times[long[0]]) if long else None
+
+    @property
+    def broken(self) -> str:
+        """Why criteria beside that of holding together have no meaning, in words; empty where they have."""
+        first = min((f for f in self.findings if f["kind"] in UNSTABLE), key=lambda f: float(f["time"]), default=None)
+        if first is not None:
+            return f"{_IN_WORDS.get(first['kind'], 'the run fails')} from t = {float(first['time']):g} s on"
+        if not self.finite:
+            return "the response is not finite"
+        return "" if self.tripped is None else _gone(self.tripped)
+
+
+def _gone(time: float) -> str:
+    return f"it feeds in nothing from t = {time:g} s on, as after a trip"
 
 
 def over_a_period(values: Numbers, times: Numbers, f_n: float) -> Numbers:

@@ -10,8 +10,9 @@ from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import judge_row, verdict_of
+from orchestrator.certification.codes.certificate import verdict_of
 from orchestrator.certification.codes.record import FORMAT, finding_json
+from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.verification import Verification
 from orchestrator.errors import InputError
@@ -77,7 +78,7 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
             if not same or (again.judged, again.accepted) != (stated["judged"], stated["accepted"]):
                 faults.append(f"row {row.name}: its response gives other findings than {JSON} states")
             if again.judged:
-                accepted.append(again.accepted)
+                accepted.append(bool(again.accepted))
     done = {stated["row"] for stated in content["rows"] if stated["judged"]}
     absent = [row.name for row in code.rows if not row.shown_only and row.name not in done]
     wanted = verdict_of(accepted, len(absent) + len(code.left_out) + len(content["departures"]))

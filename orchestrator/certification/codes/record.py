@@ -11,8 +11,9 @@ from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.codes.bench_case import case_name
-from orchestrator.certification.codes.certificate import CodeCertificate, RowVerdict
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
+from orchestrator.certification.codes.row_verdict import NOT_JUDGED, RowVerdict
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, write_sealed
 from orchestrator.report.html.document import document
@@ -20,7 +21,7 @@ from orchestrator.report.html.elements import table
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import write_text
 
-FORMAT = "code-1"
+FORMAT = "code-2"
 """Form of the JSON of a code's certificate."""
 
 
@@ -80,18 +81,18 @@ def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
     """The page of a certificate; ``mark`` is the hash of its figures."""
     rows = [
         [escape(v.row.name), escape(v.row.clause), escape(v.row.title), escape(f.criterion), escape(f.rule),
-         "the code's" if f.origin == "code" else "reading", escape(f.text), _margin(f), _word(f.accepted)]
+         "the code's" if f.origin == "code" else "reading", escape(f.text), _margin(f), _word(v, f)]
         for v in c.verdicts for f in v.findings
     ]  # fmt: skip
     rows += [[escape(v.row.name), escape(v.row.clause), escape(v.row.title), "", "", "", escape(v.unknown), "–",
-              "not judged"] for v in c.verdicts if v.unknown]  # fmt: skip
+              NOT_JUDGED] for v in c.verdicts if v.unknown]  # fmt: skip
     columns = ["Row", "Clause", "Stimulus", "Criterion", "Rule", "Number is", "Found", "Margin", "Verdict"]
     shown_rows = [r.name for r in c.code.rows if r.shown_only]
     source = f"<p>{escape(c.code.source)}, {escape(c.code.date)}. Figures: SHA-256 {mark}.</p>"
     details = [[escape(label), escape(text)] for label, text in c.details.rows()]
     sections = [
         ("For whom and by whom", table("Details", ["", ""], details, left=2)),
-        ("Result", table("All criteria", columns, rows, left=9) + _list("Rows without a verdict", shown_rows)),
+        ("Result", table("All criteria", columns, rows, left=9) + _list("The code gives no verdict on", shown_rows)),
         ("What was not tested", _list("", [*c.code.left_out, *c.departures])),
         ("How the code was read", _list("", c.code.readings)),
         ("Source", source),
@@ -109,5 +110,6 @@ def _margin(finding: RowFinding) -> str:
     return "–" if finding.margin is None else f"{100 * finding.margin:+.0f} %".replace("-", "−")
 
 
-def _word(accepted: bool | None) -> str:
-    return "accepted" if accepted else '<span class="bad">not accepted</span>'
+def _word(verdict: RowVerdict, finding: RowFinding) -> str:
+    word = verdict.word(finding)
+    return f'<span class="bad">{word}</span>' if finding.accepted is False else word

@@ -24,7 +24,7 @@ class RowFinding:
     margin
         How far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
     accepted
-        None where it cannot be judged.
+        None where it is not judged, or the code gives no verdict.
     text
         The result in words.
     """

@@ -115,7 +115,8 @@ def sensitivity_of(
         elif result.failure is not None:
             doubts.append(f"{word}, it is refused: {result.failure}")
         elif (again := _same(criterion, result)) is None:
-            doubts.append(f"{word}, {result.criteria[0].text if result.criteria else 'nothing was judged'}")
+            why = next((c.text for c in result.criteria if not c.accepted), "nothing was judged")
+            doubts.append(f"{word}, {why}")
         else:
             met[sign] = again.accepted
             if again.margin is None and not again.accepted:

@@ -14,7 +14,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.certification.codes.bench_case import DUPLICATE, PLANT, case_name
 from orchestrator.certification.codes.bench_point import BenchTask
-from orchestrator.certification.codes.certificate import CodeCertificate, RowVerdict
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import (
     ChangedCriterion,
     ChangeResult,
@@ -23,6 +23,7 @@ from orchestrator.certification.codes.change_point import (
     margins_with_time,
     mark_of,
 )
+from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.codes.sensitivity import MarginSensitivity, sensitivity_of
 from orchestrator.certification.request import GIVEN
 from orchestrator.coupling.step_awareness import INTERNAL_STEP, STEP_PARAMETER

@@ -35,6 +35,20 @@ def test_what_only_the_damping_test_has_is_refused(converter, gfor_command):
     assert "--reactances: only --code nts631 has it" in " ".join(said.split())
 
 
+@pytest.mark.parametrize("code", ["ercot", "nts631"])
+def test_a_value_that_cannot_be_is_told_at_its_option_with_its_choices(converter, tmp_path, gfor_command, code):
+    """And at no line of a file that the user did not write."""
+    words = ["--code", code, "--no-check", "--reactances", "0.1"][: 3 if code == "ercot" else 5]
+    out = ["--out", tmp_path / "out"]
+    for value, rule in (("two", "it must be one of its numbers"), ("7", "it must be at most 3")):
+        ended, _, said = gfor_command("certify", converter, *words, *out, "--set", f"current_limit.kind={value}")
+        said = " ".join(said.split())
+        assert ended == 2
+        assert f"--set current_limit.kind={value}: current_limit.kind = " in said
+        assert f"{rule} (0: box in q and d; 1: circular; " in said
+        assert "line " not in said
+
+
 def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp_path, gfor_command):
     def certified():
         return certify_code(CertificationRequest(converter), ERCOT, Serial(), tmp_path, ("phase_jumps",))

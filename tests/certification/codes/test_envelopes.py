@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from orchestrator.certification.codes import envelope as e
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import judge_row
+from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.codes.rte import DECLARED, Envelope, rte_code
 from orchestrator.certification.matrix import MatrixCell
 from orchestrator.certification.verdict import PASSES

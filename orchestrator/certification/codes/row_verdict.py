@@ -1,0 +1,84 @@
+"""The verdict on one row: what its criteria say of the response, and what none of them can say."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.certification.codes.row import CodeRow, RowFinding
+
+NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
+"""In place of a verdict: where the code gives none, and where the response allows none."""
+
+
+@dataclass(frozen=True)
+class RowVerdict:
+    """A row's findings.
+
+    Attributes
+    ----------
+    unknown
+        Why the row is not judged; empty where it is.
+    """
+
+    row: CodeRow
+    findings: tuple[RowFinding, ...] = ()
+    unknown: str = ""
+
+    @property
+    def judged(self) -> bool:
+        """Whether it counts towards the verdict."""
+        return not self.unknown and not self.row.shown_only
+
+    @property
+    def accepted(self) -> bool | None:
+        """Whether every criterion is met; None where the row does not count."""
+        return all(finding.accepted for finding in self.findings) if self.judged else None
+
+    @property
+    def failed(self) -> list[RowFinding]:
+        """The criteria that are not met; none where the code gives no verdict."""
+        return [finding for finding in self.findings if finding.accepted is False]
+
+    def word(self, finding: RowFinding) -> str:
+        """What is said of one of its findings: accepted, not accepted, not judged, or that the code has no verdict."""
+        if self.row.shown_only:
+            return NO_VERDICT
+        return {True: "accepted", False: "not accepted", None: NOT_JUDGED}[finding.accepted]
+
+
+def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
+    """Apply a row's criteria to its response.
+
+    A converter that does not hold together answers nothing else: what its other criteria meet is not judged, and what
+    they miss stays missed.
+
+    Parameters
+    ----------
+    row
+        Of the code.
+    result
+        The response.
+    f_n
+        Rated frequency of the bench [Hz].
+    """
+    if result.failure:
+        return RowVerdict(row, unknown=result.failure)
+    programme = row.programme(f_n)
+    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings))
+    if len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3:
+        ended = float(result.times[-1]) if len(result.times) else 0.0
+        text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
+        rule = "the converter runs to the end"
+        found: Sequence[RowFinding] = [RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text)]
+    else:
+        found = [judge(measured) for judge in row.criteria]
+        if reason := measured.broken:
+            found = [_without_meaning(finding, reason) if finding.accepted else finding for finding in found]
+    if row.shown_only:
+        return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
+    return RowVerdict(row, tuple(found))
+
+
+def _without_meaning(finding: RowFinding, reason: str) -> RowFinding:
+    return replace(finding, accepted=None, margin=None, text=f"{finding.text}; {NOT_JUDGED}, {reason}")

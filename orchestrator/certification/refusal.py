@@ -1,0 +1,54 @@
+"""Why a request is refused, with places in what the user gave: the case file that was made of it is deleted."""
+
+import re
+from pathlib import Path
+
+from orchestrator.cases.schema import Value
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.point import CONVERTER
+from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.errors import CaseError, Problem
+
+_OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$')
+"""Place of a value of the converter, in a case file or among changes."""
+
+
+def refused(request: CertificationRequest, error: CaseError, trial: str | Path, where: str) -> CaseError:
+    """The same problems, each at the option or in the file of the user that it comes from.
+
+    Parameters
+    ----------
+    request
+        That was refused.
+    error
+        Of the case file that was made of it.
+    trial
+        The folder in which that file lay.
+    where
+        What the case file was, in words.
+    """
+    own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
+
+    def said(text: str) -> str:
+        for laid, given in own.items():
+            text = text.replace(laid, given)
+        return text
+
+    problems = []
+    for problem in error.problems:
+        place = re.sub(r"^line \d+, ", "", problem.place)
+        value = _OWN.match(place)
+        if value and value["name"] in request.values:
+            place = f"--set {value['name']}={_shown(request.values[value['name']])}"
+        text = said(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
+        problems.append(Problem(place, text))
+    if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
+        problems.append(
+            Problem("", f"if its port has other names, give --binding; `gfor bind {request.fmu}` drafts one")
+        )
+    return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))
+
+
+def _shown(value: Value) -> str:
+    """A value as the user wrote it."""
+    return f"{value:.15g}" if isinstance(value, float) else shown(value)

@@ -1,0 +1,89 @@
+"""What is said of rows in which a converter does not hold together, or on which the code gives no verdict."""
+
+import numpy as np
+import pytest
+
+from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.row_verdict import judge_row
+
+TIMES = np.arange(0, 21.0005, 1e-3)
+"""Of AEMO's rows of jumps."""
+
+
+def opposing(times=TIMES):
+    """Half of the rating, and against each of the four jumps by 0.4 pu for a while."""
+    power = np.full(times.shape, 0.5)
+    for start, sign in ((1.0, 1), (6.0, -1), (11.0, -1), (16.0, 1)):
+        power += sign * 0.4 * np.exp(-np.clip(times - start, 0, None) / 0.1) * (times > start)
+    return power
+
+
+def judged(p, name="jump_30", kind="", **given):
+    """A row on a response with that active power, and a finding of that kind at 1.3 s."""
+    row = next(row for row in CODES["aemo"].rows if row.name == name)
+    signals = {"p": p, "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)} | given
+    findings = [{"kind": kind, "time": 1.3, "message": "found"}] if kind else []
+    return judge_row(row, BenchResult(name, TIMES, signals, findings), 50.0)
+
+
+@pytest.mark.parametrize("kind", ["loss_of_synchronism", "run_away", "growth"])
+def test_beside_a_slip_nothing_reads_as_accepted(kind):
+    """The same response without the slip meets every criterion."""
+    assert {f.accepted for f in judged(opposing()).findings} == {True}
+    verdict = judged(opposing(), kind=kind)
+    stable, *others = verdict.findings
+    assert (stable.accepted, verdict.judged, verdict.accepted) == (False, True, False)
+    assert {(f.accepted, f.margin) for f in others} == {(None, None)}
+    assert all("not judged, it" in f.text and "from t = 1.3 s on" in f.text for f in others)
+    assert [f.criterion for f in verdict.failed] == ["stable"]
+    assert verdict.word(others[0]) == "not judged"
+
+
+def test_beside_values_that_are_no_numbers_nothing_reads_as_accepted():
+    """The last value alone: no criterion looks at it."""
+    verdict = judged(np.where(TIMES > 20.9995, np.nan, opposing()))
+    assert not any(f.accepted for f in verdict.findings)
+    assert "not finite" in verdict.findings[0].text
+
+
+def test_what_is_missed_beside_a_slip_stays_missed():
+    verdict = judged(np.full(TIMES.shape, 0.5), kind="loss_of_synchronism")
+    assert [f.accepted for f in verdict.findings[1:5]] == [False] * 4
+    assert verdict.findings[1].margin == pytest.approx(-1)
+
+
+def test_a_row_without_a_verdict_says_so_and_keeps_its_figures():
+    verdict = judged(opposing(), "jump_60")
+    assert (verdict.judged, verdict.accepted, verdict.failed) == (False, None, [])
+    assert {verdict.word(f) for f in verdict.findings} == {"no verdict"}
+    assert {f.accepted for f in verdict.findings} == {None}
+    assert verdict.findings[1].value > 0.2
+
+
+def test_what_the_watch_cannot_tell_is_said():
+    """Whether a response settles is a criterion of its own, which fails where it does not."""
+    verdict = judged(opposing(), kind="not_judged")
+    assert (verdict.accepted, verdict.findings[0].text) == (True, "nothing was found; found")
+    moving = judged(opposing() + 1e-4 * np.exp(TIMES / 2), kind="not_judged")
+    assert "settles" in [f.criterion for f in moving.failed]
+
+
+@pytest.mark.parametrize(("at", "lasts"), [(18.0, 99.0), (3.0, 99.0), (3.0, 0.3)])
+def test_a_plant_that_trips_in_silence_is_not_stable(at, lasts):
+    """Also where it is back before any criterion looks."""
+    gone = (at <= TIMES) & (at + lasts > TIMES)
+    found = judged(np.where(gone, 0.0, opposing()), q=np.where(gone, 0.0, 0.1)).findings
+    assert not found[0].accepted
+    assert f"feeds in nothing from t = {at:g} s on" in found[0].text
+    assert not any(f.accepted for f in found)
+
+
+def test_a_plant_at_rest_without_power_has_not_tripped():
+    assert judged(opposing() - 0.5, q=0 * TIMES).findings[0].accepted
+
+
+def test_a_fault_that_leaves_no_voltage_is_no_trip():
+    dip = (TIMES >= 3) & (TIMES < 3.2)
+    found = judged(np.where(dip, 0.0, opposing()), q=np.where(dip, 0.0, 0.1), v=np.where(dip, 0.0, 1.0))
+    assert found.findings[0].accepted
