@@ -9,8 +9,8 @@ from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
 from orchestrator.errors import InputError
 
-NOT_TESTED = "not tested"
-"""In place of a verdict, where a device could not be tested at all."""
+NOT_TESTED, FIGURES = "not tested", "no verdict"
+"""In place of a verdict: where a device could not be tested at all, and where a code gives figures alone."""
 
 
 @dataclass
@@ -33,6 +33,8 @@ class MatrixCell:
         Whether an acceptance test of the FMU failed.
     has_needs
         Whether what the failed criteria would take lies beside the certificate.
+    figures
+        What a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
     """
 
     device: str
@@ -46,6 +48,7 @@ class MatrixCell:
     missing: int = 0
     refused: bool = False
     has_needs: bool = False
+    figures: Sequence[str] | None = None
 
     def take(self, found: Certification | CodeCertificate) -> None:
         """Take the figures of a certificate."""
@@ -71,7 +74,9 @@ class MatrixCell:
 
     @property
     def exit_code(self) -> int:
-        """As `gfor certify` of this device and code alone ends."""
+        """As `gfor certify` of this device and code alone ends; 0 of figures without a verdict."""
+        if self.figures is not None:
+            return 0
         return InputError.exit_code if self.failure is not None else exit_code(self.verdict, refused=self.refused)
 
 
@@ -105,11 +110,14 @@ class CertificateMatrix:
 
     def sentence(self) -> str:
         """The matrix in a sentence."""
-        verdicts = [cell.verdict for cell in self.cells.values()]
+        verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
-        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
+        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key))) or "none"
+        alone = list(dict.fromkeys(cell.code for cell in self.cells.values() if cell.figures is not None))
         refused = [name for name in self.devices if any(self.cells[name, code].refused for code in self.codes)]
         text = f"Of {len(verdicts)} certificates: {counted}."
+        if alone:
+            text += f" Figures without a verdict: {', '.join(alone)}."
         if self.left_out:
             text += f" Left out, as it needs --declare: {', '.join(self.left_out)}."
         return f"{text} Acceptance tests failed: {', '.join(refused)}." if refused else text

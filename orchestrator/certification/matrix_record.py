@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from orchestrator.certification.codes.frequency_domain import FIGURES_JSON, FIGURES_PNG
 from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
 from orchestrator.certification.devices import Device
 from orchestrator.certification.environment import environment
@@ -70,7 +71,8 @@ def _cell_json(cell: MatrixCell) -> dict[str, Any]:
         "sentence": cell.sentence, "failure": cell.failure, "judged": cell.judged, "missing": cell.missing,
         "acceptance_failed": cell.refused, "narrowest": None if least is None else asdict(least),
         "failed": [asdict(m) for m in cell.failed],
-        "certificate": None if cell.failure is not None else f"{cell.folder}/{JSON}",
+        "certificate": None if cell.failure is not None or cell.figures is not None else f"{cell.folder}/{JSON}",
+        "figures": None if cell.figures is None or cell.failure is not None else f"{cell.folder}/{FIGURES_JSON}",
         "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
     }  # fmt: skip
 
@@ -79,6 +81,8 @@ def in_words(cell: MatrixCell) -> list[str]:
     """What a cell of the matrix shows, line by line: verdict, narrowest margin, and what has no figure."""
     if cell.failure is not None:
         return [cell.verdict]
+    if cell.figures is not None:
+        return [cell.verdict, *cell.figures]
     lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in cell.without_figure)]
     if (least := cell.narrowest) is not None:
         lines.append(f"{margin_text(least.margin)} {least.place}: {least.criterion}")
@@ -126,7 +130,11 @@ def _given(device: Device) -> list[str]:
 
 def _cell_html(cell: MatrixCell) -> str:
     verdict, *rest = in_words(cell)
-    style = "good" if cell.exit_code == 0 else "bad" if verdict == FAILS or cell.failure is not None else "soft"
+    if cell.figures is not None and cell.failure is None:
+        word = f'<a class="soft" href="{quote(f"{cell.folder}/{FIGURES_PNG}")}">{escape(verdict)}</a>'
+        return "<br>".join([word, *(escape(line) for line in rest)])
+    passing = cell.exit_code == 0 and cell.failure is None
+    style = "good" if passing else "bad" if verdict == FAILS or cell.failure is not None else "soft"
     word = f'<span class="{style}">{escape(verdict)}</span>'
     if cell.failure is None:
         word = f'<a href="{quote(f"{cell.folder}/{HTML}")}">{word}</a>'

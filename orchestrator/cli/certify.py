@@ -93,8 +93,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("the converter is missing: gfor certify FILE.fmu")
     check_sensitivity_options(options, codes_of(options.code), NTS631)
     devices = devices_of(options.fmu, options.binding, options.set)
-    if options.code == GB:
-        return run_stiffness(options, devices)
+    if options.code == GB and len(devices) == 1:
+        return run_stiffness(options, devices[0])
     if len(devices) > 1 or options.code == ALL:
         return run_matrix(options, devices)
     return run_norm(options, devices[0]) if options.code == NTS631 else run_code(options, devices[0])

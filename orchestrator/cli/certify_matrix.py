@@ -12,12 +12,15 @@ from rich.markup import escape
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.codes.all_codes import BY_DECLARATION
 from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.declared import checked
+from orchestrator.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.certification.devices import Device
-from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
+from orchestrator.certification.matrix import FIGURES, NOT_TESTED, CertificateMatrix, MatrixCell
 from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix
-from orchestrator.cli.certify_codes import ALL, NTS631, certified_code, check_code_options, codes_of, show_code
+from orchestrator.cli.certify_codes import ALL, GB, NTS631, certified_code, check_code_options, codes_of, show_code
 from orchestrator.cli.certify_norm import certified_norm, show_norm
 from orchestrator.cli.certify_sensitivities import find_needs
+from orchestrator.cli.certify_stiffness import measured_figures
 from orchestrator.cli.terminal import make_console, make_errors
 from orchestrator.errors import InputError
 from orchestrator.points.failure import failure_kept
@@ -49,7 +52,10 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     if options.code == ALL and not options.declare:
         left_out = tuple(BY_DECLARATION)
         codes = tuple(key for key in codes if key not in left_out)
+    codes += (GB,) if options.code == ALL else ()
     several = len(devices) > 1
+    if GB in codes:
+        checked((), {} if options.code == ALL else dict(options.declare), GB)
     if set(codes) - {NTS631}:
         check_code_options(options, devices)
     if several and options.check:
@@ -94,7 +100,11 @@ def _tested(
     cell = MatrixCell(device.name, key, place)
     with failure_kept(cell):
         own = folder / place
-        if key == NTS631:
+        if key == GB:
+            cell.verdict, cell.figures = FIGURES, ()  # it decides nothing, also where it cannot be measured
+            figures, _ = measured_figures(device, own)
+            cell.figures = [*stiffness_in_words(figures), figures["phase_jump"]["sentence"]]
+        elif key == NTS631:
             result, files = certified_norm(options, device, own, console)
             cell.take(result)
             if not (options.json or several):
@@ -106,9 +116,11 @@ def _tested(
                 show_code(found, files, own, console)
             if options.sensitivities:
                 _take_needs(options, found, cell, own, console)
-        if not options.no_check:
+        if not options.no_check and key != GB:
             options.check = own / KEPT
-    if cell.failure is None and several and not options.json:
+    if cell.failure is not None and cell.figures is not None:
+        cell.verdict = NOT_TESTED
+    if cell.failure is None and cell.figures is None and several and not options.json:
         console.print(escape(f"{device.name}, {key}: {cell.sentence}"), soft_wrap=True, highlight=False)
     return cell
 

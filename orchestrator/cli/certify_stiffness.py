@@ -2,31 +2,35 @@
 
 import argparse
 import json
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
 from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.declared import checked
-from orchestrator.certification.codes.frequency_domain import figures_of_stiffness, measure_stiffness, save_stiffness
+from orchestrator.certification.codes.frequency_domain import (
+    figures_of_stiffness,
+    measure_stiffness,
+    save_stiffness,
+    stiffness_in_words,
+)
 from orchestrator.certification.devices import Device
 from orchestrator.cli.certify_codes import GB, bench_request, check_code_options
 from orchestrator.cli.terminal import make_console, said_stages
-from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
 
-def run_stiffness(options: argparse.Namespace, devices: Sequence[Device]) -> int:
+def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     """Measure a converter; there is no verdict, so that it neither passes nor fails.
 
     Parameters
     ----------
     options
         Of the command.
-    devices
-        What is measured: one device.
+    device
+        What is measured.
 
     Returns
     -------
@@ -35,29 +39,39 @@ def run_stiffness(options: argparse.Namespace, devices: Sequence[Device]) -> int
     Raises
     ------
     InputError
-        If there are several devices, or an option that it does not have.
+        If an option is given that it does not have.
     """
-    if len(devices) > 1:
-        raise InputError(f"--code {GB} gives no verdict that a matrix could compare; give one converter at a time")
-    (device,) = devices
     checked((), dict(options.declare), GB)
-    check_code_options(options, devices)
-    request = bench_request(device)
+    check_code_options(options, [device])
     folder = made_folder(options.out or Path("results") / f"certify_{device.name}_{GB}", "--out")
     console = make_console(stderr=options.json)
-    with held(folder), said_stages() as report:
-        found = measure_stiffness(request, rated_frequency(request, 50.0), report)
-        files = save_stiffness(found, request.fmu.stem, folder)
-    figures = figures_of_stiffness(found, request.fmu.stem)
+    with held(folder):
+        figures, files = measured_figures(device, folder)
     if options.json:
         print(json.dumps(figures, indent=1, ensure_ascii=False))
         return 0
-    for name, one in figures["least"].items():
-        console.print(escape(f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz"), highlight=False)
-    slow = figures["slow"]
-    console.print(
-        escape(f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"), highlight=False
-    )
+    for line in stiffness_in_words(figures):
+        console.print(escape(line), highlight=False)
+    console.print(escape(figures["phase_jump"]["sentence"]), soft_wrap=True, highlight=False)
     console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
     console.print(escape(f"Files in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
     return 0
+
+
+def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
+    """Measure a converter and write its files; says on standard error what is being done.
+
+    Parameters
+    ----------
+    device
+        What is measured.
+    folder
+        Where the files go; it is created where missing.
+    """
+    request = bench_request(device)
+    made_folder(folder, "--out")
+    with said_stages() as report:
+        f_n = rated_frequency(request, 50.0)
+        found = measure_stiffness(request, f_n, report)
+    files = save_stiffness(found, request.fmu.stem, f_n, folder)
+    return figures_of_stiffness(found, request.fmu.stem, f_n), files

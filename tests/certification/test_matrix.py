@@ -131,6 +131,25 @@ def test_the_page_links_every_certificate_and_escapes_foreign_names():
     assert "−20 % row: settles" in page
 
 
+def test_figures_without_a_verdict_stand_in_the_matrix_and_decide_nothing():
+    """Also where they could not be measured."""
+    shown = cell("b", "gb", "no verdict", figures=["least |P/theta|: 9.1", "not met"])
+    lost = cell("a", "gb", "not tested", figures=(), failure="it does not come to rest")
+    whole = matrix(cell("a", "gb"), PASSES, shown, cell("b"))
+    whole.cells["a", "gb"] = lost
+    assert whole.exit_code == 0
+    assert whole.sentence() == "Of 2 certificates: 2 passed. Figures without a verdict: gb."
+    assert in_words(shown) == ["no verdict", "least |P/theta|: 9.1", "not met"]
+    page = matrix_page(whole, [], None)
+    assert 'href="b/gb/frequency.png"' in page
+    assert '<span class="bad">not tested</span>' in page
+    assert "it does not come to rest" in page
+    assert "gb/certificate" not in page
+    first, _, third, _ = matrix_json(whole, [])["cells"]
+    assert (first["certificate"], first["figures"], first["exit_code"]) == (None, None, 0)
+    assert (third["certificate"], third["figures"]) == (None, "b/gb/frequency.json")
+
+
 @pytest.mark.slow
 def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_used(tmp_path, gfor):
     """Ours and a grid-following converter in files of one name, each with the figures that it has alone."""

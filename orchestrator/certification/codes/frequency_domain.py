@@ -3,6 +3,7 @@
 import cmath
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,15 @@ from orchestrator.black_box.frequency_response import Excitation, measure
 from orchestrator.black_box.stiffness import Stiffness, stiffness
 from orchestrator.cases.values import convert
 from orchestrator.certification.codes.bench_case import STEP
-from orchestrator.certification.codes.programme import RATING_MVA
+from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_table
 from orchestrator.safe_files import write_text
+
+FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
 
 POWER = 0.5
 """Active power at which it is measured [pu]."""
@@ -37,6 +40,70 @@ NO_VERDICT = (
     "no verdict: the GB Grid Code (ECP.A.3.9) states no criteria for the plot, and the thresholds and the band of "
     f"arXiv 2605.02131 were not at hand; {BAND[0]:g} to {BAND[1]:g} Hz is this program's band"
 )
+
+JUMP, OPPOSED, SCR, LONGEST = np.deg2rad(10.0), 0.2, 3.0, 0.015
+"""What MISO and ERCOT ask in time: a power [pu] against a jump of the angle [rad] at a short-circuit ratio, and 90 % of
+the first change within a time [s] (MISO BPM-015 r32 appendix H)."""
+
+
+@dataclass(frozen=True)
+class AskedStiffness:
+    """What the criterion of phase jumps comes to as a least |P/θ|, and what was found.
+
+    Attributes
+    ----------
+    value
+        Least |P/θ| that it asks for at the terminals [pu/rad].
+    band
+        Frequencies at which it asks for it [Hz].
+    found, at
+        Least |P/θ| in the band [pu/rad], and its frequency [Hz].
+    """
+
+    value: float
+    band: tuple[float, float]
+    found: float
+    at: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the device is stiff enough at every measured frequency of the band."""
+        return self.found >= self.value
+
+    def sentence(self) -> str:
+        """The comparison in words."""
+        low, high = self.band
+        return (
+            f"{OPPOSED:g} pu against {np.rad2deg(JUMP):g}° at SCR {SCR:g} (MISO, ERCOT) asks, by this program's "
+            f"derivation, for |P/θ| of {self.value:.3g} pu/rad from {low:.3g} to {high:.3g} Hz: "
+            f"{'met' if self.met else 'not met'}, {self.found:.3g} at {self.at:.3g} Hz; no code says so"
+        )
+
+
+def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
+    """Compare a device with what the criterion of phase jumps comes to.
+
+    A stiffness K at the terminals and that of the grid, K_g = X/|Z|², lie in series: a jump Δθ of the source moves the
+    power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
+    last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
+    change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band.
+
+    Parameters
+    ----------
+    found
+        What was measured.
+    f_n
+        Rated frequency [Hz].
+
+    Raises
+    ------
+    ValueError
+        If no frequency of the band was measured.
+    """
+    Z = jumps(SCR, POWER, ()).impedance
+    asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
+    band = (f_n / (2 * np.pi), float(np.log(10) / (2 * np.pi * LONGEST)))
+    return AskedStiffness(float(asked), band, *found.least(found.p_theta, *band))
 
 
 def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
@@ -81,21 +148,30 @@ def _values(description: FmuDescription, request: CertificationRequest, f_n: flo
     return values
 
 
-def figures_of_stiffness(found: Stiffness, model: str) -> dict[str, Any]:
-    """The figures, as JSON's types."""
+def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:
+    """The figures, as JSON's types; ``f_n`` is the rated frequency [Hz]."""
     least = {
         name: dict(zip(("value", "at_hz"), found.least(values, *BAND), strict=True))
         for name, values in (("P/theta [pu/rad]", found.p_theta), ("Q/V [pu/pu]", found.q_v))
     }
-    slow = found.p_omega[0]
+    slow, asked = found.p_omega[0], asked_stiffness(found, f_n)
     return {
         "code": "gb", "model": model, "verdict": None, "sentence": NO_VERDICT, "band_hz": list(BAND), "least": least,
         "slow": {"name": "P/omega [pu/pu]", "real": float(slow.real), "imag": float(slow.imag),
                                                     "at_hz": float(found.frequencies[0])},
+        "phase_jump": {"name": "P/theta [pu/rad]", "asked": asked.value, "band_hz": list(asked.band),
+                       "found": asked.found, "at_hz": asked.at, "met": asked.met, "sentence": asked.sentence()},
     }  # fmt: skip
 
 
-def save_stiffness(found: Stiffness, model: str, folder: Path) -> list[Path]:
+def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
+    """Lines on the figures of `figures_of_stiffness`."""
+    slow = figures["slow"]
+    least = [f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz" for name, one in figures["least"].items()]
+    return [*least, f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"]
+
+
+def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
     """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``.
 
     Parameters
@@ -104,10 +180,12 @@ def save_stiffness(found: Stiffness, model: str, folder: Path) -> list[Path]:
         What was measured.
     model
         Name of the converter.
+    f_n
+        Rated frequency [Hz].
     folder
         Where the files go.
     """
-    table, figures, picture = (folder / f"frequency.{kind}" for kind in ("csv", "json", "png"))
+    table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []
     for k, f in enumerate(found.frequencies.tolist()):
         row = {"frequency [Hz]": f}
@@ -116,12 +194,12 @@ def save_stiffness(found: Stiffness, model: str, folder: Path) -> list[Path]:
             row[f"re {name}"], row[f"im {name}"] = float(values[k].real), float(values[k].imag)
         rows.append(row)
     save_table(rows, table)
-    write_text(figures, json.dumps(figures_of_stiffness(found, model), indent=1) + "\n")
-    _plot(found, picture)
+    write_text(figures, json.dumps(figures_of_stiffness(found, model, f_n), indent=1) + "\n")
+    _plot(found, asked_stiffness(found, f_n), picture)
     return [table, figures, picture]
 
 
-def _plot(found: Stiffness, path: Path) -> None:
+def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         size, phase, stiff = figure.subplots(3, 1, sharex=True)
@@ -133,6 +211,7 @@ def _plot(found: Stiffness, path: Path) -> None:
         for k, (name, values) in enumerate((("|P/θ| [pu/rad]", found.p_theta), ("|Q/V| [pu/pu]", found.q_v))):
             stiff.plot(found.frequencies, np.abs(values), ".-", ms=3, color=colour(k), label=name)
         stiff.axvspan(*BAND, color="0.9", zorder=0)
+        stiff.plot(asked.band, [asked.value] * 2, color="0.3", ls="--", label="asked by 0.2 pu for 10° at SCR 3")
         stiff.set(yscale="log", ylabel="Stiffness", xlabel="Frequency of the change [Hz]")
         stiff.legend()
         save_figure(figure, path)

@@ -11,11 +11,13 @@ from orchestrator.certification.codes import bench_point, frequency_domain
 from orchestrator.certification.codes.all_codes import code_for
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
+from orchestrator.certification.codes.frequency_domain import asked_stiffness, measure_stiffness
 from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
 from orchestrator.certification.codes.record import save_certificate
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import ComponentError
 from orchestrator.points.serial import Serial
+from tests.certification.codes.reactance_source import write_source
 from tests.certification.codes.wrong_droop import write_wrong
 
 pytestmark = pytest.mark.slow
@@ -115,6 +117,21 @@ def test_the_command_asks_for_what_is_to_be_declared(converter, gfor_command):
         assert words in " ".join(said.split())
 
 
+@pytest.mark.parametrize(("X", "stiff"), [(0.3, True), (0.8, False)])
+def test_the_stiffness_that_a_jump_asks_for_agrees_with_the_jump(tmp_path, monkeypatch, X, stiff):
+    """A source behind a reactance: 1/X to 1/X/(1 − (f/f_n)²) against 1/(10°/0.2 pu − |Z|²/X_g) = 1.87 pu/rad."""
+    monkeypatch.setattr(frequency_domain, "EXCITATION", Excitation(lowest_hz=5.0, highest_hz=40.0, lines=8))
+    request = CertificationRequest(write_source(tmp_path), None, {"X": X})
+    asked = asked_stiffness(measure_stiffness(request, 60.0, lambda text: None), 60.0)
+    assert asked.value == pytest.approx(1 / (math.radians(10) / 0.2 - 1 / 9 / 0.3288), rel=1e-3)
+    assert asked.band == pytest.approx((60 / (2 * math.pi), 24.43), rel=1e-3)
+    assert 0.98 / X < asked.found < 1.02 / X / (1 - (24.43 / 60) ** 2)
+    assert asked.met is stiff
+    (verdict,) = certify_code(request, ERCOT, Serial(), tmp_path, ("phase_jumps",)).verdicts
+    opposed = [finding.accepted for finding in verdict.findings if finding.criterion.startswith("opposes")]
+    assert opposed == [stiff, stiff]
+
+
 def test_gb_gives_figures_and_no_verdict(converter, tmp_path, gfor_command, monkeypatch):
     """Slow changes of the frequency see the droop, P/ω = −1/(R_f/(1 + τ_P·s) + s·X_t/ω_b). Quick ones of the voltage
     see the transformer, Q/V = 1/X_t/(1 − (f/f_n)²), but for the voltage loop of 50 ms.
@@ -130,6 +147,8 @@ def test_gb_gives_figures_and_no_verdict(converter, tmp_path, gfor_command, monk
     s = 2j * math.pi * 0.5
     droop = -1 / (0.05 / (1 + 0.1 * s) + s * 0.15 / (2 * math.pi * 50))
     assert abs(complex(figures["slow"]["real"], figures["slow"]["imag"]) - droop) < 0.05 * abs(droop)
+    assert figures["phase_jump"]["met"]
+    assert "no code says so" in figures["phase_jump"]["sentence"]
     stiff = figures["least"]["Q/V [pu/pu]"]
     assert stiff["value"] == pytest.approx(1 / 0.15 / (1 - (stiff["at_hz"] / 50) ** 2), rel=0.05)
     assert {path.name for path in out.glob("frequency.*")} == {"frequency.csv", "frequency.json", "frequency.png"}
