@@ -1,5 +1,7 @@
 """What names a point's file."""
 
+import shutil
+
 import pytest
 
 from orchestrator.cases.case import load_case
@@ -23,3 +25,26 @@ def test_another_version_of_a_library_gives_other_names(fresh, monkeypatch, libr
     code_hash.cache_clear()
     assert key_of({"a": 1}) != before[0]
     assert fingerprint(case) != before[1]
+
+
+@pytest.mark.parametrize(
+    ("file", "counts"),
+    [
+        ("watch/synchronism.py", True),
+        ("watch/finding.py", True),
+        ("certification/codes/bench_point.py", True),
+        ("cli/check.py", False),
+    ],
+)
+def test_another_code_gives_other_names(fresh, monkeypatch, tmp_path, file, counts):
+    """What a kept row says is the watch's as well; what only shows it does not count."""
+    root = shutil.copytree(
+        key._ROOT, tmp_path / "code", ignore=shutil.ignore_patterns("*.toml", "__pycache__", "cases")
+    )
+    monkeypatch.setattr(key, "_ROOT", root)
+    code_hash.cache_clear()
+    before = key_of({"a": 1})
+    with (root / file).open("a", encoding="utf-8") as text:
+        text.write("# another rule\n")
+    code_hash.cache_clear()
+    assert (key_of({"a": 1}) != before) is counts
