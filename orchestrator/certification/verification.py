@@ -217,7 +217,7 @@ def _compare_point(
     tolerance = TOLERANCE_IDENTIFIED if identified else TOLERANCE
     modes = _differ_modes(stated, again.modes.eigenvalues.tolist(), tolerance)
     kept = data[signal].sel(scenario=scenario, X_L=point["X_L"]).values
-    response = _differ_signal(kept, again.signals.get(signal, np.empty(0)))
+    response = differ_signal(kept, again.signals.get(signal, np.empty(0)))
     found.faults += [f"{where}: {text}" for text in _differ_figures(point, scenario, again, tolerance)]
     for what, (fault, said) in (("modes", modes), (signal, response)):
         (found.faults if fault else found.agreed).append(f"{where}: {what}: {fault or said}")
@@ -269,7 +269,8 @@ def _shown(value: complex) -> str:
     return f"{hz:.4f} Hz with {100 * ratio:.4f} %"
 
 
-def _differ_signal(kept: Numbers, again: Numbers) -> tuple[str, str]:
+def differ_signal(kept: Numbers, again: Numbers) -> tuple[str, str]:
+    """A fault, or otherwise a sentence on the difference, of a signal that was certified and of the same anew."""
     if kept.shape != again.shape:
         return f"{len(again)} instants come out and {len(kept)} were certified", ""
     span = float(np.ptp(kept)) or 1.0

@@ -8,6 +8,7 @@ from typing import Any
 from rich.markup import escape
 
 from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
+from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import (
     TOLERANCE,
@@ -37,7 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--points", type=reactances, metavar="X,X,…",
                        help="line reactances that are computed anew [pu] (default: the least damped one)")  # fmt: skip
-    which.add_argument("--all", action="store_true", help="compute every point anew")
+    which.add_argument("--rows", type=lambda text: tuple(text.split(",")), metavar="ROW,ROW,…",
+                       help="of a code's certificate: rows that are computed anew (default: the one with the narrowest "
+                       "margin, and one that chance draws)")  # fmt: skip
+    which.add_argument("--all", action="store_true", help="compute every point or row anew")
     which.add_argument("--files-only", action="store_true", help="compute nothing: compare hashes, and judge again")
     add_executor_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -53,6 +57,9 @@ def run(options: argparse.Namespace) -> int:
     if (code := read_code_certificate(options.certificate)) is not None:
         return _run_code(options, *code)
     folder, content = read_certificate(options.certificate)
+    if options.rows:
+        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
+                         "with line reactances")  # fmt: skip
     console = make_console(stderr=options.json)
     wanted = [p["X_L"] for p in content["points"]] if options.all else options.points or (least_damped(content),)
     points = chosen_points(content, () if options.files_only else wanted)
@@ -95,23 +102,36 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_code(options: argparse.Namespace, folder: Path, content: dict[str, Any]) -> int:
-    """The certificate of a code on the test bench: its hashes, and its rows judged again."""
-    if options.all or options.points:
-        raise InputError(
-            f"{'--all' if options.all else '--points'}: {folder} is the certificate of a grid code; gfor verify "
-            "judges its rows again and does not compute anew: leave it out; `gfor run row_NAME.toml` in its folder does"
-        )
+    """The certificate of a code on the test bench: its hashes, its rows judged again, and some computed anew."""
+    if options.points:
+        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
+                         "their names")  # fmt: skip
+    console = make_console(stderr=options.json)
     found = verify_code(folder, content)
+    rows = [] if options.files_only else chosen_rows(content, options.rows or (), every=options.all)
+    computed = bool(rows) and found.holds
+    if computed:
+        with progress_bar(console) as bar:
+            task = bar.add_task("Rows", total=len(rows))
+            executor = choose_executor(options, ["orchestrator.certification.codes.bench_point"])
+            try:
+                again = verify_rows(folder, content, rows, executor, lambda done, _: bar.update(task, completed=done))
+            finally:
+                executor.close()
+        found = Verification(found.faults + again.faults, found.agreed + again.agreed)
     if options.json:
         print(json.dumps({"holds": found.holds, "verdict": content["verdict"], "faults": found.faults,
-                          "agreed": found.agreed, "computed": []}, indent=1, ensure_ascii=False))  # fmt: skip
+                          "agreed": found.agreed, "computed": rows if computed else []},
+                         indent=1, ensure_ascii=False))  # fmt: skip
         return _exit_code(found, content)
-    console = make_console()
     for text in found.agreed:
         console.print(f"[green]agrees[/]        {escape(text)}")
     for text in found.faults:
         console.print(f"[bold red]does not agree[/] {escape(text)}")
-    console.print("No row was computed anew: `gfor run row_NAME.toml` in its folder does.")
+    if rows and not computed:
+        console.print("No row was computed anew: with other files that would say nothing of this certificate.")
+    if computed and len(rows) < len(content["rows"]):
+        console.print(f"{len(rows)} of {len(content['rows'])} rows were computed anew; --all takes every one.")
     holds = "The certificate holds" if found.holds else "[bold red]The certificate does not hold[/]"
     console.print(f"{holds}; its verdict: {escape(content['verdict'])}.")
     return _exit_code(found, content)

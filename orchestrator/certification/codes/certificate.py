@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import load_case
+from orchestrator.cases.schema import Value
 from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.codes.bench_case import lay_files, rated_frequency, write_row
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
@@ -55,10 +56,7 @@ class CodeCertificate:
     @property
     def departures(self) -> tuple[str, ...]:
         """By what the test departs from the code's."""
-        set_too = tuple(f"converter.{n} = {shown(self.request.values[n])}" for n in GIVEN if n in self.request.values)
-        if self.f_n != self.code.f_n:
-            set_too += (f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz",)
-        return set_too
+        return departures_of(self.request.values, self.f_n, self.code)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -94,6 +92,24 @@ class CodeCertificate:
         if self.acceptance is not None and self.refused:
             said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
         return said
+
+
+def departures_of(values: Mapping[str, Value], f_n: float, code: GridCode) -> tuple[str, ...]:
+    """By what a test departs from a code's.
+
+    Parameters
+    ----------
+    values
+        Of the converter, as they were given.
+    f_n
+        Rated frequency of the bench [Hz].
+    code
+        The code.
+    """
+    set_too = tuple(f"converter.{name} = {shown(values[name])}" for name in GIVEN if name in values)
+    if f_n != code.f_n:
+        set_too += (f"the rated frequency, {f_n:g} Hz in place of {code.f_n:g} Hz",)
+    return set_too
 
 
 def verdict_of(accepted: Sequence[bool], missing: int) -> str:

@@ -10,7 +10,7 @@ from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import verdict_of
+from orchestrator.certification.codes.certificate import departures_of, verdict_of
 from orchestrator.certification.codes.record import FORMAT, finding_json
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
@@ -27,7 +27,8 @@ def read_code_certificate(path: Path) -> tuple[Path, dict[str, Any]] | None:
         return None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         return None
-    wanted = {"code": str, "rows": list, "verdict": str, "files": dict, "f_n": float, "missing": list, "sentence": str}
+    wanted = {"code": str, "rows": list, "verdict": str, "values": dict, "declared": dict, "files": dict, "f_n": float,
+              "missing": list, "sentence": str, "departures": list}  # fmt: skip
     bad = [name for name, kind in wanted.items() if not isinstance(content.get(name), kind)]
     if bad or content["code"] not in {*CODES, *BY_DECLARATION}:
         raise InputError(
@@ -79,6 +80,8 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
                 faults.append(f"row {row.name}: its response gives other findings than {JSON} states")
             if again.judged:
                 accepted.append(bool(again.accepted))
+    if content["departures"] != list(departures_of(content["values"], content["f_n"], code)):
+        faults.append("the departures from the code are not those of its values and its rated frequency")
     done = {stated["row"] for stated in content["rows"] if stated["judged"]}
     absent = [row.name for row in code.rows if not row.shown_only and row.name not in done]
     wanted = verdict_of(accepted, len(absent) + len(code.left_out) + len(content["departures"]))

@@ -1,6 +1,8 @@
 """Converters on the test bench: ours, and one without damping, with a certificate that is verified and forged."""
 
 import json
+from copy import deepcopy
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +14,7 @@ from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
 from orchestrator.certification.codes.record import save_certificate
+from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.points.serial import Serial
 
@@ -60,16 +63,58 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     save_certificate(found, tmp_path)
     folder, content = read_code_certificate(tmp_path)
     assert verify_code(folder, content).holds
-    for option in ("--all", "--points=0.1"):
+    for option, words in (("--points=0.1", "give --rows"), ("--rows=none", "it has: phase_jumps")):
         code, _, said = gfor_command("verify", tmp_path, option)
         assert code == 2
-        assert "does not compute anew" in said
+        assert words in " ".join(said.split())
+    code, said, _ = gfor_command("verify", tmp_path, "--workers", 1)
+    assert code == 3  # it holds, and is incomplete
+    assert "row phase_jumps, computed anew: its response, and its criteria" in said
+    other = deepcopy(content)
+    other["rows"][0]["findings"] = [{"kind": "loss_of_synchronism", "time": 2.0, "message": ""}]
+    (fault,) = verify_rows(folder, other, ["phase_jumps"], Serial()).faults
+    assert fault == "row phase_jumps: the watch finds nothing, and loss of synchronism was certified"
+    other["values"] = {"droop.R_f": 0.1}
+    (fault,) = verify_rows(folder, other, ["phase_jumps"], Serial()).faults
+    assert "not what the table of ercot and the certified values give" in fault
+    other["values"], other["f_n"] = {"S_n": 50.0}, 50.0
+    assert "the departures from the code are not those" in " ".join(verify_code(folder, other).faults)
     content["rows"][0]["criteria"][1]["value"] += 0.1
     content["verdict"] = "passes"
     (tmp_path / "certificate.json").write_text(json.dumps(content), encoding="utf-8")
     faults = " ".join(verify_code(*read_code_certificate(tmp_path)).faults)
     assert "gives other findings" in faults
     assert "its rows come to 'incomplete'" in faults
+
+
+def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(converter, tmp_path, gfor_command):
+    """All hashes fit, and every verdict follows from the responses; these are those of ours."""
+    folders = [tmp_path / "ours", tmp_path / "theirs"]
+    found = []
+    for folder, fmu in zip(folders, (converter, gfor.build("gfl", tmp_path / "fmu")), strict=True):
+        folder.mkdir()
+        found.append(certify_code(CertificationRequest(fmu), ERCOT, Serial(), folder, ("phase_jumps",)))
+    ours, theirs = found
+    assert (ours.verdict, theirs.verdict) == ("incomplete", "fails")
+    save_certificate(replace(theirs, results=ours.results, verdicts=ours.verdicts), folders[1])
+    assert verify_code(*read_code_certificate(folders[1])).holds
+    assert gfor_command("verify", folders[1], "--files-only")[0] == 3
+    code, said, _ = gfor_command("verify", folders[1], "--workers", 1)
+    assert code == 5
+    assert "row phase_jumps: v_re: it differs by up to" in said
+
+
+def test_rows_are_drawn_by_their_margin_and_by_chance():
+    rows = [
+        {"row": name, "unknown": "", "accepted": accepted, "criteria": [{"margin": margin}, {"margin": None}]}
+        for name, margin, accepted in (("a", 0.5, True), ("b", 0.1, True), ("c", -3.0, False), ("d", 0.9, True))
+    ]
+    rows.append({"row": "e", "unknown": "no licence", "accepted": None, "criteria": []})
+    drawn = [chosen_rows({"rows": rows}) for _ in range(60)]
+    assert {first for first, _ in drawn} == {"b"}
+    assert {other for _, other in drawn} == {"a", "c", "d"}
+    assert chosen_rows({"rows": rows}, every=True) == ["a", "b", "c", "d"]
+    assert chosen_rows({"rows": rows}, ("d",)) == ["d"]
 
 
 def test_a_converter_without_damping_does_not_settle(converter, tmp_path):

@@ -1,0 +1,150 @@
+"""Rows of a code's certificate, computed anew and compared with what was certified."""
+
+import random
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.cases.case import load_case
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.codes.all_codes import code_for
+from orchestrator.certification.codes.bench_case import case_name, lay_files, write_row
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.codes.row import CodeRow, GridCode
+from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.files import RESPONSES
+from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.verification import Verification, differ_signal
+from orchestrator.errors import InputError
+from orchestrator.points.executor import Executor, WorkerLostError
+from orchestrator.points.key import fingerprint, key_of, reference_to
+from orchestrator.watch.finding import UNSTABLE
+
+DRAWN = 1
+"""So many rows are drawn by chance beside the one with the narrowest margin."""
+
+
+def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: bool = False) -> list[str]:
+    """Names of the rows that are computed anew.
+
+    Parameters
+    ----------
+    content
+        Contents of the certificate's JSON file.
+    wanted
+        Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN` others that
+        chance draws, so that nobody knows them beforehand.
+    every
+        Take all of them.
+
+    Raises
+    ------
+    InputError
+        If the certificate has no such row.
+    """
+    known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
+    if unknown := [name for name in wanted if name not in known]:
+        raise InputError(f"--rows: the certificate has no row {unknown[0]!r}; it has: {', '.join(known)}")
+    if every or wanted:
+        return list(wanted) or known
+    margins = [
+        (criterion["margin"], stated["row"])
+        for stated in content["rows"] if stated["accepted"]
+        for criterion in stated["criteria"] if criterion["margin"] is not None
+    ]  # fmt: skip
+    narrowest = [min(margins)[1]] if margins else known[:1]
+    others = [name for name in known if name not in narrowest]
+    return narrowest + random.SystemRandom().sample(others, min(DRAWN, len(others)))
+
+
+def verify_rows(
+    folder: Path,
+    content: dict[str, Any],
+    names: Sequence[str],
+    executor: Executor,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Verification:
+    """Compute rows anew, from the code's table and the FMU in the folder, and compare them with what was certified.
+
+    Parameters
+    ----------
+    folder
+        Of the certificate.
+    content
+        Contents of the certificate's JSON file.
+    names
+        Of the rows.
+    executor
+        Where they are computed.
+    report
+        Called with the number of rows done and their total.
+    """
+    found = Verification()
+    code = code_for(content["code"], content["declared"])
+    rows = {row.name: row for row in code.rows}
+    chosen = [rows[name] for name in names if _as_the_table(folder, content, code, rows[name], found)]
+    tasks = []
+    for row in chosen:
+        case = load_case(folder / case_name(row.name))
+        mark = fingerprint(case)
+        tasks.append(BenchTask(row.name, reference_to(case), mark, key_of({"verify": [mark, row.name]})))
+    with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
+        for done, (index, outcome) in enumerate(executor.run(compute_row, tasks), start=1):
+            again = BenchResult.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
+            _compare(chosen[index], content, data, again, found)
+            report(done, len(tasks))
+    return found
+
+
+def _as_the_table(folder: Path, content: dict[str, Any], code: GridCode, row: CodeRow, found: Verification) -> bool:
+    """Whether the case file of a row is the one that the code's table and the certificate's values give."""
+    binding = folder / BINDING if content["binding"] else None
+    request = CertificationRequest(folder / FMU, binding, content["values"])
+    with TemporaryDirectory(prefix="verify_") as place:
+        lay_files(request, Path(place))
+        made = write_row(request, row.name, row.title, row.programme(content["f_n"]), content["f_n"], Path(place))
+        same = made.read_text(encoding="utf-8") == (folder / case_name(row.name)).read_text(encoding="utf-8")
+    if not same:
+        found.faults.append(
+            f"{case_name(row.name)}: it is not what the table of {code.key} and the certified values give"
+        )
+    return same
+
+
+def _compare(row: CodeRow, content: dict[str, Any], data: xr.Dataset, again: BenchResult, found: Verification) -> None:
+    where = f"row {row.name}"
+    if again.failure:
+        found.faults.append(f"{where}: it cannot be computed again: {again.failure}")
+        return
+    stated = next(entry for entry in content["rows"] if entry["row"] == row.name)
+    kinds = [sorted({f["kind"] for f in findings} & UNSTABLE) for findings in (stated["findings"], again.findings)]
+    if kinds[0] != kinds[1]:
+        words = [", ".join(kind).replace("_", " ") or "nothing" for kind in kinds]
+        found.faults.append(f"{where}: the watch finds {words[1]}, and {words[0]} was certified")
+        return
+    faults = [float(f["time"]) for f in again.findings if f["kind"] in UNSTABLE]
+    until = min(faults, default=np.inf)
+    times = data[f"time_{row.name}"].values
+    before, part = int(np.sum(again.times < until)), int(np.sum(times < until))
+    worst: list[str] = []
+    for signal, values in again.signals.items():
+        name = f"{row.name}.{signal}"
+        if name not in data.data_vars:
+            worst.append(f"{signal}: {RESPONSES} does not hold it")
+            continue
+        fault, _ = differ_signal(data[name].values[:part], values[:before])
+        worst += [f"{signal}: {fault}"] if fault else []
+    if worst:
+        found.faults.append(f"{where}: {'; '.join(worst)}")
+        return
+    judged = judge_row(row, again, content["f_n"])
+    criteria = [(f.criterion, bool(f.accepted)) for f in judged.findings]
+    if criteria != [(entry["criterion"], bool(entry["accepted"])) for entry in stated["criteria"]]:
+        found.faults.append(f"{where}: its criteria come out otherwise than certified")
+        return
+    said = "its response" if until == np.inf else f"its response to t = {until:g} s, from where on it fails"
+    found.agreed.append(f"{where}, computed anew: {said}, and its criteria")
