@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.codes.measured import MeasuredRow
-from orchestrator.certification.codes.row import Judge, RowFinding
+from orchestrator.certification.codes.row import Band, Bounded, Judge, RowFinding
 
 CODE, READING = "code", "reading"
 
@@ -37,6 +37,9 @@ SPIKE = 5e-3
 
 SIDE = 0.01
 """Largest deviation of a settled frequency to the wrong side of rated [Hz]."""
+
+POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"
+"""How pictures call what is judged."""
 
 LOOK = 0.5
 """End of a hold in which it has to be settled [s]."""
@@ -130,7 +133,12 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
         rule = f"P is back within {tolerance:g} pu {when}"
         return _finding(name, rule, CODE if of_code else READING, worst, tolerance, text)
 
-    return judge
+    def bands(row: MeasuredRow) -> list[Band]:
+        asked = row.before(row.events[0])
+        spans = [((end := row.until(t)) - LOOK if within is None else t + within, end) for t in _chosen(row, events)]
+        return [_power_band(name, *span, asked - tolerance, asked + tolerance) for span in spans if span[0] < span[1]]
+
+    return Bounded(judge, bands)
 
 
 def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -> Judge:
@@ -156,7 +164,13 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
         origin = CODE if of_code else READING
         return _finding(f"opposes the jump at {time:g} s", rule, origin, peak, least, f"{peak:.3f} pu", at_most=False)
 
-    return judge
+    def bands(row: MeasuredRow) -> list[Band]:
+        time = row.events[event]
+        level = row.before(time) + sign * least
+        low, high = (level, None) if sign > 0 else (None, level)
+        return [_power_band("reached in the first swing after each jump", time, time + FIRST_SWING, low, high)]
+
+    return Bounded(judge, bands)
 
 
 def opposes_jumps(signs: tuple[int, ...]) -> tuple[Judge, ...]:
@@ -211,7 +225,13 @@ def follows_droop(event: int, sign: int) -> Judge:
         rule = f"the settled power is {'higher' if sign > 0 else 'lower'} than at the start by {MOVED:g} pu or more"
         return _finding(f"droop after {time:g} s", rule, READING, change, MOVED, f"{change:.3f} pu", at_most=False)
 
-    return judge
+    def bands(row: MeasuredRow) -> list[Band]:
+        end = row.until(row.events[event])
+        level = row.before(row.events[0]) + sign * MOVED
+        low, high = (level, None) if sign > 0 else (None, level)
+        return [_power_band("the droop's side at the end of each hold", end - LOOK, end, low, high)]
+
+    return Bounded(judge, bands)
 
 
 def stays_within(low: float, high: float, longest: float) -> Judge:
@@ -225,7 +245,11 @@ def stays_within(low: float, high: float, longest: float) -> Judge:
         rule = f"v is outside of {low:g} to {high:g} pu for at most {longest:g} s"
         return _finding("voltage", rule, CODE, taken, longest, text)
 
-    return judge
+    def bands(row: MeasuredRow) -> list[Band]:
+        ends = row.times[[0, -1]]
+        return [Band("voltage", VOLTAGE_SHOWN, lambda r: r.mean_v, ends, np.full(2, low), np.full(2, high))]
+
+    return Bounded(judge, bands)
 
 
 def frequency_settles() -> Judge:
@@ -298,6 +322,12 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
         return _finding(f"inertia at {time:g} s", rule, CODE, H, least, f"{H:.2f} s", at_most=False)
 
     return judge
+
+
+def _power_band(name: str, begin: float, end: float, low: float | None, high: float | None) -> Band:
+    """Limits of the power [pu] from a time to another [s]."""
+    lowest, highest = (None if level is None else np.full(2, level) for level in (low, high))
+    return Band(name, POWER_SHOWN, lambda row: row.mean_p, np.array([begin, end]), lowest, highest)
 
 
 def _chosen(row: MeasuredRow, events: tuple[int, ...]) -> tuple[float, ...]:

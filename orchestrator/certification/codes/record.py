@@ -13,11 +13,12 @@ from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
-from orchestrator.certification.codes.row_verdict import NOT_JUDGED, RowVerdict
+from orchestrator.certification.codes.row_pictures import row_pictures
+from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, write_sealed
 from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import table
+from orchestrator.report.html.elements import Figures, table
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import write_text
 
@@ -93,12 +94,24 @@ def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
     sections = [
         ("For whom and by whom", table("Details", ["", ""], details, left=2)),
         ("Result", table("All criteria", columns, rows, left=9) + _list("The code gives no verdict on", shown_rows)),
+        ("Responses and their limits", _pictures(c)),
         ("What was not tested", _list("", [*c.code.left_out, *c.departures])),
         ("How the code was read", _list("", c.code.readings)),
         ("Source", source),
     ]
     return document(f"{c.code.key.upper()}: {c.verdict}", c.code.title, f"<p><b>{escape(c.sentence())}</b></p>",
                     sections, made)  # fmt: skip
+
+
+def _pictures(c: CodeCertificate) -> str:
+    """Every row's responses, folded where it is accepted."""
+    figures, parts = Figures(), []
+    for v in c.verdicts:
+        if content := row_pictures(v, c.results[v.row.name], c.f_n, figures):
+            word = "accepted" if v.accepted else NO_VERDICT if v.row.shown_only else "not accepted"
+            title = escape(f"{v.row.name}: {v.row.title}: {word}")
+            parts.append(f"<details{'' if v.accepted else ' open'}><summary>{title}</summary>{content}</details>")
+    return "".join(parts)
 
 
 def _list(heading: str, texts: Any) -> str:

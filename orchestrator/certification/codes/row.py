@@ -1,8 +1,9 @@
 """What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from orchestrator.arrays import Numbers
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.programme import BenchProgramme
 
@@ -41,6 +42,55 @@ class RowFinding:
 
 Judge = Callable[[MeasuredRow], RowFinding]
 """A criterion: the response of a row → whether it is met."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Where a criterion asks a quantity to stay, for a picture.
+
+    Attributes
+    ----------
+    criterion
+        Its name.
+    label
+        The quantity, with its unit.
+    quantity
+        The response of a row → the quantity over its times, shape (n,).
+    times
+        At which the limits hold [s], shape (m,).
+    low, high
+        Limits in the quantity's unit, shape (m,); None where there is none.
+    alone
+        Whether it gets a picture of its own, which shows its times alone.
+    """
+
+    criterion: str
+    label: str
+    quantity: Callable[[MeasuredRow], Numbers]
+    times: Numbers
+    low: Numbers | None = None
+    high: Numbers | None = None
+    alone: bool = False
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A criterion whose limits can be drawn.
+
+    Attributes
+    ----------
+    judge
+        The criterion.
+    bands
+        The limits of a response.
+    """
+
+    judge: Judge
+    bands: Callable[[MeasuredRow], Sequence[Band]]
+
+    def __call__(self, row: MeasuredRow) -> RowFinding:
+        """Whether it is met."""
+        return self.judge(row)
 
 
 @dataclass(frozen=True)

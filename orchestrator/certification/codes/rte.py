@@ -25,7 +25,7 @@ from orchestrator.certification.codes.envelope import (
 )
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.programme import FIRST, BenchChange, BenchProgramme, ramps
-from orchestrator.certification.codes.row import CodeRow, GridCode, Judge, RowFinding
+from orchestrator.certification.codes.row import Band, Bounded, CodeRow, GridCode, Judge, RowFinding
 
 DECLARED = (
     Declaration("X_eff", "effective reactance up to the connection point", "pu of the rating", 0.01, 2.0),
@@ -127,14 +127,17 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
         How many events later its time ends: 2 for a ramp, whose own end is an event.
     """
 
-    def judge(row: MeasuredRow) -> RowFinding:
+    def bounds(row: MeasuredRow, values: Numbers) -> tuple[slice, Numbers, Numbers]:
         begin = row.events[event]
         later = row.events[event + skipped] if event + skipped < len(row.events) else float(row.times[-1])
-        values = quantity(row)
         before = values[row.within(begin - 0.5, begin)]
         part = row.within(begin, min(later, begin + HORIZON))
-        t, value = row.times[part] - begin, values[part]
-        low, high = made(row.f_n).between(t, float(np.mean(before)))
+        return part, *made(row.f_n).between(row.times[part] - begin, float(np.mean(before)))
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        values = quantity(row)
+        part, low, high = bounds(row, values)
+        t, value = row.times[part] - row.events[event], values[part]
         outside = np.maximum(low - value, value - high)
         outside = np.where(np.isfinite(outside), outside, np.inf)
         at = int(np.argmax(outside))
@@ -148,7 +151,12 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
         return RowFinding(name, f"within the envelope for {HORIZON:g} s", c.CODE, number, 0.0,
                           least if np.isfinite(least) else None, bool(worst <= 0), text)  # fmt: skip
 
-    return judge
+    def bands(row: MeasuredRow) -> list[Band]:
+        part, low, high = bounds(row, quantity(row))
+        label = c.POWER_SHOWN if quantity is active_power else "Reactive current [pu]"
+        return [Band(name, label, quantity, row.times[part], low, high, alone=True)]
+
+    return Bounded(judge, bands)
 
 
 def rte_code(declared: Mapping[str, float]) -> GridCode:

@@ -1,0 +1,63 @@
+"""Pictures of responses with their limits, on the page of a certificate."""
+
+import re
+
+import numpy as np
+import pytest
+
+from orchestrator.certification.codes.all_codes import CODES, code_for
+from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.row_pictures import row_pictures
+from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.report.html.elements import Figures
+
+RTE = code_for("rte", {"X_eff": 0.15, "D": 20.0, "H": 1.0})
+
+
+def drawn(code, name, power, until=99.0):
+    """The pictures of a row on a response with that active power, a function of the time."""
+    row = next(row for row in code.rows if row.name == name)
+    times = np.arange(0, row.programme(50.0).stop + 5e-4, 1e-3)
+    times = times[times <= until]
+    signals = {"p": power(times), "q": np.full(times.shape, 0.1), "v": np.ones(times.shape)}
+    signals |= {"v_re": signals["v"], "v_im": 0 * times}
+    result = BenchResult(name, times, signals)
+    return row_pictures(judge_row(row, result, 50.0), result, 50.0, Figures())
+
+
+def curves(page):
+    """Label, x and y of every curve."""
+    found = re.findall(r'data-label="([^"]*)" data-x="([^"]*)" data-y="([^"]*)"', page)
+    return [(label, *(np.array(list(map(float, text.split()))) for text in values)) for label, *values in found]
+
+
+def test_every_envelope_is_a_picture_in_which_the_response_leaves_it():
+    """A constant power against a jump: outside of the drawn envelope, where the text says so."""
+    page = drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, 0.5))
+    assert page.count("<svg") == 2
+    assert "igfm1_scr10_p50, power after the jump ahead: not accepted: " in page
+    (_, x, response), (high, t, most), (low, low_t, least) = curves(page)[:3]
+    assert (high, low) == ("power after the jump ahead: at most", "power after the jump ahead: at least")
+    assert (x[0], t[0]) == pytest.approx((0.75, 1.0), abs=2e-3)
+    assert np.any(np.interp(t, x, response) > most + 0.05)
+    assert np.all(least < np.interp(low_t, t, most))
+
+
+def test_what_other_codes_ask_is_drawn_along_the_run():
+    """AEMO's jumps: 0.2 pu against each, and back within 0.05 pu."""
+    page = drawn(CODES["aemo"], "jump_10", lambda t: np.full(t.shape, 0.5))
+    levels = [(label, tuple(y)) for label, _, y in curves(page) if label != "response"]
+    first = "reached in the first swing after each jump"
+    assert levels[0] == (f"{first}: at least", pytest.approx((0.7, 0.7)))
+    assert levels[1] == (f"{first}: at most", pytest.approx((0.3, 0.3)))
+    assert levels[4] == ("returns: at most", pytest.approx((0.55, 0.55)))
+    assert page.count("<svg") == 1
+
+
+@pytest.mark.parametrize(("power", "until"), [(lambda t: np.where(t > 3, np.nan, 0.5), 99.0),
+                                              (lambda t: np.full(t.shape, 0.5), 3.0)])  # fmt: skip
+def test_a_broken_or_a_short_response_is_drawn_as_far_as_it_goes(power, until):
+    page = drawn(RTE, "igfm1_scr10_p50", power, until)
+    assert any(label == "response" and len(x) > 100 for label, x, _ in curves(page))
+    assert all(np.isfinite(y).all() for _, _, y in curves(page))
+    assert drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, np.nan)).count("no value is a number") == 2
