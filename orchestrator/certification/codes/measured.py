@@ -15,6 +15,10 @@ NOTHING, ALIVE, GONE = 1e-6, 0.1, 0.1
 """Apparent power below which a plant feeds in nothing [pu], voltage from which on it could [pu], and how long it has to
 last to be a trip [s]."""
 
+INSIDE, HOLD, LATEST = 0.5, 1.0, 0.05
+"""Reactance behind which the voltage of a plant is looked for [pu], shortest hold in whose end that is done, and how
+long that end is [s]."""
+
 SHARE = 1e-4
 """`NOTHING` is nothing where it is less than this part of the power before."""
 
@@ -41,6 +45,8 @@ class MeasuredRow:
         Of the watch over the run, in the form of `Finding.as_json`.
     declared
         What the applicant declares of the converter, by name.
+    source_angle
+        Of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
     """
 
     times: Numbers
@@ -49,6 +55,7 @@ class MeasuredRow:
     events: tuple[float, ...]
     findings: tuple[Mapping[str, Any], ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
+    source_angle: Numbers | None = None
 
     @property
     def p(self) -> Numbers:
@@ -89,7 +96,8 @@ class MeasuredRow:
         watched = [str(f["message"]) for f in self.findings if f["kind"] in UNSTABLE]
         odd = [] if self.finite else ["the response is not finite"]
         gone = self.tripped
-        return odd + watched + ([] if gone is None else [_gone(gone)])
+        slips = [] if self.turned is None or watched else [_turned(self.turned)]
+        return odd + watched + slips + ([] if gone is None else [_gone(gone)])
 
     @property
     def undecided(self) -> list[str]:
@@ -116,6 +124,32 @@ class MeasuredRow:
         long = [begin for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin >= count]
         return float(self.times[long[0]]) if long else None
 
+    @cached_property
+    def turned(self) -> float | None:
+        """When the plant is found half a turn or more from where it stood against the source [s]; None where it is not.
+
+        The voltage v + jX·i inside of the plant, with `INSIDE` for X, is looked at in the end of each hold. An X that
+        is larger than the plant's own counts the same turns: the voltage then encloses the origin all the more.
+        """
+        needed = {"p", "q", "v_re", "v_im"}
+        if self.source_angle is None or not needed <= set(self.signals) or not self.finite or not self.events:
+            return None
+        v = self.signals["v_re"] + 1j * self.signals["v_im"]
+        power = self.p + 1j * self.signals["q"]
+        inside = (v + 1j * INSIDE * np.conj(power / np.where(np.abs(v) < 1e-6, 1e-6, v))) * np.exp(
+            -1j * self.source_angle
+        )
+        parts = [over_a_period(part, self.times, self.f_n) for part in (inside.real, inside.imag)]
+        angle = np.unwrap(np.angle(parts[0] + 1j * parts[1]))
+        first = angle[max(0, int(np.searchsorted(self.times, self.events[0])) - 2)]
+        for begin in self.events:
+            end = self.until(begin)
+            if end - begin >= HOLD:
+                last = self.within(end - LATEST, end)
+                if abs(float(np.median(angle[last])) - first) > np.pi:
+                    return begin
+        return None
+
     @property
     def broken(self) -> str:
         """Why criteria beside that of holding together have no meaning, in words; empty where they have."""
@@ -124,7 +158,13 @@ class MeasuredRow:
             return f"{_IN_WORDS.get(first['kind'], 'the run fails')} from t = {float(first['time']):g} s on"
         if not self.finite:
             return "the response is not finite"
+        if self.turned is not None:
+            return _turned(self.turned)
         return "" if self.tripped is None else _gone(self.tripped)
+
+
+def _turned(time: float) -> str:
+    return f"it slips after t = {time:g} s: the voltage behind its current is half a turn or more from where it was"
 
 
 def _gone(time: float) -> str:

@@ -3,6 +3,9 @@
 from dataclasses import dataclass, field
 from math import hypot, radians, sqrt
 
+import numpy as np
+
+from orchestrator.arrays import Numbers
 from orchestrator.cases.schema import Value
 
 RATING_MVA = 100.0
@@ -69,6 +72,28 @@ class BenchProgramme:
     def times(self) -> tuple[float, ...]:
         """When something changes [s], each time once."""
         return tuple(dict.fromkeys(change.time for change in self.changes))
+
+    def source_angle(self, times: Numbers, f_n: float) -> Numbers | None:
+        """Angle of the source against one that turns at the rated frequency [rad]; None where the source is lost.
+
+        Parameters
+        ----------
+        times
+            [s], shape (n,).
+        f_n
+            Rated frequency [Hz].
+        """
+        if any(change.parameter == "source.connected" for change in self.changes):
+            return None
+        angle = np.zeros(times.shape)
+        for parameter, power in (("source.jump", 0), ("source.rise", 2)):
+            before = 0.0
+            for change in (c for c in self.changes if c.parameter == parameter):
+                since = np.maximum(times - change.time, 0)
+                by = float(change.value) - before
+                angle += by * (times >= change.time) if power == 0 else np.pi * f_n * by * since**power
+                before = float(change.value)
+        return angle
 
     @property
     def load_mvar(self) -> float:

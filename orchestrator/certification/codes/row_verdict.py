@@ -65,7 +65,8 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
     if result.failure:
         return RowVerdict(row, unknown=result.failure)
     programme = row.programme(f_n)
-    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings))
+    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings),
+                           source_angle=programme.source_angle(result.times, f_n))  # fmt: skip
     if len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3:
         ended = float(result.times[-1]) if len(result.times) else 0.0
         text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"

@@ -5,6 +5,7 @@ import pytest
 
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.programme import jumps, last_machine, ramps
 from orchestrator.certification.codes.row_verdict import judge_row
 
 TIMES = np.arange(0, 21.0005, 1e-3)
@@ -81,6 +82,16 @@ def test_a_plant_that_trips_in_silence_is_not_stable(at, lasts):
 
 def test_a_plant_at_rest_without_power_has_not_tripped():
     assert judged(opposing() - 0.5, q=0 * TIMES).findings[0].accepted
+
+
+def test_the_angle_of_the_source_is_that_of_its_programme():
+    """After 1 Hz for a second it has turned once; jumps are given as sums."""
+    jumped = jumps(3.0, 0.5, (-10.0, 10.0, -25.0)).source_angle(np.array([0.5, 1.0, 6.0, 11.0]), 60.0)
+    assert np.degrees(jumped) == pytest.approx([0, -10, 0, -25])
+    moved = ramps(10.0, 0.5, 60.0, 4.0, (1.0, -1.0), hold=1.0)
+    angle = moved.source_angle(np.array([1.0, 1.25, 2.25, 2.5, 3.5]), 60.0)
+    assert angle / (2 * np.pi) == pytest.approx([0, 0.125, 1.125, 1.25, 1.25])
+    assert last_machine(0.0, 1.0, 1.0).source_angle(TIMES, 60.0) is None
 
 
 def test_a_fault_that_leaves_no_voltage_is_no_trip():
