@@ -290,4 +290,4 @@ def test_the_reactance_is_not_to_be_set(tmp_path, fmu_path, gfor):
 def test_a_setting_that_does_not_fit_is_told_by_its_option(tmp_path, fmu_path, gfor):
     code, _, error = gfor("certify", fmu_path("gfor"), "--set", "pod_p.K=-200", "--out", tmp_path)
     assert code == 2
-    assert "--set converter.pod_p.K: pod_p.K = -200 pu; it must be at least 0 pu" in error
+    assert "--set pod_p.K=-200: pod_p.K = -200 pu; it must be at least 0 pu" in error

@@ -135,7 +135,8 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
 
     def bands(row: MeasuredRow) -> list[Band]:
         asked = row.before(row.events[0])
-        spans = [((end := row.until(t)) - LOOK if within is None else t + within, end) for t in _chosen(row, events)]
+        ends = [(time, row.until(time)) for time in _chosen(row, events)]
+        spans = [(end - LOOK if within is None else time + within, end) for time, end in ends]
         return [_power_band(name, *span, asked - tolerance, asked + tolerance) for span in spans if span[0] < span[1]]
 
     return Bounded(judge, bands)

@@ -109,6 +109,11 @@ class MeasuredRow:
         """Whether every value of every signal is a number."""
         return all(bool(np.isfinite(values).all()) for values in self.signals.values())
 
+    @property
+    def _begun(self) -> bool:
+        """Whether the response reaches the first event."""
+        return bool(self.events) and float(self.times[-1]) >= self.events[0]
+
     @cached_property
     def tripped(self) -> float | None:
         """When the plant stops feeding in, at a bus that has a voltage [s]; None where it does not.
@@ -116,7 +121,7 @@ class MeasuredRow:
         It has stopped where its apparent power is nothing for `GONE`. Of a plant that feeds in nothing before the first
         event this cannot be told.
         """
-        if "q" not in self.signals or not self.events or abs(self.before(self.events[0])) < NOTHING / SHARE:
+        if "q" not in self.signals or not self._begun or abs(self.before(self.events[0])) < NOTHING / SHARE:
             return None
         silent = (np.hypot(self.p, self.signals["q"]) < NOTHING) & (self.signals["v"] > ALIVE)
         count = round(GONE / float(self.times[1] - self.times[0]))
@@ -132,7 +137,7 @@ class MeasuredRow:
         is larger than the plant's own counts the same turns: the voltage then encloses the origin all the more.
         """
         needed = {"p", "q", "v_re", "v_im"}
-        if self.source_angle is None or not needed <= set(self.signals) or not self.finite or not self.events:
+        if self.source_angle is None or not needed <= set(self.signals) or not self.finite or not self._begun:
             return None
         v = self.signals["v_re"] + 1j * self.signals["v_im"]
         power = self.p + 1j * self.signals["q"]
@@ -144,7 +149,7 @@ class MeasuredRow:
         first = angle[max(0, int(np.searchsorted(self.times, self.events[0])) - 2)]
         for begin in self.events:
             end = self.until(begin)
-            if end - begin >= HOLD:
+            if end - begin >= HOLD and end <= self.times[-1] + 1e-9:
                 last = self.within(end - LATEST, end)
                 if abs(float(np.median(angle[last])) - first) > np.pi:
                     return begin

@@ -11,6 +11,8 @@ from orchestrator.certification.codes.row_pictures import row_pictures
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.report.html.elements import Figures
 
+pytestmark = pytest.mark.filterwarnings("error")
+
 RTE = code_for("rte", {"X_eff": 0.15, "D": 20.0, "H": 1.0})
 
 
@@ -20,7 +22,7 @@ def drawn(code, name, power, until=99.0):
     times = np.arange(0, row.programme(50.0).stop + 5e-4, 1e-3)
     times = times[times <= until]
     signals = {"p": power(times), "q": np.full(times.shape, 0.1), "v": np.ones(times.shape)}
-    signals |= {"v_re": signals["v"], "v_im": 0 * times}
+    signals |= {"v_re": signals["v"], "v_im": 0 * times, "duplicate.p": 0 * times, "source.p": -signals["p"]}
     result = BenchResult(name, times, signals)
     return row_pictures(judge_row(row, result, 50.0), result, 50.0, Figures())
 
@@ -54,9 +56,25 @@ def test_what_other_codes_ask_is_drawn_along_the_run():
     assert page.count("<svg") == 1
 
 
+@pytest.mark.parametrize("code", CODES.values(), ids=lambda code: code.key)
+def test_every_row_has_a_picture(code):
+    for row in code.rows:
+        page = drawn(code, row.name, lambda t: np.full(t.shape, 0.5))
+        assert page.count("<svg") == page.count("<figure") >= 1
+        assert all(len(x) == len(y) > 1 for _, x, y in curves(page))
+
+
+def test_the_power_after_a_dip_is_drawn_from_the_codes_time_on():
+    """Fingrid: 3 s after the last step of its profile, at 2.5 s, until the end."""
+    page = drawn(CODES["fingrid"], "dip", lambda t: np.full(t.shape, 0.5))
+    (most,) = [(tuple(x), tuple(y)) for label, x, y in curves(page) if label == "power after the dip: at most"]
+    assert most == (pytest.approx((5.5, 9.0), abs=2e-3), pytest.approx((0.55, 0.55)))
+
+
 @pytest.mark.parametrize(("power", "until"), [(lambda t: np.where(t > 3, np.nan, 0.5), 99.0),
                                               (lambda t: np.full(t.shape, 0.5), 3.0)])  # fmt: skip
 def test_a_broken_or_a_short_response_is_drawn_as_far_as_it_goes(power, until):
+    drawn(RTE, "igfm1_scr10_p50", power, 0.4)
     page = drawn(RTE, "igfm1_scr10_p50", power, until)
     assert any(label == "response" and len(x) > 100 for label, x, _ in curves(page))
     assert all(np.isfinite(y).all() for _, _, y in curves(page))

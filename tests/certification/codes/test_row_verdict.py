@@ -8,6 +8,8 @@ from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps
 from orchestrator.certification.codes.row_verdict import judge_row
 
+pytestmark = pytest.mark.filterwarnings("error")
+
 TIMES = np.arange(0, 21.0005, 1e-3)
 """Of AEMO's rows of jumps."""
 
