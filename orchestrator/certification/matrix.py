@@ -112,10 +112,10 @@ class CertificateMatrix:
         """The matrix in a sentence."""
         verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
-        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key))) or "none"
+        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
         alone = list(dict.fromkeys(cell.code for cell in self.cells.values() if cell.figures is not None))
         refused = [name for name in self.devices if any(self.cells[name, code].refused for code in self.codes)]
-        text = f"Of {len(verdicts)} certificates: {counted}."
+        text = f"Of {len(verdicts)} certificates: {counted}." if verdicts else "No certificate was asked for."
         if alone:
             text += f" Figures without a verdict: {', '.join(alone)}."
         if self.left_out:

@@ -139,6 +139,7 @@ def test_figures_without_a_verdict_stand_in_the_matrix_and_decide_nothing():
     whole.cells["a", "gb"] = lost
     assert whole.exit_code == 0
     assert whole.sentence() == "Of 2 certificates: 2 passed. Figures without a verdict: gb."
+    assert matrix(shown).sentence() == "No certificate was asked for. Figures without a verdict: gb."
     assert in_words(shown) == ["no verdict", "least |P/theta|: 9.1", "not met"]
     page = matrix_page(whole, [], None)
     assert 'href="b/gb/frequency.png"' in page
