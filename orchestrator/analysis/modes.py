@@ -27,7 +27,7 @@ HIGHEST_SWING_HZ = 5.0
 _DEAD = 1e-9
 """A multiplier of the step map smaller than this decays within one step and is not a mode."""
 
-_ALL_VECTORS = 400
+ALL_VECTORS = 400
 """Up to this number of states, all eigenvectors are computed: they take no time that anyone notices."""
 
 _REAL = 1e-2
@@ -193,7 +193,7 @@ def _values_and_vectors(
     model: LinearModel,
 ) -> tuple[NDArray[np.complex128], Callable[[Sequence[int]], tuple[Vector, Vector]]]:
     """All eigenvalues [rad/s], and what gives the left and right eigenvectors of some of them, as columns."""
-    if len(model.names) <= _ALL_VECTORS:
+    if len(model.names) <= ALL_VECTORS:
         lambdas, left, right = eigenvectors(model)
         return lambdas, lambda chosen: (left[:, chosen], right[:, chosen])
     form = RealSchur(model.A)

@@ -1,11 +1,11 @@
 """One thread for linear algebra on small or sparse matrices: several threads would only wait for each other."""
 
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
@@ -16,28 +16,25 @@ def one_thread() -> AbstractContextManager[Any]:
     return limited
 
 
-Found = TypeVar("Found")
-
-
 @contextmanager
-def beside(compute: Callable[[], Found]) -> Iterator[Future[Found]]:
-    """Inside ``with``, another thread computes what is given; it has ended where the block ends.
+def side_by_side() -> Iterator[Executor]:
+    """Inside ``with``, two more threads compute what is submitted; all of it has ended where the block ends.
 
-    It pays where one side at least spends its time in linear algebra that lets other threads of Python run, as NumPy's
-    does. BLAS uses one thread on each side, so that both cores work and no last digit depends on their number.
-
-    Parameters
-    ----------
-    compute
-        Must not touch an FMU, nor what the block changes.
+    It pays for what spends its time in linear algebra that lets other threads of Python run, as NumPy's does. BLAS uses
+    one thread on each side, so that both cores work and no last digit depends on their number. What is submitted must
+    not touch an FMU, nor what the block changes.
 
     Yields
     ------
-    Future
-        Its ``result()`` raises what ``compute`` raised.
+    Executor
+        Its ``submit(compute).result()`` raises what ``compute`` raised.
     """
-    with one_thread(), ThreadPoolExecutor(1) as pool:
-        yield pool.submit(compute)
+    with one_thread(), ThreadPoolExecutor(2) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)  # what has begun cannot be stopped
+            raise
 
 
 _one_at_a_time = threading.Lock()

@@ -24,6 +24,7 @@ from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.study import tables
+from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.modes import modes_json
 
 
@@ -84,17 +85,19 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
     folder
         For the results, if they are wanted.
     """
-    with said_stages() if options.black_box else nullcontext() as report:
-        results = [
-            scenario.modes(
-                options.range,
-                options.critical,
-                directional=options.directional,
-                black_box=options.black_box,
-                report=report,
-            ).result
-            for scenario in scenarios
-        ]
+    if options.black_box:
+        with said_stages() as report:
+            results = [
+                scenario.modes(options.range, options.critical, black_box=True, report=report).result
+                for scenario in scenarios
+            ]
+    else:
+        results = compute_all_modes(
+            [scenario.prepared for scenario in scenarios],
+            options.range,
+            options.critical,
+            directional=options.directional,
+        )
     written = []
     if folder:
         from orchestrator.results.staging import new_run_id, staged  # noqa: PLC0415 - only here

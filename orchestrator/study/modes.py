@@ -3,7 +3,8 @@
 import fnmatch
 import math
 from cmath import phase
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -16,6 +17,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.mode_names import Measure, Naming, name_modes, opposition
 from orchestrator.analysis.modes import (
+    ALL_VECTORS,
     ELECTROMECHANICAL_HZ,
     HIGHEST_SWING_HZ,
     Mode,
@@ -23,9 +25,9 @@ from orchestrator.analysis.modes import (
     find_spectrum,
 )
 from orchestrator.analysis.periodic import model_of
-from orchestrator.analysis.stability import WHOLE, Hidden, Stability, hidden, whole_spectrum
+from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
-from orchestrator.analysis.threads import beside
+from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.fault_tables import component_faults
@@ -184,9 +186,27 @@ def modes_of(
     directional
         Linearise with the FMUs' own directional derivatives.
     """
+    return _computed(linearised(prepared, master, frequency_range, critical, directional=directional))
+
+
+def linearised(
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    *,
+    directional: bool = False,
+) -> "Linearised":
+    """A running system at its operating point, before its eigenvalues are computed.
+
+    Parameters
+    ----------
+    prepared, master, frequency_range, critical, directional
+        As `modes_of`.
+    """
     point = find_operating_point(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return modes_from(prepared, master, point, blocks, frequency_range, critical)
+    return Linearised(prepared, master, point, blocks, frequency_range, critical)
 
 
 def modes_from(
@@ -210,74 +230,123 @@ def modes_from(
     frequency_range, critical
         As for `modes_of`.
     """
-    model = model_of(master, blocks)
-    system = continuous_model(master, blocks)
-    low, high = frequency_range
-    # Each of the two spectra takes seconds in a large system.
-    with beside(_spectrum_of(system)) as of_system:
-        if critical is None:
-            # Names are given before the range is applied, so that a mode outside it leaves its name to no other.
-            first, last = min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
-            everything = find_spectrum(model, first, max(last, HIGHEST_SWING_HZ))
-            spectrum: Spectrum | None = everything
-            oscillating = [mode for mode in everything.modes if mode.is_oscillation]
+    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical))
+
+
+def _computed(system: "Linearised") -> ModesResult:
+    """The result, with both spectra computed side by side."""
+    with side_by_side() as pool:
+        system.begin(pool)
+    return system.finished()
+
+
+class Linearised:
+    """A linearised scenario, whose eigenvalues other threads compute meanwhile.
+
+    Parameters
+    ----------
+    prepared, master, point, blocks, frequency_range, critical
+        As `modes_from`.
+    """
+
+    def __init__(
+        self,
+        prepared: PreparedScenario,
+        master: Master,
+        point: OperatingPoint,
+        blocks: Blocks,
+        frequency_range: tuple[float, float],
+        critical: float | None,
+    ) -> None:
+        self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
+        self._range, self._critical = frequency_range, critical
+        self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
+
+    def begin(self, pool: Executor) -> None:
+        """Submit the eigenvalues.
+
+        Parameters
+        ----------
+        pool
+            As `side_by_side` gives it.
+        """
+        if self._system is not None and len(self._model.names) <= ALL_VECTORS:
+            # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
+            # its way, in NumPy's `eigvals`, before that begins.
+            _ = self._system.A
+            self._of_system = pool.submit(self._spectrum_of_system)
+            self._found = pool.submit(self._spectrum_of_map)
+        else:  # the step map's takes longer
+            self._found = pool.submit(self._spectrum_of_map)
+            self._of_system = pool.submit(self._spectrum_of_system)
+
+    def _spectrum_of_system(self) -> Spectrum | None:
+        return None if self._system is None else whole_spectrum(self._system)
+
+    def _spectrum_of_map(self) -> tuple[Spectrum | None, list[Mode]]:
+        """The step map's spectrum, and the critical modes where only they are asked for."""
+        if self._critical is not None:
+            return whole_spectrum(self._model), find_critical_modes(self._model, *self._range, self._critical)
+        first, last = self._named_range
+        return find_spectrum(self._model, first, max(last, HIGHEST_SWING_HZ)), []
+
+    @property
+    def _named_range(self) -> tuple[float, float]:
+        """Names are given before the range is applied, so that a mode outside it leaves its name to no other [Hz]."""
+        low, high = self._range
+        return min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
+
+    def finished(self) -> ModesResult:
+        """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
+        prepared, model = self._prepared, self._model
+        low, high = self._range
+        spectrum, critical_modes = self._found.result()
+        if self._critical is None and spectrum is not None:
+            first, last = self._named_range
+            oscillating = [mode for mode in spectrum.modes if mode.is_oscillation]
             swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
             shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
             naming = named_modes(prepared.case, model, swinging)
             named = {name: mode for name, mode in naming.named.items() if low <= mode.frequency_hz <= high}
         else:
-            spectrum = whole_spectrum(model)
-            swinging = shown = find_critical_modes(model, low, high, critical)
+            swinging = shown = critical_modes
             naming, named, oscillating = Naming({}, ()), {}, []
-    examined = examine(
-        master, blocks, model, system, spectrum=spectrum, of_system=of_system.result(), modes=swinging, shown=shown,
-        frequency_range=frequency_range,
-    )  # fmt: skip
-    stability = examined.stability
-    analysis = prepared.case.table.analysis
-    own = prepared.case.scenarios[prepared.name].events
-    failing = component_faults(prepared.case.table.events if own is None else own, prepared.system)
-    return ModesResult(
-        prepared=prepared,
-        operating_point=point,
-        model=model,
-        modes=shown,
-        named=named,
-        references=dict(prepared.references),
-        warnings=(
-            *map(str, prepared.questions),
-            *examined.warnings,
-            *naming.doubts,
-            *(f"{fault}: the modes are those before it" for fault in failing),
-        ),
-        swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
-        areas=areas_of(analysis.areas, prepared.system),
-        stability=stability,
-        hidden=None
-        if spectrum is None
-        else replace(
-            hidden(spectrum.eigenvalues, low, high),
-            electromechanical=tuple(
-                mode.eigenvalue
-                for mode in oscillating
-                if not low <= mode.frequency_hz <= high and _is_swing(mode, analysis.swing)
+        examined = examine(
+            self._master, self._blocks, model, self._system, spectrum=spectrum, of_system=self._of_system.result(),
+            modes=swinging, shown=shown, frequency_range=self._range,
+        )  # fmt: skip
+        analysis = prepared.case.table.analysis
+        own = prepared.case.scenarios[prepared.name].events
+        failing = component_faults(prepared.case.table.events if own is None else own, prepared.system)
+        return ModesResult(
+            prepared=prepared,
+            operating_point=self._point,
+            model=model,
+            modes=shown,
+            named=named,
+            references=dict(prepared.references),
+            warnings=(
+                *map(str, prepared.questions),
+                *examined.warnings,
+                *naming.doubts,
+                *(f"{fault}: the modes are those before it" for fault in failing),
             ),
-        ),
-        system=system,
-        fit_errors={name: c.disagreement for name, c in blocks.components.items() if c.source == IDENTIFIED},
-    )
-
-
-def _spectrum_of(system: LinearModel | None) -> Callable[[], Spectrum | None]:
-    """What gives all eigenvalues of the continuous model.
-
-    The matrix is formed here: in a small system SciPy's `eig` lets no other thread of Python run, so that the other
-    spectrum must be on its way, in NumPy's `eigvals`, before that begins.
-    """
-    if system is None or len(system.names) > WHOLE:
-        return lambda: None
-    _ = system.A
-    return lambda: whole_spectrum(system)
+            swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
+            areas=areas_of(analysis.areas, prepared.system),
+            stability=examined.stability,
+            hidden=None
+            if spectrum is None
+            else replace(
+                hidden(spectrum.eigenvalues, low, high),
+                electromechanical=tuple(
+                    mode.eigenvalue
+                    for mode in oscillating
+                    if not low <= mode.frequency_hz <= high and _is_swing(mode, analysis.swing)
+                ),
+            ),
+            system=self._system,
+            fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
+        )
 
 
 def _is_swing(mode: Mode, speeds: Sequence[str]) -> bool:

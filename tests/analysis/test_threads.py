@@ -1,11 +1,11 @@
-"""What is computed beside something else: at the same time, with its error, and with one thread of BLAS."""
+"""What is computed side by side: at the same time, with its error, and with one thread of BLAS."""
 
 import threading
 
 import pytest
 from threadpoolctl import threadpool_info
 
-from orchestrator.analysis.threads import beside
+from orchestrator.analysis.threads import side_by_side
 from orchestrator.errors import AnalysisError
 
 
@@ -13,27 +13,46 @@ def blas_threads():
     return {library["num_threads"] for library in threadpool_info()}
 
 
-def test_both_sides_are_under_way_at_the_same_time_with_one_thread_of_blas():
-    here, there = threading.Event(), threading.Event()
+def test_two_computations_and_the_block_are_under_way_at_the_same_time_with_one_thread_of_blas():
+    together = threading.Barrier(3, timeout=10)
 
     def compute():
-        there.set()
-        assert here.wait(10)  # would not come if the block began after this
+        together.wait()  # breaks if one of them began after another's end
         return blas_threads()
 
-    with beside(compute) as found:
-        assert there.wait(10)
-        here.set()
+    with side_by_side() as pool:
+        found = [pool.submit(compute) for _ in range(2)]
+        together.wait()
         assert blas_threads() == {1}
-    assert found.done()
-    assert found.result() == {1}
+    assert [one.result() for one in found] == [{1}, {1}]
 
 
-def test_an_error_of_the_other_side_comes_with_its_result():
+def test_an_error_of_a_computation_comes_with_its_result():
     def fail():
         raise AnalysisError("it does not converge")
 
-    with beside(fail) as found:
-        pass
+    with side_by_side() as pool:
+        found = pool.submit(fail)
     with pytest.raises(AnalysisError, match="does not converge"):
         found.result()
+
+
+def test_what_has_not_begun_is_given_up_where_the_block_fails():
+    go_on, begun = threading.Event(), threading.Semaphore(0)
+
+    def wait():
+        begun.release()
+        assert go_on.wait(10)
+
+    def interrupted():
+        with side_by_side() as pool:
+            computations.extend(pool.submit(wait) for _ in range(3))
+            assert all(begun.acquire(timeout=10) for _ in range(2))
+            threading.Timer(0.1, go_on.set).start()
+            raise KeyboardInterrupt
+
+    computations = []
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert [one.cancelled() for one in computations] == [False, False, True]
+    assert all(one.done() for one in computations)

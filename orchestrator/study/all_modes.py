@@ -1,0 +1,68 @@
+"""The modes of several scenarios, one after the other, with both cores at work.
+
+The eigenvalues of a large system take seconds in linear algebra, which lets Python run. Meanwhile the FMUs of the next
+scenario are initialised and linearised, which is Python's work. All calls of FMUs stay in the calling thread.
+"""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.analysis.threads import side_by_side
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.fmi.instance import is_ours
+from orchestrator.study.modes import Linearised, ModesResult, compute_modes, linearised, running
+
+
+def compute_all_modes(
+    scenarios: Sequence[PreparedScenario],
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    critical: float | None = None,
+    *,
+    directional: bool = False,
+) -> list[ModesResult]:
+    """The same as `compute_modes` of each scenario, in their order, to the last bit.
+
+    FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
+
+    Parameters
+    ----------
+    scenarios
+        Of one case.
+    frequency_range, critical, directional
+        As `compute_modes`.
+
+    Raises
+    ------
+    CosimError
+        As `compute_modes`, of the first scenario that cannot be computed.
+    """
+    if len(scenarios) < 2 or not all(_all_ours(prepared) for prepared in scenarios):
+        return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
+    results: list[ModesResult] = []
+    before: Linearised | None = None
+    with side_by_side() as pool, ExitStack() as its_fmus:
+        for prepared in scenarios:
+            with ExitStack() as fmus:
+                try:
+                    master = fmus.enter_context(running(prepared))
+                    begun = linearised(prepared, master, frequency_range, critical, directional=directional)
+                except Exception:
+                    if before is not None:
+                        before.finished()  # an error of its own comes first
+                    raise
+                begun.begin(pool)
+                if before is not None:
+                    results.append(before.finished())
+                its_fmus.close()
+                its_fmus.push(fmus.pop_all())
+            before = begun
+        if before is not None:
+            results.append(before.finished())
+    return results
+
+
+def _all_ours(prepared: PreparedScenario) -> bool:
+    """Whether all FMUs are our own, in this process."""
+    plans = prepared.system.components.values()
+    return all(plan.isolated is not True for plan in plans) and all(map(is_ours, {p.description.path for p in plans}))
