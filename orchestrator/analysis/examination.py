@@ -6,6 +6,7 @@ Every command that linearises uses this examination, and so all of them give the
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.coupled_response import confirmed
 from orchestrator.analysis.delays import LARGEST_ERROR, doubtful_delays, representation_error, too_long, warnings_of
 from orchestrator.analysis.linear_model import LinearModel
@@ -78,13 +79,19 @@ def examine(
             f"sampled controllers repeat after {model.period} communication steps "
             f"({model.period * master.clock.step_size:g} s): the modes are those of the map over this period"
         )
-        return Examination(stability, (told, *verdict_warnings(stability), *warnings_of(master)))
+        apart = standing_apart(master, model)
+        return Examination(stability, (told, *verdict_warnings(stability), *apart, *warnings_of(master)))
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     shown = modes if shown is None else shown
     eigenvalues = [mode.eigenvalue for mode in [*shown, *rightmost]]
     links = blocks.links.values()
     long = too_long(links, frequency_range[1], model.step_size)
-    wires = (*warnings_of(master), *long, *doubtful_delays(links, eigenvalues, model.step_size))
+    wires = (
+        *standing_apart(master, model),
+        *warnings_of(master),
+        *long,
+        *doubtful_delays(links, eigenvalues, model.step_size),
+    )
     if long and not (stability.stable is False and _has_delays(blocks, model, rightmost)):
         stability = replace(stability, stable=None, reason="; ".join(long))
     if turning := _turning(blocks, master, model, stability, found, rightmost):

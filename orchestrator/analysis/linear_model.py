@@ -6,13 +6,14 @@ the equations are not, which is what a search for a few eigenvalues of a large s
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
 
 from orchestrator.analysis.hub_elimination import HubEquations, hub_equations
 from orchestrator.arrays import Matrix, Vector
@@ -99,15 +100,33 @@ class LinearModel:
 
     @property
     def clocks(self) -> int:
-        """Number of states that stand or advance by themselves, and are coupled with no other: each is a zero of its
-        own that says nothing of the system.
+        """Number of states that stand `apart`: each is a zero of its own that says nothing of the system."""
+        return len(self.apart)
+
+    @cached_property
+    def apart(self) -> tuple[str, ...]:
+        """Names of the states that stand or advance by themselves, and are coupled with no other: clocks, and the
+        integrators of controllers that are off.
         """
+        return tuple(self.names[k] for k in np.flatnonzero(self._is_apart))
+
+    @cached_property
+    def _is_apart(self) -> NDArray[np.bool_]:
         own = self.F.diagonal()
         others = sp.csr_array(self.F - sp.diags_array(own))
-        alone = np.ones(len(self.names), dtype=bool)
+        alone: NDArray[np.bool_] = own == (0.0 if self.step_size is None else 1.0)
         for matrix, axis in ((others, 0), (others, 1), (self.G, 1), (self.H, 0)):
             alone &= np.asarray(abs(matrix).sum(axis=axis)).ravel() == 0
-        return int((alone & (own == (0.0 if self.step_size is None else 1.0))).sum())
+        return alone
+
+    @property
+    def coupled(self) -> Self:
+        """The model without the states that stand `apart`: the others' eigenvalues are the same."""
+        kept = np.flatnonzero(~self._is_apart)
+        if len(kept) == len(self.names):
+            return self
+        F = self.F[kept][:, kept]
+        return replace(self, F=F, G=self.G[kept], H=self.H[:, kept], names=tuple(self.names[k] for k in kept))
 
     @cached_property
     def settle(self) -> Callable[[Any], Any]:

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, find_spectrum, index_of_rightmost
@@ -88,6 +89,8 @@ class PointModes:
         The same for the eigenvalue with the largest real part.
     loops
         The open loops; None where they were not asked for.
+    clocks
+        Number of states that are coupled with no other, each of which is a zero in ``values``.
     lasting
         Whether computing it again would give the same.
     """
@@ -102,6 +105,7 @@ class PointModes:
     who: tuple[str, ...] = ()
     rightmost: str = ""
     loops: OpenLoops | None = None
+    clocks: int = 0
     lasting: bool = True
 
     @property
@@ -111,8 +115,10 @@ class PointModes:
 
     @property
     def zeros(self) -> int:
-        """Number of eigenvalues that are zero: one is the free angle, two are a frequency that nothing holds."""
-        return int((np.abs(self.values) <= ZERO).sum())
+        """Number of eigenvalues that are zero, clocks left out: one is the free angle, two are a frequency that
+        nothing holds.
+        """
+        return int((np.abs(self.values) <= ZERO).sum()) - self.clocks
 
 
 _LOOP_ARRAYS = ("A", "U", "V", "D", "right", "left", "rest")
@@ -219,6 +225,7 @@ def _at(
     if doubtful:
         text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
         warnings = (*warnings, text)
+    warnings = (*warnings, *standing_apart(master, model))
     loops = measure(master, model, known, places) if places else None
     return _modes(case, model, loops, warnings, doubtful=bool(doubtful))
 
@@ -240,6 +247,7 @@ def _modes(
         who=tuple(_who(mode) for mode in modes),
         rightmost="" if index_of_rightmost(spectrum.eigenvalues) is None else _who(spectrum.rightmost),
         loops=loops,
+        clocks=model.clocks,
     )
 
 

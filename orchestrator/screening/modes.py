@@ -69,6 +69,9 @@ class FoundModes:
         The one of them with the largest real part [rad/s]; None where there is none, or they were only counted.
     zeros
         Number of eigenvalues that are zero, where growth was counted: one may be the free angle.
+    slowest
+        Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0
+        only. 0 where all eigenvalues are known.
     """
 
     modes: ModeSet
@@ -76,6 +79,7 @@ class FoundModes:
     growing_elsewhere: int | None
     fastest: complex | None = None
     zeros: int = 0
+    slowest: float = 0.0
 
     def critical(self, wanted: CriticalRegion) -> list[int]:
         """Places of the critical modes, least damped first."""
@@ -127,7 +131,7 @@ def find_modes_here(
     if not count:
         return FoundModes(found, searched, None)
     zeros, slow = _near_zero(model, found)
-    return FoundModes(found, searched, _elsewhere(equations, alone, found) + slow, None, zeros)
+    return FoundModes(found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING)
 
 
 def _from_search(model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion) -> ModeSet:
@@ -192,12 +196,14 @@ def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> in
 
 def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
     """How many eigenvalues are zero, and how many others near 0 grow too slowly to be counted; a pair counts twice."""
-    values = np.array([value for value, _, _ in nearest_pairs(model, complex(_BESIDE_ZERO), _NEAREST)])
+    # Arnoldi's method finds one copy of a zero that many have, and the nearest six would be clocks where there are six.
+    values = np.array([value for value, _, _ in nearest_pairs(model.coupled, complex(_BESIDE_ZERO), _NEAREST)])
     zeros = np.abs(values) <= ZERO
     slow = values[~zeros & (values.real > UNSTABLE) & (values.real <= GROWING)]
     known = [value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO]
-    upper = [value for value in slow.tolist() if value.imag >= 0 and value not in known]
-    return int(zeros.sum()) - model.clocks, sum(1 + (value.imag > ZERO) for value in upper)
+    # Arnoldi's method gives a real one an imaginary part of rounding, of either sign.
+    upper = [value for value in slow.tolist() if value.imag > -ZERO and value not in known]
+    return int(zeros.sum()), sum(1 + (value.imag > ZERO) for value in upper)
 
 
 def _columns(modes: ModeSet) -> RefinedModes:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.mode_tracking import ModeSet, match
 from orchestrator.analysis.slope_linearization import gives_slopes
@@ -184,6 +185,7 @@ class _Worker:
         doubtful = [f"{n}: {', '.join(c.doubtful[:3])}" for n, c in whole.items() if c.doubtful]
         if doubtful:
             warnings = (*warnings, f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:3])}")
+        warnings = (*warnings, *standing_apart(master, model))
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(model, own, wanted, None if neighbour is None else neighbour.modes, count=count)
         residues = _residues(found.modes, whole)
@@ -210,6 +212,7 @@ class _Worker:
             fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),
             searched=found.searched,
             zeros=found.zeros,
+            slowest=found.slowest,
             eigenvalues=found.modes.eigenvalues,
             critical=tuple(critical),
             shares=_shares(found.modes),

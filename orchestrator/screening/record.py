@@ -74,6 +74,9 @@ class ItemRecord:
     zeros
         Number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency
         or a voltage that nothing restores.
+    slowest
+        Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0
+        only. 0 where all eigenvalues are known.
     eigenvalues
         Of the modes that are followed [rad/s].
     critical
@@ -100,6 +103,7 @@ class ItemRecord:
     fastest: tuple[float, float] | None = None
     searched: bool = False
     zeros: int = 0
+    slowest: float = 0.0
     eigenvalues: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=complex))
     critical: tuple[int, ...] = ()
     shares: dict[str, NDArray[np.float32]] = field(default_factory=dict)

@@ -119,6 +119,13 @@ class Summary:
         """Items at which growth was counted at all frequencies."""
         return sum(item.record.counted for item in self.result.items)
 
+    @property
+    def slowest(self) -> float:
+        """Growth [1/s] from which it was counted at all frequencies, wherever it was; slower growth outside of the
+        range was sought near 0 only. 0 where all eigenvalues are known everywhere.
+        """
+        return max((item.record.slowest for item in self.result.items), default=0.0)
+
     def failures(self) -> Iterator[ScreenedItem]:
         """Items that have no modes."""
         return (item for item in self.result.items if item.record.status is not Status.COMPUTED)
@@ -178,6 +185,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "complete": result.complete,
         "stable": summary.stable,
         "counted_at_all_frequencies": summary.counted,
+        "slowest_growth_counted": summary.slowest,
         "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
         "counts": {str(status): number for status, number in summary.counts.items()},
         "unstable": [_where(item) for item in summary.unstable],

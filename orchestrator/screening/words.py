@@ -30,7 +30,7 @@ def verdict_sentence(summary: Summary) -> str:
             f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
         )
     if summary.stable:
-        return f"stable: nothing grows at any of {total} points and outages{tail}"
+        return f"stable: nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
     left = summary.result.plan.number_of_items - total
     missing = [f"{number} {status}" for status, number in summary.counts.items() if status is not Status.COMPUTED]
     missing += [f"{left} not computed yet"] if left else []
@@ -56,6 +56,17 @@ def what_was_counted(summary: Summary) -> str:
         f"from a neighbour with a check that no mode is missed there. Growth at other frequencies was counted at "
         f"{summary.counted} of {computed} items, in systems of more than {DENSE} states where it is faster than "
         f"{GROWING:g} 1/s, or near 0."
+    )
+
+
+def _but_slowly(summary: Summary) -> str:
+    """What growth a stable verdict does not exclude; "" where all eigenvalues are known."""
+    if not summary.slowest:
+        return ""
+    wanted = summary.result.plan.wanted
+    return (
+        f", but what grows slower than {summary.slowest:g} 1/s outside of {wanted.lowest_hz:g} to "
+        f"{wanted.highest_hz:g} Hz is seen near 0 Hz only"
     )
 
 

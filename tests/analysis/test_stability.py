@@ -111,6 +111,18 @@ def test_a_clock_is_no_second_zero_but_a_frequency_that_nothing_holds_is(step_si
     assert "nothing restores" in judge(model(angle_and_frequency, step_size)).sentence()
 
 
+@pytest.mark.parametrize("step_size", [None, STEP])
+def test_what_stands_apart_is_named_and_can_be_left_out(step_size):
+    """An integrator that is driven, or that drives, is neither a clock nor a controller that is off."""
+    A = scipy.linalg.block_diag([[0.0]], [[0.0, 0.3], [0.0, -1.0]], [[0.0]], [[0.0, 0.0], [0.2, -2.0]])
+    found = model(A, step_size)
+    assert found.apart == tuple(found.names[k] for k in (0, 3))
+    assert found.clocks == 2
+    assert found.coupled.names == tuple(found.names[k] for k in (1, 2, 4, 5))
+    np.testing.assert_array_equal(found.coupled.A, found.A[np.ix_([1, 2, 4, 5], [1, 2, 4, 5])])
+    assert judge(found).zeros == judge(found.coupled).zeros == 2
+
+
 def test_the_system_or_the_coupling_is_named():
     growing, damped = np.array(pair(1.0, 0.2)), np.array(pair(1.0, -0.2))
     assert judge(model(growing, STEP), system=model(growing)).cause is Cause.SYSTEM

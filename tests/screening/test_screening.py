@@ -367,11 +367,15 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, t
     assert {record.zeros for record in computed if record.counted} == {1}
 
 
-def test_slow_growth_beside_zero_and_second_zeros_are_found():
-    """Both hide from the count of what grows faster than 0.002 1/s."""
-    blocks = [np.diag([0.0, 0.0, 1e-3 + 5e-4, -1.0]), *([[-w / 5, w], [-w, -w / 5]] for w in (3.0, 5.0, 40.0))]
-    A = scipy.linalg.block_diag(*blocks)
-    A[:2, 3] = 0.5, 0.2  # what nothing drives would be a clock
+@pytest.mark.parametrize("clocks", [0, 1, 3, 7])
+@pytest.mark.parametrize("others", [(3.0, 5.0, 40.0), (3.0, 5.0, 40.0, 60.0, 80.0, 100.0)])
+def test_slow_growth_beside_zero_and_second_zeros_are_found(clocks, others):
+    """Both hide from the count of what grows faster than 0.002 1/s, and must hide neither behind many clocks nor
+    behind an imaginary part of rounding.
+    """
+    blocks = [np.diag([0.0, 0.0, 1e-3 + 5e-4, -1.0]), *([[-w / 5, w], [-w, -w / 5]] for w in others)]
+    A = scipy.linalg.block_diag(*blocks, np.zeros((clocks, clocks)))
+    A[:3, 3] = 0.5, 0.2, 0.5  # what nothing drives would be a clock
     model = LinearModel.from_matrix(A, tuple(f"x{k}" for k in range(len(A))), None)
     known = ModeSet(np.zeros(0, complex), np.zeros((0, len(A)), complex), np.zeros((0, len(A)), complex), model.names)
     assert modes._near_zero(model, known) == (2, 1)

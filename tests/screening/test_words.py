@@ -10,7 +10,7 @@ from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.record import ItemRecord, Status
 from orchestrator.screening.study import plan_screening, run_screening
-from orchestrator.screening.summary import Summary
+from orchestrator.screening.summary import Summary, as_json
 from orchestrator.screening.tables import remarks
 from orchestrator.screening.words import growth_outside, verdict_sentence, what_was_counted
 
@@ -82,5 +82,20 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_pa
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.in_service\nin,1\n")
     plan = plan_screening(load_case("two_area"), path, None, "gfor")
-    (item,) = run_screening(plan, Serial(), PointStore(tmp_path / "points")).items
+    for _ in range(2):  # computed, and then kept
+        result = run_screening(plan, Serial(), PointStore(tmp_path / "points"))
+    (item,) = result.items
     assert (item.record.stable, item.record.counted) == (stable, counted)
+    if stable:
+        assert "what grows slower than 0.002 1/s outside of 0.1 to 2 Hz is seen near 0 Hz only" in verdict_sentence(
+            Summary(result)
+        )
+
+
+def test_where_all_eigenvalues_are_known_nothing_is_left_out(screened):
+    calm = next(item for item in screened.items if item.record.stable)
+    summary = Summary(replace(screened, items=[calm, calm]))
+    assert summary.slowest == 0.0
+    assert verdict_sentence(summary).startswith("stable: nothing grows at any of 2 points and outages")
+    assert "slower" not in verdict_sentence(summary)
+    assert as_json(summary)["slowest_growth_counted"] == 0.0

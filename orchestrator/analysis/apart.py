@@ -1,0 +1,37 @@
+"""States that are coupled with nothing: clocks, which say nothing of a system, and what should not be taken for one."""
+
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.coupling.master import Master
+
+_SHOWN = 3
+
+
+def standing_apart(master: Master, model: LinearModel) -> list[str]:
+    """A sentence on states that nothing moves and that move nothing; none where there are no such states.
+
+    Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
+    like that, so that whoever believes it on must be told. A state in seconds is a clock.
+
+    Parameters
+    ----------
+    master
+        Has the components whose states these are.
+    model
+        Step map or continuous model.
+    """
+    names = [name for name in model.apart if _unit(master, name) != "s"]
+    if not names:
+        return []
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return [
+        f"states that nothing moves and that move nothing, as of a controller that is off: {', '.join(names[:_SHOWN])}"
+        f"{more}; their zeros are not counted"
+    ]
+
+
+def _unit(master: Master, name: str) -> str:
+    """The unit that an FMU gives a state ``component.state``; "" where it gives none."""
+    component, _, state = name.partition(".")
+    found = master.components.get(component)
+    variable = None if found is None else found.description.variables.get(state)
+    return "" if variable is None else variable.unit or ""
