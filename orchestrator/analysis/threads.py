@@ -37,7 +37,7 @@ def side_by_side() -> Iterator[Executor]:
             raise
 
 
-_one_at_a_time = threading.Lock()
+_one_at_a_time = threading.RLock()
 
 
 @contextmanager
@@ -46,7 +46,8 @@ def alone() -> Iterator[None]:
     study run in it.
 
     FMUs and the limit on BLAS belong to the whole process, whose workers may be threads of a Dask cluster. With one
-    BLAS thread each, several workers do not fight, and rounding is the same everywhere.
+    BLAS thread each, several workers do not fight, and rounding is the same everywhere. The thread that is alone may
+    ask for it again.
     """
     with _one_at_a_time, one_thread():
         yield

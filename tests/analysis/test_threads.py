@@ -5,7 +5,7 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info
 
-from orchestrator.analysis.threads import side_by_side
+from orchestrator.analysis.threads import alone, side_by_side
 from orchestrator.errors import AnalysisError
 
 
@@ -56,3 +56,26 @@ def test_what_has_not_begun_is_given_up_where_the_block_fails():
         interrupted()
     assert [one.cancelled() for one in computations] == [False, False, True]
     assert all(one.done() for one in computations)
+
+
+def test_who_is_alone_may_ask_for_it_again_and_others_wait():
+    """The benchmark of a screening did, and waited for itself for ever."""
+    inside, go_on, entered = threading.Event(), threading.Event(), threading.Event()
+
+    def twice():
+        with alone(), alone():
+            assert blas_threads() == {1}
+            inside.set()
+            assert go_on.wait(10)
+
+    def another():
+        with alone():
+            entered.set()
+
+    threads = [threading.Thread(target=work, daemon=True) for work in (twice, another)]
+    threads[0].start()
+    assert inside.wait(10)
+    threads[1].start()
+    assert not entered.wait(0.1)
+    go_on.set()
+    assert entered.wait(10)
