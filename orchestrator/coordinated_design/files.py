@@ -41,6 +41,7 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "unstable": [_where(point) for point in verdict.unstable],
         "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
+        "unforeseen": [_where(point) for point in verdict.unforeseen],
         "settings": [
             {
                 "controller": group.controller,

@@ -258,8 +258,8 @@ def together(worths: Iterable[Worth]) -> Worth:
     return Worth(worst.worst, max(worth.breach for worth in found), worst.point)
 
 
-def least_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> float:
-    """The least damping ratio of all modes to be damped, also of those that no loop moves; 1 where there is none.
+def worth_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> Worth:
+    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves.
 
     Parameters
     ----------
@@ -270,4 +270,4 @@ def least_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> float:
     aim
         Which modes are damped.
     """
-    return RatedPoint(0, loops, aim, None).worth(setting).worst
+    return RatedPoint(0, loops, aim, None).worth(setting)

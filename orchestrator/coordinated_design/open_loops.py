@@ -13,16 +13,20 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Complex, Matrix, Vector
 from orchestrator.pod_design.closed_loop import PodSetting
+from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, lead_lag_turning
 
 REDUCED = 300
 """Systems with more states are reduced to their slow modes."""
 
 _FASTEST = 2 * np.pi * 30
-"""Faster modes than this [rad/s] answer as they do at rest."""
+"""Faster modes than this [rad/s] answer as they do at rest, unless loops move them."""
+
+_LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
+"""Two stages of a lead/lag that leads most pass fast signals with this gain."""
 
 _GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
-"""A slower mode that loops with this gain [pu] move by less than this part of its size, which counts as at least so
-much [rad/s], stays where it is."""
+"""A mode that loops with this gain [pu] move by less than this part of its size, which counts as at least so much
+[rad/s], stays where it is. Fast modes meet the gain with the lead's on top."""
 
 _TRUE = 1e-6
 """A reduction whose modes are not those of the system to this part is not taken."""
@@ -200,8 +204,10 @@ def _reduced(A: Matrix, U: Matrix, V: Matrix, places: tuple[PodPlace, ...], name
     reach = _GAIN * np.linalg.norm(entries, axis=1) * np.linalg.norm(exits, axis=0)
     fast, hertz = np.abs(values) > _FASTEST, np.abs(values.imag) / (2 * np.pi)
     moved = reach > _MOVED * np.maximum(np.abs(values), _SLOWEST)
-    kept = ~fast & (moved | ((hertz > _SEEN[0]) & (hertz < _SEEN[1])))
-    at_rest = -(exits[:, fast] / values[fast]) @ entries[fast]
+    swung = fast & (_LEAD * reach > _MOVED * np.abs(values))
+    kept = swung | (~fast & (moved | ((hertz > _SEEN[0]) & (hertz < _SEEN[1]))))
+    resting = fast & ~swung
+    at_rest = -(exits[:, resting] / values[resting]) @ entries[resting]
     matrix, there, back = _real_form(values[kept], rows[kept], right[:, kept])
     if np.abs(back @ inner @ there - matrix).max() > _TRUE * np.abs(inner).max():
         return None

@@ -15,7 +15,7 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.coordinated_design.objective import Aim, RatedPoint, least_of_all
+from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
 from orchestrator.coordinated_design.ranking import RankedConverter, ranked
@@ -307,7 +307,7 @@ def design_over_points(
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
     ranking = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked)
-    predicted = {point.number: least_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
+    predicted = {point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
     where = [(plan.points[item.point], plan.outages[item.outage]) for item in plan.items]
     points = tuple(judged(where, before, after, plan.aim, predicted))
     return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations)

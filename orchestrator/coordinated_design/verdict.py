@@ -55,7 +55,7 @@ class JudgedPoint:
     worth
         Least damping and breach with the controllers; None where nothing is known.
     predicted
-        Least damping ratio from the search's linear models.
+        The same worth from the search's linear models; None where they were not asked.
     unnamed
         Whether a name that is asked for is borne by no mode here, so that all electromechanical ones count.
     """
@@ -68,7 +68,7 @@ class JudgedPoint:
     target: PlacedMode | None = None
     other: PlacedMode | None = None
     worth: Worth | None = None
-    predicted: float | None = None
+    predicted: Worth | None = None
     unnamed: bool = False
 
     @property
@@ -111,7 +111,12 @@ class JudgedPoint:
         """By how much the search's models were wrong on the least damping ratio."""
         if self.predicted is None or self.worth is None:
             return 0.0
-        return abs(self.predicted - self.worth.worst)
+        return abs(self.predicted.worst - self.worth.worst)
+
+    @property
+    def unforeseen(self) -> bool:
+        """Whether a mode grows or falls below its floor, and the search's models did not show it."""
+        return bool(self.worth and self.predicted and not self.worth.allowed and self.predicted.allowed)
 
 
 def judged(
@@ -119,7 +124,7 @@ def judged(
     before: Sequence[PointModes],
     after: Sequence[PointModes],
     aim: Aim,
-    predicted: Mapping[int, float],
+    predicted: Mapping[int, Worth],
 ) -> Iterator[JudgedPoint]:
     """Every point with what became of it.
 
@@ -139,7 +144,7 @@ def judged(
 
 
 def _judged(
-    where: tuple[OperatingCase, Outage], before: PointModes, after: PointModes, aim: Aim, predicted: float | None
+    where: tuple[OperatingCase, Outage], before: PointModes, after: PointModes, aim: Aim, predicted: Worth | None
 ) -> JudgedPoint:
     if not (before.computed and after.computed):
         return JudgedPoint(*where, before, after, predicted=predicted)
@@ -231,6 +236,11 @@ class PointsVerdict:
     def astray(self) -> list[JudgedPoint]:
         """Points at which the search's models were wrong, the worst first."""
         return sorted((p for p in self.known if p.astray > ASTRAY), key=lambda point: -point.astray)
+
+    @property
+    def unforeseen(self) -> list[JudgedPoint]:
+        """Points with harm that the search's models did not show."""
+        return [point for point in self.known if point.unforeseen]
 
 
 def _damping(mode: PlacedMode | None) -> float:

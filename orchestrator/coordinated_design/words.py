@@ -133,8 +133,14 @@ def remarks(verdict: PointsVerdict) -> list[str]:
         assert worst.worth is not None
         texts.append(
             f"the search was led astray: at {len(verdict.astray)} of {total} its linear models were wrong, most at "
-            f"{worst.where}, where they expected {100 * worst.predicted:.2f} % and "
+            f"{worst.where}, where they expected {100 * worst.predicted.worst:.2f} % and "
             f"{100 * worst.worth.worst:.2f} % came out"
+        )
+    if verdict.unforeseen:
+        place = verdict.unforeseen[0].where
+        texts.append(
+            f"the search was led astray: at {len(verdict.unforeseen)} of {total}, first at {place}, its linear models "
+            "showed no harm to other modes, and there is; give a lower upper end of --gain-bounds, or fewer controllers"
         )
     free = [point for point in verdict.known if point.after.zeros > 1]
     if free:

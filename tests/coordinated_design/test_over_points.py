@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
@@ -189,6 +190,45 @@ def test_a_wrong_sign_of_a_loop_is_seen(planned, store, monkeypatch):
         assert one.target.damping_ratio == pytest.approx(one.worth.worst)
         believed = min(damping_ratio(z) for z in near(one.before.loops.eigenvalues(setting), 0.7, 12.0))
         assert abs(believed - one.worth.worst) > 0.01
+
+
+@pytest.mark.parametrize("blind", [True, False])
+def test_harm_that_the_search_did_not_show_is_told(case, tmp_path, store, monkeypatch, blind):
+    """Where the loops' models lack the mode that grows, the least damping alone shows nothing."""
+    measured = point.measure
+    if blind:
+        monkeypatch.setattr(point, "measure", lambda *given: replace(measured(*given), U=0 * measured(*given).U))
+    monkeypatch.setattr(
+        SettingSearch, "best", lambda search: search.tried(search._space.vector([-120.0], [2.0], [1000.0]))
+    )
+    monkeypatch.setattr(study, "_frequency", lambda points: 3.6)
+    path = tmp_path / "long.csv"
+    path.write_text("name,grid.X_L\nlong,0.6\n")
+    request = PointsDesignRequest(("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
+    verdict = design_over_points(plan_points_design(case, request, path), Serial(), store).verdict
+    assert verdict.stable is False
+    assert len(verdict.unforeseen) == blind
+    assert any("its linear models showed no harm to other modes, and there is" in t for t in remarks(verdict)) is blind
+
+
+def test_a_fast_mode_that_a_lead_drives_stays_in_a_reduced_system(monkeypatch):
+    """A mode at 48 Hz that the gain alone moves by 0.1 % grows by the gain with 200 times the lead on top."""
+    slow, fast = 2 * np.pi * 1.2, 2 * np.pi * 48
+    blocks = [np.array([[-0.1 * w, w], [-w, -0.1 * w]]) for w in (slow, fast)]
+    A = scipy.linalg.block_diag(*blocks, np.diag(-np.arange(1.0, 9.0)))
+    U, V = np.zeros((len(A), 1)), np.zeros((1, len(A)))
+    U[:, 0], V[0] = 0.002, 0.002
+    U[2, 0], V[0, 2] = 0.035, 0.035
+    names = tuple(f"x{k}" for k in range(len(A)))
+    setting = {P: PodSetting(400.0, lead_lag_turning(120.0, 8.0, 2))}
+    whole = open_loops.OpenLoops(A, U, V, np.zeros((1, 1)), (P,), names).eigenvalues(setting)
+    assert growth(whole) > 1.0
+    monkeypatch.setattr(open_loops, "REDUCED", 5)
+    reduced = open_loops.OpenLoops.of(A, U, V, (P,), names)
+    assert len(reduced.A) < len(A)
+    assert growth(reduced.eigenvalues(setting)) == pytest.approx(growth(whole), rel=0.05)
+    monkeypatch.setattr(open_loops, "_LEAD", 1.0)
+    assert growth(open_loops.OpenLoops.of(A, U, V, (P,), names).eigenvalues(setting)) == 0.0
 
 
 def test_points_without_modes_leave_the_verdict_not_known(planned, store, monkeypatch):
