@@ -6,8 +6,9 @@ from orchestrator.coupling.master import Master
 _SHOWN = 3
 
 
-def standing_apart(master: Master, model: LinearModel) -> list[str]:
-    """A sentence on states that nothing moves and that move nothing; none where there are no such states.
+def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
+    """A sentence on states that nothing moves and that move nothing, where their zeros would not pass for the free
+    angle.
 
     Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
     like that, so that whoever believes it on must be told. A state in seconds is a clock.
@@ -18,7 +19,11 @@ def standing_apart(master: Master, model: LinearModel) -> list[str]:
         Has the components whose states these are.
     model
         Step map or continuous model.
+    zeros
+        How many eigenvalues of zero are counted beside theirs.
     """
+    if zeros + len(model.apart) <= 1:
+        return []
     names = [name for name in model.apart if _unit(master, name) != "s"]
     if not names:
         return []

@@ -79,7 +79,7 @@ def examine(
             f"sampled controllers repeat after {model.period} communication steps "
             f"({model.period * master.clock.step_size:g} s): the modes are those of the map over this period"
         )
-        apart = standing_apart(master, model)
+        apart = standing_apart(master, model, stability.zeros)
         return Examination(stability, (told, *verdict_warnings(stability), *apart, *warnings_of(master)))
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     shown = modes if shown is None else shown
@@ -87,7 +87,7 @@ def examine(
     links = blocks.links.values()
     long = too_long(links, frequency_range[1], model.step_size)
     wires = (
-        *standing_apart(master, model),
+        *standing_apart(master, model, stability.zeros),
         *warnings_of(master),
         *long,
         *doubtful_delays(links, eigenvalues, model.step_size),

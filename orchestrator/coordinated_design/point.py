@@ -4,7 +4,7 @@ Everything here can be sent to another process or another machine.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -225,9 +225,9 @@ def _at(
     if doubtful:
         text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
         warnings = (*warnings, text)
-    warnings = (*warnings, *standing_apart(master, model))
     loops = measure(master, model, known, places) if places else None
-    return _modes(case, model, loops, warnings, doubtful=bool(doubtful))
+    found = _modes(case, model, loops, warnings, doubtful=bool(doubtful))
+    return replace(found, warnings=(*warnings, *standing_apart(master, model, found.zeros)))
 
 
 def _modes(

@@ -185,9 +185,9 @@ class _Worker:
         doubtful = [f"{n}: {', '.join(c.doubtful[:3])}" for n, c in whole.items() if c.doubtful]
         if doubtful:
             warnings = (*warnings, f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:3])}")
-        warnings = (*warnings, *standing_apart(master, model))
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(model, own, wanted, None if neighbour is None else neighbour.modes, count=count)
+        warnings = (*warnings, *standing_apart(master, model, found.zeros))
         residues = _residues(found.modes, whole)
         record = self._item_record(found, residues, point.residual, warnings, certain=not doubtful)
         return _Result(record, found)

@@ -43,6 +43,7 @@ def test_an_integrator_that_is_off_is_told_beside_the_verdict(without_units):
 
 def test_screenings_and_designs_tell_it_at_their_points(monkeypatch, tmp_path):
     monkeypatch.setattr(LinearModel, "apart", property(lambda self: ("gfor.off.x",)))
+    monkeypatch.setattr(LinearModel, "clocks", 0)  # its zero is not there
     case, store = load_case("two_area"), PointStore(tmp_path / "points")
     (tmp_path / "points.csv").write_text("name\nonly\n")
     (item,) = run_screening(plan_screening(case, tmp_path / "points.csv", None, "gfor"), Serial(), store).items
@@ -54,8 +55,14 @@ def test_screenings_and_designs_tell_it_at_their_points(monkeypatch, tmp_path):
 
 def test_many_are_counted_and_not_listed():
     model = LinearModel.from_matrix(np.zeros((5, 5)), tuple(f"c{k}.x" for k in range(5)), None)
-    (text,) = apart.standing_apart(SimpleNamespace(components={}), model)
+    (text,) = apart.standing_apart(SimpleNamespace(components={}), model, 0)
     assert "c0.x, c1.x, c2.x and 2 more; their" in text
+
+
+@pytest.mark.parametrize(("zeros", "told"), [(0, 0), (1, 1)])
+def test_one_that_could_be_the_free_angle_is_not_told(zeros, told):
+    model = LinearModel.from_matrix(np.diag([0.0, -1.0]), ("c.x", "c.y"), None)
+    assert len(apart.standing_apart(SimpleNamespace(components={}), model, zeros)) == told
 
 
 def test_a_design_over_points_counts_no_clock_among_the_zeros():
