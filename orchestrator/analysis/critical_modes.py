@@ -10,9 +10,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy.linalg
+import scipy.optimize
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
+from orchestrator.analysis.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
@@ -33,6 +36,10 @@ DENSE = 200
 _STRETCH = 1.35
 """The range is first cut into stretches whose ends have this ratio: the region is a wedge, so discs grow upwards."""
 
+_SHORT_STRETCH = 1.15
+"""The same where a model has a hub: a factorisation is worth few vectors there, and short stretches keep the crowd of
+better damped modes out of the discs."""
+
 _AT_A_TIME = (20, 80)
 """Numbers of eigenvalues to find around one point: the first number, and the largest one if the first does not reach
 far enough. Many equal units have many equal local modes, and a small number would find only these."""
@@ -44,6 +51,14 @@ equations (299 buses, 0.1 to 2 Hz)."""
 _TOLERANCE = 1e-9
 """Of Arnoldi's method, relative. The last digits of eigenvalues at the rim, which crowd, cost most of its equations;
 eigenvalues inside have settled far beyond it by then."""
+
+_SAME = 1e-5
+"""Eigenvalues of the equations and of their adjoint are one where they differ by less than this part of their distance
+from σ."""
+
+_FAR, _CIRCLE = 10.0, np.exp(2j * np.pi * np.arange(8) / 8)
+"""An eigenvalue that has not settled may be farther from where it seems to be than its equations leave over by this
+factor, as none of the matrices is normal; and directions in which it may be."""
 
 _SMALLEST = 1e-4
 """Smallest size of a cell of the region, relative to its distance from 0."""
@@ -157,7 +172,8 @@ class _Cell:
 def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[Mode] = []
-    edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()
+    stretch = _SHORT_STRETCH if model.is_searched_in_blocks else _STRETCH
+    edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))).tolist()
     waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
     while waiting:
         cell = waiting.pop()
@@ -166,7 +182,7 @@ def _search(model: LinearModel, lowest: float, highest: float, damping: float) -
                 f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
             )
         search = Search(model, cell.centre)
-        values = search.reaching(cell.radius)
+        values = search.reaching(cell.radius, cell.holds)
         if values is None:
             waiting += cell.halves()
         else:
@@ -193,16 +209,31 @@ class Search:
         self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
         self.reach = 0.0
         self._right = np.zeros((len(model.names), 0), dtype=complex)
+        self._blocks: BlockArnoldi | None = None
 
     def nearest(self, count: int) -> NDArray[np.complex128]:
         """The nearest eigenvalues λ."""
+        self._blocks = None
         nu, self._right = self._arnoldi(self._solver.solve, count)
         self._values = self._to_lambda(nu)
         self.reach = float(1 / np.abs(nu).min())
         return self._values
 
-    def reaching(self, radius: float) -> NDArray[np.complex128] | None:
-        """All eigenvalues nearer than ``radius``; None if there are too many."""
+    def reaching(
+        self, radius: float, wanted: Callable[[complex], bool] = lambda _: True
+    ) -> NDArray[np.complex128] | None:
+        """All eigenvalues nearer than ``radius``; None if there are too many. Those that are not wanted may be rough.
+
+        Parameters
+        ----------
+        radius
+            Distance from ``centre`` [rad/s].
+        wanted
+            Whether an eigenvalue λ is looked for.
+        """
+        if self._solver.takes_many:
+            self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
+            return self._reaching_in_blocks(self._blocks, radius, wanted)
         count, most = _AT_A_TIME
         while count <= most:
             values = self.nearest(count)
@@ -219,6 +250,8 @@ class Search:
         """Eigenvalue, left and right eigenvector of some of the eigenvalues of the last search."""
         if not chosen:
             return []
+        if self._blocks is not None:
+            return self._pairs_of_blocks(self._blocks, list(chosen))
         nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
         partners = self._to_lambda(nu.conj())
         return [
@@ -226,8 +259,56 @@ class Search:
             for k in chosen
         ]
 
+    def _reaching_in_blocks(
+        self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
+    ) -> NDArray[np.complex128] | None:
+        self.reach = self._farthest(radius)
+
+        def may_be_wanted(place: int) -> bool:
+            (value,) = self._to_lambda(blocks.values[place : place + 1])
+            around = value + _FAR * blocks.accuracy[place] * abs(value - self.centre) * _CIRCLE
+            return wanted(complex(value)) or any(map(wanted, around.tolist()))
+
+        if not _grow(blocks, lambda found: found.knows_all_beyond(1 / self.reach, may_be_wanted)):
+            return None
+        count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
+        self._values = self._to_lambda(blocks.values[:count])
+        return self._values if blocks.is_complete(count) else None
+
+    def _pairs_of_blocks(self, blocks: BlockArnoldi, chosen: list[int]) -> list[tuple[complex, Vector, Vector]]:
+        """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
+        wanted = blocks.values[chosen]
+        adjoint = BlockArnoldi(self._solver.solve_adjoint, len(self._model.names), 2 * MOST)
+        if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
+            raise self._not_converging
+        with one_thread():
+            left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
+            moved = self._solver.solve(right)
+            nu, of_left, of_right = scipy.linalg.eig(left.conj().T @ moved, left.conj().T @ right, left=True)
+            left, right, moved = left @ of_left, right @ of_right, moved @ of_right
+        order = scipy.optimize.linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
+        rest = np.linalg.norm(moved - right * nu, axis=0) / (np.abs(nu) * np.linalg.norm(right, axis=0))
+        moves = np.abs(nu[order] - wanted) / np.abs(wanted)
+        if not (np.concatenate([rest, moves]) <= _SAME).all():  # nor is it where one is not a number
+            raise self._not_converging
+        values = self._to_lambda(nu)
+        return [(complex(values[k]), left[:, k], right[:, k]) for k in order.tolist()]
+
+    def _farthest(self, radius: float) -> float:
+        """Distance from ``sigma`` of the farthest point of the circle around ``centre``."""
+        if not self._model.step_size:
+            return radius
+        circle = self.centre + radius * np.exp(1j * np.linspace(0, 2 * np.pi, 65))
+        return float(np.abs(np.exp(circle * self._model.step_size) - self.sigma).max())
+
     def _to_lambda(self, nu: NDArray[np.complex128]) -> NDArray[np.complex128]:
         return to_continuous(self.sigma + 1 / nu, self._model.step_size)[0]
+
+    @property
+    def _not_converging(self) -> AnalysisError:
+        return AnalysisError(
+            f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
+        )
 
     def _arnoldi(self, solve: Callable[[Vector], Vector], count: int) -> tuple[Vector, Vector]:
         n = len(self._model.names)
@@ -238,7 +319,24 @@ class Search:
                 nu, vectors = spla.eigs(inverse, k=count, ncv=min(n, max(_KEPT, 2 * count + 10)), v0=start,
                                       tol=_TOLERANCE)  # fmt: skip
         except spla.ArpackNoConvergence as error:
-            raise AnalysisError(
-                f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
-            ) from error
+            raise self._not_converging from error
         return nu, vectors
+
+
+def _grow(blocks: BlockArnoldi, enough: Callable[[BlockArnoldi], bool]) -> bool:
+    """Take vectors until there are enough; whether they suffice before there are too many."""
+    with one_thread():
+        while not enough(blocks):
+            if not blocks.grow():
+                return False
+    return True
+
+
+def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int] | None:
+    """Places of the settled values of the adjoint equations that are those wanted, one for each; None if one lacks."""
+    settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
+    if len(settled) < len(wanted):
+        return None
+    apart = np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(apart, 1.0))
+    return settled[columns].tolist() if bool((apart[rows, columns] <= _SAME).all()) else None

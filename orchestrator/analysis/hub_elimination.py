@@ -73,14 +73,14 @@ class HubEquations:
         return entered, R[:, entered].toarray()
 
     def taken_in(self, x: Vector) -> Vector:
-        """R·x, for x of shape (k,), complex or not."""
+        """R·x, for x of shape (k,) or (k, c), complex or not."""
         entered, dense = self.into_hub
         return _times(dense, x[entered])
 
     def given_out(self, y: Vector) -> Vector:
-        """Rᵀ·y, for y of shape (h,), complex or not."""
+        """Rᵀ·y, for y of shape (h,) or (h, c), complex or not."""
         entered, dense = self.into_hub
-        whole = np.zeros(len(self.rest), dtype=y.dtype)
+        whole = np.zeros((len(self.rest), *y.shape[1:]), dtype=y.dtype)
         whole[entered] = _times(dense.T, y)
         return whole
 
@@ -165,14 +165,13 @@ class HubFactors:
     port: tuple[Matrix, Places]
 
     def solve(self, right: Vector) -> Vector:
-        """X with (A − σI)·x = right, shape (n,)."""
+        """X with (A − σI)·x = right, shape (n,) or (n, c)."""
         return self._whole(right)[: self.equations.states]
 
     def solve_adjoint(self, right: Vector) -> Vector:
-        """X with (A − σI)ᴴ·x = right, shape (n,)."""
+        """X with (A − σI)ᴴ·x = right, shape (n,) or (n, c)."""
         e = self.equations
-        b = np.zeros(e.whole.shape[0], dtype=self.port[0].dtype)
-        b[: e.states] = right
+        b = self._right(right)
         beside = (self.inside.T @ b[e.rest].conj()).conj()
         y = scipy.linalg.lu_solve(self.port, b[e.hub] - beside, trans=2, check_finite=False)
         b[e.rest], b[e.hub] = self.blocks.solve(b[e.rest] - e.given_out(y), "H"), y
@@ -189,20 +188,25 @@ class HubFactors:
 
     def _whole(self, right: Vector) -> Vector:
         e = self.equations
-        b = np.zeros(e.whole.shape[0], dtype=self.port[0].dtype)
-        b[: e.states] = right
+        b = self._right(right)
         x = self.blocks.solve(b[e.rest])
         y = scipy.linalg.lu_solve(self.port, b[e.hub] - e.taken_in(x), check_finite=False)
         b[e.rest], b[e.hub] = x - self.inside @ y, y
         return b
 
+    def _right(self, right: Vector) -> Vector:
+        b = np.zeros((self.equations.whole.shape[0], *right.shape[1:]), dtype=self.port[0].dtype)
+        b[: self.equations.states] = right
+        return b
+
 
 def _times(real: Matrix, vector: Vector) -> Vector:
-    """A real matrix times a vector, whose real and imaginary parts are taken together, without a complex copy."""
+    """A real matrix times vectors, whose real and imaginary parts are taken together, without a complex copy."""
     if not np.iscomplexobj(vector):
         return np.asarray(real @ vector)
-    product = real @ np.ascontiguousarray(vector).view(float).reshape(-1, 2)
-    return np.ascontiguousarray(product).view(complex)[:, 0]
+    columns = vector.reshape(len(vector), vector.shape[1] if vector.ndim == 2 else 1)
+    product = real @ np.ascontiguousarray(columns).view(float)
+    return np.ascontiguousarray(product).view(complex).reshape(len(real), *vector.shape[1:])
 
 
 def hub_equations(F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array) -> HubEquations | None:

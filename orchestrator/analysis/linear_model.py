@@ -22,6 +22,9 @@ HELD = " (held)"
 DELAYED = " (delayed"
 """In the name of a state that stands for what is on its way over a connection."""
 
+LEAST_IN_BLOCKS = 4_000
+"""Models with fewer states are searched with one vector at a time, and keep the last digits of their modes."""
+
 PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
 """Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model
 in the FMU's file, or a model fitted to measurements at its inputs and outputs."""
@@ -29,10 +32,17 @@ in the FMU's file, or a model fitted to measurements at its inputs and outputs."
 
 @dataclass(frozen=True)
 class ShiftedSolver:
-    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
+    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``.
+
+    Attributes
+    ----------
+    takes_many
+        Whether both take many vectors as columns, and take hardly longer for them than for one.
+    """
 
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
+    takes_many: bool = False
 
 
 @dataclass(frozen=True)
@@ -143,6 +153,13 @@ class LinearModel:
         return hub_equations(self.F, self.G, self.H, self.K)
 
     @property
+    def is_searched_in_blocks(self) -> bool:
+        """Whether a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
+        all of them.
+        """
+        return len(self.names) >= LEAST_IN_BLOCKS and self._hub is not None
+
+    @property
     def number_of_states(self) -> int:
         """States of the components, without what the exchange remembers."""
         return sum(not (name.endswith(HELD) or DELAYED in name) for name in self.names)
@@ -151,7 +168,9 @@ class LinearModel:
         """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""
         factors_of_hub = self._hub.at(sigma) if self._hub else None
         if factors_of_hub:
-            return ShiftedSolver(factors_of_hub.solve, factors_of_hub.solve_adjoint)
+            return ShiftedSolver(
+                factors_of_hub.solve, factors_of_hub.solve_adjoint, takes_many=self.is_searched_in_blocks
+            )
         n, m = self.G.shape
         identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
         whole = sp.block_array([[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc")

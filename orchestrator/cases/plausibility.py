@@ -155,8 +155,8 @@ def _frequency_place(draft: Draft, name: str) -> str:
 def _coupled(draft: Draft) -> list[set[str]]:
     """Components that are connected, directly or through others."""
     groups = [{name} for name in draft.system.components]
-    for connection in draft.system.connections:
-        ends = {connection.source.component, connection.target.component}
+    wires = (frozenset((c.source.component, c.target.component)) for c in reversed(draft.system.connections))
+    for ends in reversed(dict.fromkeys(wires)):  # the last wire between two decides where their group stands
         touched = [group for group in groups if group & ends]
         groups = [group for group in groups if not group & ends] + [set().union(*touched)]
     return groups

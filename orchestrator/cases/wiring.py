@@ -16,8 +16,19 @@ def connect(draft: Draft) -> None:
             _try_connect(draft, wire.source, wire.target, draft.place("connections", index))
     at_buses = [n for n, table in draft.tables.items() if table.bus is not None and n in draft.system.components]
     _check_forms(draft, at_buses)
+    taken = _taken_by_port(draft)
     for name in at_buses:
-        _connect_to_bus(draft, name, draft.tables[name].bus or "")
+        _connect_to_bus(draft, name, draft.tables[name].bus or "", taken.get(name, []))
+
+
+def _taken_by_port(draft: Draft) -> dict[str, list[str]]:
+    """Variables that the grid takes from each device: its current, or an emf with its admittance."""
+    found: dict[str, list[str]] = {}
+    if draft.grid in draft.system.components:
+        for taken in draft.system.components[draft.grid].description.inputs:
+            port, _, variable = taken.rpartition(".")
+            found.setdefault(port, []).append(variable)
+    return found
 
 
 def _check_forms(draft: Draft, names: list[str]) -> None:
@@ -92,7 +103,7 @@ def check_inputs(draft: Draft) -> None:
         )
 
 
-def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
+def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None:
     where = draft.place("components", name, "bus")
     if draft.network_failed:
         return
@@ -102,24 +113,20 @@ def _connect_to_bus(draft: Draft, name: str, bus: str) -> None:
             "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
         )
         return
-    ports = {port.name: port.bus for port in draft.network.ports}
-    if ports.get(name) != bus:
-        known = ", ".join(f"{p} at {b}" for p, b in ports.items())
+    if not any(port.name == name and port.bus == bus for port in draft.network.ports):
+        known = ", ".join(f"{port.name} at {port.bus}" for port in draft.network.ports)
         draft.note(where, f"the network has no port {name!r} at bus {bus!r}; it has: {known}")
         return
     if draft.grid in draft.system.components:
         for part in ("re", "im"):
             _try_connect(draft, f"{draft.grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
-        # The grid's inputs decide which outputs of a device are connected: its current, or an emf with its admittance.
-        for taken in draft.system.components[draft.grid].description.inputs:
-            port, _, variable = taken.rpartition(".")
-            if port == name and name not in draft.misfits:
-                _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{taken}", where)
+        for variable in taken if name not in draft.misfits else ():
+            _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{name}.{variable}", where)
 
 
 def _try_connect(draft: Draft, source: str, target: str, where: str) -> None:
-    known = draft.known - set(draft.system.components)
-    if {source.partition(".")[0], target.partition(".")[0]} & known:
+    ends = source.partition(".")[0], target.partition(".")[0]
+    if any(end in draft.known and end not in draft.system.components for end in ends):
         return  # the problem of this end is noted already
     try:
         draft.system.connect(source, target)

@@ -70,6 +70,8 @@ class System:
         self.components: dict[str, ComponentPlan] = {}
         self.connections: list[Connection] = []
         self.wires: dict[Endpoint, WirePlan] = {}
+        self._counted: list[Connection] | None = None
+        self._feeding: dict[Endpoint, Endpoint] = {}
 
     def add(
         self,
@@ -125,10 +127,18 @@ class System:
             )
         if out.unit and into.unit and out.unit != into.unit:
             raise InputError(f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal")
-        feeding = next((c.source for c in self.connections if c.target == end), None)
+        feeding = self._sources().get(end)
         if feeding is not None:
             raise InputError(f"{label}: {target} is already fed by {feeding}; an input takes one connection")
         self.connections.append(Connection(start, end))
+        self._feeding[end] = start
+
+    def _sources(self) -> dict[Endpoint, Endpoint]:
+        """What feeds each connected input; collected anew where the list of connections was changed from outside."""
+        if self._counted is not self.connections or len(self._feeding) != len(self.connections):
+            self._counted = self.connections
+            self._feeding = {c.target: c.source for c in reversed(self.connections)}
+        return self._feeding
 
     def disturb(self, connection: Connection, imperfection: Imperfection) -> None:
         """Let a connection have an imperfection from t = 0 on.
