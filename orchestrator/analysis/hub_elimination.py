@@ -119,11 +119,11 @@ class HubEquations:
             blocks = spla.splu((P - sigma * at_rest).tocsc())
         except RuntimeError:
             return None
-        schur = T.astype(np.result_type(T, sigma))
+        schur = T.astype(np.result_type(T, sigma), order="F")  # as LAPACK takes it
         among = np.flatnonzero(self.hub < self.states)
         schur[among, among] -= sigma
         inside = self._through_blocks(blocks, Q, schur.dtype)
-        schur -= (R @ inside).toarray()
+        schur -= (R @ inside).toarray(order="F")
         port = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
         factors = HubFactors(self, sigma, blocks, inside, port)
         trial = np.random.default_rng(1).standard_normal(self.states).astype(schur.dtype)

@@ -129,6 +129,16 @@ def test_a_disc_is_known_only_where_all_that_matters_has_settled(values, accurac
     assert blocks_with(values, accuracy).knows_all_beyond(1.0, lambda place: place == 0) is known
 
 
+@pytest.mark.parametrize(("real", "known"), [(-0.51, False), (-0.6, True)])
+def test_a_rough_value_beside_the_region_may_lie_in_it(real, known, in_blocks, monkeypatch):
+    monkeypatch.setattr(BlockArnoldi, "grow", lambda self: False)
+    search = Search(model(complex(-0.2, 5.0)), 5j)
+    beside = [1 / (complex(real, 5.0) - 5j), *(1 / (-9.0 - k) for k in range(8))]
+    blocks = blocks_with(beside, [5e-3, *[1e-3] * 8])
+    found = search._reaching_in_blocks(blocks, 1.0, lambda value: value.real > -0.5)
+    assert (found is not None) is known
+
+
 def test_an_adjoint_that_is_another_systems_is_noticed(in_blocks, monkeypatch):
     mode = complex(-0.2, 5.0)
     other, search = Search(model(mode * 1.01), 5.1j), Search(model(mode), 5.1j)

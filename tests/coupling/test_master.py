@@ -387,6 +387,18 @@ def test_a_connection_that_cannot_be_made_names_both_ends_and_why(source, target
     assert len(system.connections) == 1
 
 
+def test_connections_that_were_put_into_the_list_itself_feed_their_inputs_too():
+    components = {"a": ("integrator",), "b": ("integrator",), "k": ("gain",)}
+    system, other = system_of([("k.y", "b.u")], **components), system_of([("k.y", "b.u"), ("b.y", "a.u")], **components)
+    system.connections.append(other.connections[1])
+    with pytest.raises(InputError, match="a.u is already fed by b.y"):
+        system.connect("k.y", "a.u")
+    system.connections = [other.connections[1], other.connections[1]]  # another list of the same length
+    system.connect("k.y", "b.u")
+    with pytest.raises(InputError, match="b.u is already fed by k.y"):
+        system.connect("a.y", "b.u")
+
+
 def test_a_name_is_taken_once():
     with pytest.raises(InputError, match="component 'a' is added twice"):
         system_of(a=("gain",)).add("a", small_fmu("lag"))
