@@ -391,11 +391,11 @@ def test_connections_that_were_put_into_the_list_itself_feed_their_inputs_too():
     components = {"a": ("integrator",), "b": ("integrator",), "k": ("gain",)}
     system, other = system_of([("k.y", "b.u")], **components), system_of([("k.y", "b.u"), ("b.y", "a.u")], **components)
     system.connections.append(other.connections[1])
-    with pytest.raises(InputError, match="a.u is already fed by b.y"):
+    with pytest.raises(InputError, match=r"a\.u is already fed by b\.y"):
         system.connect("k.y", "a.u")
     system.connections = [other.connections[1], other.connections[1]]  # another list of the same length
     system.connect("k.y", "b.u")
-    with pytest.raises(InputError, match="b.u is already fed by k.y"):
+    with pytest.raises(InputError, match=r"b\.u is already fed by k\.y"):
         system.connect("a.y", "b.u")
 
 
