@@ -181,7 +181,7 @@ class HubFactors:
         """What a solution leaves over of a right side, shape (n,), as a part of its largest element."""
         e = self.equations
         found = self._whole(right)
-        rest = e.whole @ found
+        rest = _times(e.whole, found)
         rest[: e.states] -= self.sigma * found[: e.states] + right
         left = float(np.abs(rest).max() / np.abs(right).max())
         return left if np.isfinite(left) else np.inf
@@ -200,13 +200,13 @@ class HubFactors:
         return b
 
 
-def _times(real: Matrix, vector: Vector) -> Vector:
+def _times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
     """A real matrix times vectors, whose real and imaginary parts are taken together, without a complex copy."""
     if not np.iscomplexobj(vector):
         return np.asarray(real @ vector)
     columns = vector.reshape(len(vector), vector.shape[1] if vector.ndim == 2 else 1)
     product = real @ np.ascontiguousarray(columns).view(float)
-    return np.ascontiguousarray(product).view(complex).reshape(len(real), *vector.shape[1:])
+    return np.ascontiguousarray(product).view(complex).reshape(real.shape[0], *vector.shape[1:])
 
 
 def hub_equations(F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array) -> HubEquations | None:
