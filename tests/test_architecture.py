@@ -160,6 +160,8 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return b == "fmus.toolchain.compiler"
         if a in ("orchestrator.fmi.vendor_files", "orchestrator.fmi.dll_reading"):
             return within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive") or b == "fmus"
+        if a == "orchestrator.fmi.wine_program":
+            return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
         if a in ("orchestrator.fmi.instance", "orchestrator.ssp.archive"):
             return b == "fmus.toolchain.cache"  # what was built or unpacked here, and is intact, is trusted
         return within(a, *importers) and not within(b, "gfor_fmu")

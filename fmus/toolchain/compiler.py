@@ -156,12 +156,14 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     target
         One of those of a platform in `TARGETS`.
     ending
-        Of the library's file, such as ``.so``.
+        Of the library's file, such as ``.so``; ``.exe`` makes a program.
     libraries
         Of the system, that the source needs beside the C library and its mathematics, such as ``dl``.
     """
     require("compiling C", "ziglang")
-    flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else FLAGS
+    flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]
+    if ending == ".exe":
+        flags.remove("-shared")
     key = hashlib.sha256("\0".join([source, target, *recipe(), *libraries]).encode()).hexdigest()[:32]
     library = cache_directory("libraries") / f"{key}{ending}"
     if intact(library):

@@ -70,7 +70,7 @@ READER = "fmus.vendor_dll.reading"
 """Module whose process reads a DLL."""
 
 
-def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
+def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -> VendorDll:
     """Read a DLL in a process of its own, and try how it keeps its state.
 
     Parameters
@@ -79,6 +79,8 @@ def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
         The vendor's file.
     reader
         Module that is run for it; one that closes its process off first.
+    also
+        Platforms beside this machine's own whose libraries the reader can load.
 
     Raises
     ------
@@ -86,7 +88,7 @@ def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
         If it is no such DLL, is not for this machine, or declares what no host can run.
     """
     path = Path(path).absolute()
-    platform = _platform_of(path)
+    platform = platform_of(path, also)
     answer, end = _ask(path, reader, "--try")
     if end and not answer:
         answer, again = _ask(path, reader)
@@ -104,7 +106,21 @@ def read_dll(path: Path | str, reader: str = READER) -> VendorDll:
     return VendorDll(path, interface, Trial.from_json(answer["trial"]), platform)
 
 
-def _platform_of(path: Path) -> str:
+def platform_of(path: Path, also: Sequence[str] = ()) -> str:
+    """FMI 2.0 name of the platform that a library is for.
+
+    Parameters
+    ----------
+    path
+        Its file.
+    also
+        Platforms that are taken beside this machine's own.
+
+    Raises
+    ------
+    DllError
+        If it is no library, or for a platform that is not taken.
+    """
     try:
         with path.open("rb") as file:
             head = file.read(8)
@@ -113,7 +129,12 @@ def _platform_of(path: Path) -> str:
     here = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}.get(sys.platform)
     for mark, platform, words in _FORMATS:
         if head.startswith(mark):
-            if platform != here:
+            if platform == "win64" and _is_32_bit(path):
+                raise DllError(
+                    f"{path.name}: it is a Windows DLL of 32 bits, and those of 64 bits can be run; ask its author for "
+                    "such a build"
+                )
+            if platform != here and platform not in also:
                 raise DllError(
                     f"{path.name}: it is {words}, and this machine runs {here}; ask its author for such a build, or "
                     "build the FMU on a machine of its kind"
@@ -123,6 +144,14 @@ def _platform_of(path: Path) -> str:
     raise DllError(
         f"{path.name}: it is no shared library (it begins with {head[:4]!r}); give the vendor's .dll or .so file"
     )
+
+
+def _is_32_bit(path: Path) -> bool:
+    """Whether a Windows DLL is not for 64-bit x86, by the machine in its head."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    at = int.from_bytes(head[60:64], "little")
+    return head[at : at + 4] == b"PE\0\0" and head[at + 4 : at + 6] == b"\x4c\x01"
 
 
 def _ask(path: Path, reader: str, *more: str) -> tuple[dict[str, Any], str]:

@@ -6,10 +6,12 @@
 import ctypes as c
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from fmus.vendor_dll.interface import CALLS, DATA_TYPES, DllInterface, DllParameter, Number, Signal
+from fmus.vendor_dll.memory import Library, LocalLibrary
 from fmus.vendor_dll.state_trial import Trial, tried
 
 _TEXTS = (
@@ -20,11 +22,15 @@ _MOST = 100_000
 """More signals or parameters than this are taken for a structure of another layout."""
 
 
+_Text = Callable[[int | None], str]
+_Row = TypeVar("_Row", bound=c.Structure)
+
+
 class _Value(c.Union):
     """A default, or a bound."""
 
     _fields_ = (
-        *(("char", c.c_int8), ("c_string", c.c_char_p), ("int8", c.c_int8), ("uint8", c.c_uint8)),
+        *(("char", c.c_int8), ("c_string", c.c_void_p), ("int8", c.c_int8), ("uint8", c.c_uint8)),
         *(("int16", c.c_int16), ("uint16", c.c_uint16), ("int32", c.c_int32), ("uint32", c.c_uint32)),
         *(("real32", c.c_float), ("real64", c.c_double)),
     )
@@ -32,7 +38,7 @@ class _Value(c.Union):
 
 class _Signal(c.Structure):
     _fields_ = (
-        *((name, c.c_char_p) for name in ("name", "description", "unit")),
+        *((name, c.c_void_p) for name in ("name", "description", "unit")),
         ("data_type", c.c_int),
         ("width", c.c_int32),
     )
@@ -40,7 +46,7 @@ class _Signal(c.Structure):
 
 class _Parameter(c.Structure):
     _fields_ = (
-        *((name, c.c_char_p) for name in ("name", "group", "description", "unit")),
+        *((name, c.c_void_p) for name in ("name", "group", "description", "unit")),
         ("data_type", c.c_int),
         ("fixed", c.c_int32),
         *((name, _Value) for name in ("default", "minimum", "maximum")),
@@ -50,17 +56,17 @@ class _Parameter(c.Structure):
 class _ModelInfo(c.Structure):
     _fields_ = (
         ("interface_version", c.c_uint8 * 4),
-        *((name, c.c_char_p) for name in _TEXTS),
+        *((name, c.c_void_p) for name in _TEXTS),
         ("sample_time", c.c_double),
         ("mode", c.c_uint8),
-        *(("n_inputs", c.c_int32), ("inputs", c.POINTER(_Signal))),
-        *(("n_outputs", c.c_int32), ("outputs", c.POINTER(_Signal))),
-        *(("n_parameters", c.c_int32), ("parameters", c.POINTER(_Parameter))),
+        *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
+        *(("n_outputs", c.c_int32), ("outputs", c.c_void_p)),
+        *(("n_parameters", c.c_int32), ("parameters", c.c_void_p)),
         *((name, c.c_int32) for name in ("int_states", "float_states", "double_states")),
     )
 
 
-def read_interface(library: c.CDLL) -> DllInterface:
+def read_interface(library: Library) -> DllInterface:
     """What a loaded DLL declares.
 
     Raises
@@ -68,79 +74,79 @@ def read_interface(library: c.CDLL) -> DllInterface:
     ValueError
         If it declares nothing, or numbers that no DLL has.
     """
-    try:
-        get_info = library.Model_GetInfo
-    except AttributeError as error:
-        raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL") from error
-    get_info.restype = c.POINTER(_ModelInfo)
-    found = get_info()
+    if not library.has("Model_GetInfo"):
+        raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL")
+    found = library.call("Model_GetInfo")
     if not found:
         raise ValueError("Model_GetInfo returns no model information")
-    info = found.contents
+
+    def text(address: int | None) -> str:
+        return library.text(address).decode("utf-8", "replace").strip()
+
+    def rows(kind: type[_Row], address: int | None, count: int) -> list[_Row]:
+        size = c.sizeof(kind)
+        return [kind.from_buffer_copy(library.read((address or 0) + k * size, size)) for k in range(count)]
+
+    info = _ModelInfo.from_buffer_copy(library.read(found, c.sizeof(_ModelInfo)))
     for name in ("n_inputs", "n_outputs", "n_parameters"):
         if not 0 <= getattr(info, name) <= _MOST:
             raise ValueError(
                 f"Model_GetInfo tells {getattr(info, name)} {name[2:]}; its structure is of another layout"
             )
     return DllInterface(
-        texts={name: _text(getattr(info, name)) for name in _TEXTS},
+        texts={name: text(getattr(info, name)) for name in _TEXTS},
         interface_version=tuple(info.interface_version),
         sample_time=info.sample_time,
         mode=info.mode,
-        inputs=tuple(_signal(info.inputs[k]) for k in range(info.n_inputs)),
-        outputs=tuple(_signal(info.outputs[k]) for k in range(info.n_outputs)),
-        parameters=tuple(_parameter(info.parameters[k]) for k in range(info.n_parameters)),
+        inputs=tuple(_signal(row, text) for row in rows(_Signal, info.inputs, info.n_inputs)),
+        outputs=tuple(_signal(row, text) for row in rows(_Signal, info.outputs, info.n_outputs)),
+        parameters=tuple(_parameter(row, text) for row in rows(_Parameter, info.parameters, info.n_parameters)),
         states=(info.int_states, info.float_states, info.double_states),
-        calls=tuple(name for name in CALLS if hasattr(library, f"Model_{name}")),
+        calls=tuple(name for name in CALLS if library.has(f"Model_{name}")),
     )
 
 
-def _text(value: bytes | None) -> str:
-    return (value or b"").decode("utf-8", "replace").strip()
+def _signal(row: _Signal, text: _Text) -> Signal:
+    return Signal(text(row.name), text(row.description), text(row.unit), row.data_type, row.width)
 
 
-def _signal(row: _Signal) -> Signal:
-    return Signal(_text(row.name), _text(row.description), _text(row.unit), row.data_type, row.width)
-
-
-def _parameter(row: _Parameter) -> DllParameter:
+def _parameter(row: _Parameter, text: _Text) -> DllParameter:
     kind = DATA_TYPES.get(row.data_type)
-    text = kind is None or kind.kind == "String"
+    words = kind is None or kind.kind == "String"
 
     def bound(value: _Value) -> Number | None:
         number: Number = getattr(value, kind.name) if kind else 0
         return number
 
-    bounds = (None, None) if text else (bound(row.minimum), bound(row.maximum))
+    bounds = (None, None) if words else (bound(row.minimum), bound(row.maximum))
     if bounds == (0, 0):  # the author wrote none
         bounds = (None, None)
     return DllParameter(
-        _text(row.name),
-        _text(row.group),
-        _text(row.description),
-        _text(row.unit),
+        text(row.name),
+        text(row.group),
+        text(row.description),
+        text(row.unit),
         row.data_type,
         bool(row.fixed),
-        (_text(row.default.c_string) if kind else "") if text else bound(row.default) or 0,
+        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0,
         *bounds,
     )
 
 
-def read(path: Path, *, with_trial: bool) -> dict[str, Any]:
+def read(library: Library, *, with_trial: bool) -> dict[str, Any]:
     """What a DLL declares, and how it keeps its state where that is tried, as JSON has it."""
-    library = c.CDLL(str(path))
     interface = read_interface(library)
-    trial = tried(library, interface, path) if with_trial and not interface.faults() else Trial("not tried")
+    trial = tried(library, interface) if with_trial and not interface.faults() else Trial("not tried")
     return {"interface": interface.as_json(), "trial": trial.as_json()}
 
 
-def answer_for(path: Path, answer: Path, *, with_trial: bool) -> None:
+def answer_for(load: Callable[[], Library], answer: Path, *, with_trial: bool) -> None:
     """Write what `read` finds into a file, or the error.
 
     Parameters
     ----------
-    path
-        The DLL.
+    load
+        Loads the DLL.
     answer
         The file.
     with_trial
@@ -148,11 +154,11 @@ def answer_for(path: Path, answer: Path, *, with_trial: bool) -> None:
     """
     found: dict[str, Any]
     try:
-        found = read(path, with_trial=with_trial)
+        found = read(load(), with_trial=with_trial)
     except (OSError, ValueError) as error:
         found = {"error": str(error)}
     answer.write_text(json.dumps(found), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    answer_for(Path(sys.argv[1]), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"])
+    answer_for(lambda: LocalLibrary(Path(sys.argv[1])), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"])

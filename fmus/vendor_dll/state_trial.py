@@ -7,13 +7,12 @@ variables of their own as well: the library's writable memory then changes in a 
 import ctypes as c
 import math
 import struct
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 from fmus.vendor_dll.interface import DllInterface, DllParameter, Layout, Signal, layout
+from fmus.vendor_dll.memory import Library, Region
 
 _SAMPLES = 200
 """In each of the runs."""
@@ -23,8 +22,6 @@ _LARGEST = (1.5, 0.6)
 
 _MODEST = (1e-12, 1e12)
 """A word is taken for a number where its magnitude is zero or between these at all times."""
-
-_WRITABLE, _LOADED, _RELOCATED_ONLY = 2, 1, 0x6474E552  # PF_W, PT_LOAD, PT_GNU_RELRO
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ class _Instance(c.Structure):
         *((name, c.c_void_p) for name in ("inputs", "outputs", "parameters")),
         ("time", c.c_double),
         ("mode", c.c_uint8),
-        *((name, c.c_char_p) for name in ("error", "message")),
+        *((name, c.c_void_p) for name in ("error", "message")),
         *((name, c.c_void_p) for name in ("ints", "floats", "doubles")),
     )
 
@@ -75,26 +72,31 @@ class _Instance(c.Structure):
 class _Host:
     """One instance of a DLL, with inputs that move."""
 
-    def __init__(self, library: c.CDLL, interface: DllInterface, largest: float) -> None:
+    def __init__(self, library: Library, interface: DllInterface, largest: float) -> None:
         self._library, self._interface, self._largest = library, interface, largest
         self._layouts = [layout(rows) for rows in (interface.inputs, interface.outputs, interface.parameters)]
-        sizes = [found.size for found in self._layouts] + [
+        self._sizes = [found.size for found in self._layouts] + [
             n * size for n, size in zip(interface.states, (4, 4, 8), strict=True)
         ]
-        self._buffers = [c.create_string_buffer(size + 64) for size in sizes]
-        addresses = [c.addressof(buffer) for buffer in self._buffers]
-        self._instance = _Instance(*addresses[:3], 0.0, 2 if interface.mode == 2 else 1, None, None, *addresses[3:])
-        self._kept: list[c.Array[c.c_char]] = []
+        self._sizes = [size + 64 for size in self._sizes]
+        self._at = [library.allocate(size) for size in self._sizes]
+        at = self._at
+        self._instance = _Instance(*at[:3], 0.0, 2 if interface.mode == 2 else 1, None, None, *at[3:])
+        self._instance_at = library.allocate(c.sizeof(_Instance))
+        self._inputs = bytearray(self._sizes[0])
         self._set_defaults(interface.parameters, self._layouts[2])
 
     def _set_defaults(self, parameters: Sequence[DllParameter], places: Layout) -> None:
+        content = bytearray(self._sizes[2])
         for parameter, place in zip(parameters, places.places, strict=True):
             if isinstance(parameter.default, str):
-                text = c.create_string_buffer(parameter.default.encode())
-                self._kept.append(text)
-                struct.pack_into("P", self._buffers[2], place.offset, c.addressof(text))
+                text = parameter.default.encode() + b"\0"
+                address = self._library.allocate(len(text))
+                self._library.write(address, text)
+                struct.pack_into("P", content, place.offset, address)
             else:
-                _pack(self._buffers[2], place.row, place.offset, parameter.default)
+                _pack(content, place.row, place.offset, parameter.default)
+        self._library.write(self._at[2], bytes(content))
 
     def start(self) -> None:
         for call in ("FirstCall", "CheckParameters", "Initialize"):
@@ -102,8 +104,11 @@ class _Host:
                 self._call(call)
 
     def _call(self, name: str) -> None:
-        if getattr(self._library, f"Model_{name}")(c.byref(self._instance)) == 2:
-            words = (self._instance.error or b"(no message)").decode("utf-8", "replace").strip()
+        library = self._library
+        library.write(self._instance_at, bytes(self._instance))
+        if c.c_int32(library.call(f"Model_{name}", self._instance_at)).value == 2:
+            said = _Instance.from_buffer_copy(library.read(self._instance_at, c.sizeof(_Instance))).error
+            words = (library.text(said) or b"(no message)").decode("utf-8", "replace").strip()
             raise ValueError(f"Model_{name} ends with an error: {words}")
 
     def run(self, first: int) -> bytes:
@@ -113,11 +118,12 @@ class _Host:
         for sample in range(first, first + _SAMPLES):
             for k, place in enumerate(self._layouts[0].places):
                 if place.type.kind != "String":
-                    _pack(self._buffers[0], place.row, place.offset, self._input(sample, k, place.type.kind))
+                    _pack(self._inputs, place.row, place.offset, self._input(sample, k, place.type.kind))
+            self._library.write(self._at[0], bytes(self._inputs))
             self._instance.time = sample * step
             self._call("Outputs")
-            seen += self._buffers[1].raw
-        return seen + b"".join(buffer.raw for buffer in self._buffers[3:])
+            seen += self._library.read(self._at[1], self._sizes[1])
+        return seen + b"".join(self.arrays()[3:])
 
     def _input(self, sample: int, k: int, kind: str) -> float:
         """Waves beyond what is usual in per unit, then around 1, where a voltage is; whole numbers change in turn."""
@@ -127,30 +133,31 @@ class _Host:
         return self._largest * wave if sample % _SAMPLES < _SAMPLES // 2 else 1.0 + 0.2 * wave
 
     def arrays(self) -> list[bytes]:
-        return [buffer.raw for buffer in self._buffers]
+        return [self._library.read(at, size) for at, size in zip(self._at, self._sizes, strict=True)]
 
     def restore(self, arrays: list[bytes]) -> None:
-        for buffer, kept in zip(self._buffers, arrays, strict=True):
-            c.memmove(buffer, kept, len(kept))
+        for at, kept in zip(self._at, arrays, strict=True):
+            self._library.write(at, kept)
+        self._inputs[:] = arrays[0]
 
 
-def tried(library: c.CDLL, interface: DllInterface, path: Path) -> Trial:
+def tried(library: Library, interface: DllInterface) -> Trial:
     """Run a DLL from the same arrays twice, and then from the same arrays and the same memory of its library."""
     for largest in _LARGEST:
         try:
-            return _tried(_Host(library, interface, largest), path)
+            return _tried(_Host(library, interface, largest), library)
         except ValueError as error:
             refused = Trial("not tried", why=str(error))
     return refused
 
 
-def _tried(host: _Host, path: Path) -> Trial:
+def _tried(host: _Host, library: Library) -> Trial:
     host.start()
     host.run(0)
-    regions = list(_writable(path)) if sys.platform.startswith("linux") else []
-    arrays, memory = host.arrays(), _copy(regions)
+    regions = library.regions() or []
+    arrays, memory = host.arrays(), _copy(library, regions)
     first = host.run(_SAMPLES)
-    moving = [memory, _copy(regions)]
+    moving = [memory, _copy(library, regions)]
     host.restore(arrays)
     from_arrays = host.run(_SAMPLES) == first
     places = tuple((start - base, size) for base, start, size in regions)
@@ -159,72 +166,28 @@ def _tried(host: _Host, path: Path) -> Trial:
     if not regions:
         return Trial("hidden", why="the library's own memory is looked at on Linux only")
     host.restore(arrays)
-    _put_back(regions, memory)
+    _put_back(library, regions, memory)
     if host.run(_SAMPLES) != first:
         return Trial("hidden", why="a run from the same arrays and the same memory of the library differs")
     return Trial("library", *_numbers(regions, moving), regions=places)
 
 
-def _pack(buffer: c.Array[c.c_char], row: Signal | DllParameter, offset: int, value: float) -> None:
+def _pack(buffer: bytearray, row: Signal | DllParameter, offset: int, value: float) -> None:
     code = {1: "b", 2: "b", 3: "B", 4: "h", 5: "H", 6: "i", 7: "I", 8: "f", 9: "d"}[row.data_type]
     whole = max(0, round(value)) if code in "BHI" else round(value)
     struct.pack_into(code, buffer, offset, value if code in "fd" else whole)
 
 
-class _Segment(c.Structure):
-    _fields_ = (
-        ("type", c.c_uint32),
-        ("flags", c.c_uint32),
-        *((name, c.c_uint64) for name in ("offset", "address", "physical", "in_file", "size", "align")),
-    )
+def _copy(library: Library, regions: Sequence[Region]) -> list[bytes]:
+    return [library.read(start, size) for _, start, size in regions]
 
 
-class _Loaded(c.Structure):
-    _fields_ = (
-        ("base", c.c_uint64),
-        ("name", c.c_char_p),
-        ("segments", c.POINTER(_Segment)),
-        ("count", c.c_uint16),
-    )
+def _put_back(library: Library, regions: Sequence[Region], memory: list[bytes]) -> None:
+    for (_, start, _), kept in zip(regions, memory, strict=True):
+        library.write(start, kept)
 
 
-def _writable(path: Path) -> Iterator[tuple[int, int, int]]:
-    """Base, start and size of each stretch of a loaded library's memory that it may write."""
-    found: list[tuple[int, int, int]] = []
-
-    def look(info: Any, _size: int, _data: Any) -> int:
-        loaded = info.contents
-        if not loaded.name or Path(loaded.name.decode("utf-8", "surrogateescape")) != path:
-            return 0
-        segments = [loaded.segments[k] for k in range(loaded.count)]
-        fixed = [(s.address, s.address + s.size) for s in segments if s.type == _RELOCATED_ONLY]
-        for segment in segments:
-            if segment.type == _LOADED and segment.flags & _WRITABLE:
-                begin, end = segment.address, segment.address + segment.size
-                for low, high in fixed:  # relocated once, then made read-only, by whole pages
-                    if low <= begin < high:
-                        begin = min(end, -(-high // 4096) * 4096 if high < end else high)
-                if begin < end:
-                    found.append((loaded.base, loaded.base + begin, end - begin))
-        return 0
-
-    callback = c.CFUNCTYPE(c.c_int, c.POINTER(_Loaded), c.c_size_t, c.c_void_p)
-    c.CDLL(None).dl_iterate_phdr(callback(look), None)
-    return iter(found)
-
-
-def _copy(regions: Sequence[tuple[int, int, int]]) -> list[bytes]:
-    return [c.string_at(start, size) for _, start, size in regions]
-
-
-def _put_back(regions: Sequence[tuple[int, int, int]], memory: list[bytes]) -> None:
-    for (_, start, size), kept in zip(regions, memory, strict=True):
-        c.memmove(start, kept, size)
-
-
-def _numbers(
-    regions: Sequence[tuple[int, int, int]], moving: Sequence[list[bytes]]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _numbers(regions: Sequence[Region], moving: Sequence[list[bytes]]) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Places of doubles and of floats that differ between two times, as numbers look."""
     doubles, floats = [], []
     for k, (base, start, size) in enumerate(regions):

@@ -20,7 +20,7 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi import answers
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.messages import texts
@@ -80,7 +80,9 @@ class FmuProcess:
         fmu = description.path.resolve()
         port = asdict(description.port) if isinstance(description, BoundDescription) else None
         request = {"fmu": str(fmu), "port": port, "directory": str(directory)}
-        self._process = ConfinedProcess("orchestrator.acceptance.worker", request, [fmu, directory], limits)
+        self._process = ConfinedProcess(
+            "orchestrator.acceptance.worker", request, [fmu, directory], limits, windows=runs_under_wine(description)
+        )
         try:
             self.box = self._process.box
             self._into, self._out = (self.box.array(which, np.uint32, MOST) for which in (0, 1))

@@ -8,7 +8,7 @@ from fmus.toolchain.extras import require
 from orchestrator.api.values import names
 from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
-from orchestrator.fmi.vendor_files import DEVICE_ENDING
+from orchestrator.fmi.vendor_files import DEVICE_ENDING, READER, foreign_platforms
 
 KEPT_IN = {
     "arrays": "its state is in the host's arrays: it can be saved, restored and perturbed",
@@ -63,7 +63,8 @@ def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[
         library, table = Path(dll), None
         if library.suffix.lower() == DEVICE_ENDING:
             library, table = read_device_file(library)
-        read = read_dll(library)
+        also = foreign_platforms(library)
+        read = read_dll(library, READER, also) if also else read_dll(library)
         device = None if table is None else device_of(Path(dll), table, read.interface)
         path = dll_fmu(read, Path(folder), texts, device)
     except (DllError, DeviceFileError) as error:

@@ -11,9 +11,10 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.fmi3 import FUNCTIONS as FUNCTIONS_OF_3
 from orchestrator.fmi.fmi3 import in_words_of_3, needed_functions
+from orchestrator.fmi.wine import PLATFORM
 
 _FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))
 """Those of co-simulation."""
@@ -38,9 +39,13 @@ def binary_path(description: FmuDescription, directory: Path) -> Path:
     FmuFileError
         If it is not there.
     """
-    newer = description.fmi_version == "3.0"
+    newer, ending = description.fmi_version == "3.0", fmpy.sharedLibraryExtension
+    if runs_under_wine(description):
+        library: Path = directory.resolve() / "binaries" / PLATFORM / f"{description.model_identifier}.dll"
+        if library.is_file():
+            return library
     folder = (directory / "binaries" / (fmpy.platform_tuple if newer else fmpy.platform)).resolve()
-    library: Path = folder / f"{description.model_identifier}{fmpy.sharedLibraryExtension}"
+    library = folder / f"{description.model_identifier}{ending}"
     if not library.is_file():
         raise FmuFileError(
             f"{description.path}: it has no binaries/{folder.name}/{library.name}, where an FMU of FMI "

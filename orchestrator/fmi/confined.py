@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.temporary import own_folder, remove
+from orchestrator.fmi import wine
 from orchestrator.fmi.confinement import LAYERS
 from orchestrator.fmi.environment import environment
 from orchestrator.fmi.limits import Limits
@@ -36,6 +37,8 @@ class ConfinedProcess:
         Files and folders that it may read.
     limits
         What it may take.
+    windows
+        Whether the FMU is for Windows, and Wine's server is needed.
 
     Attributes
     ----------
@@ -45,8 +48,18 @@ class ConfinedProcess:
         What keeps it from the rest of the machine; empty until the worker has told.
     """
 
-    def __init__(self, worker: str, request: Mapping[str, Any], readable: Sequence[Path], limits: Limits) -> None:
+    def __init__(
+        self,
+        worker: str,
+        request: Mapping[str, Any],
+        readable: Sequence[Path],
+        limits: Limits,
+        *,
+        windows: bool = False,
+    ) -> None:
         self._limits, self.protections = limits, tuple[Protection, ...]()
+        if windows:
+            wine.socket_bases()  # the closed process cannot make them
         self.folder = own_folder("isolated")
         memory: int | str = ""
         try:
@@ -63,6 +76,7 @@ class ConfinedProcess:
                 "limits": asdict(limits),
                 "layers": list(LAYERS),
                 "parent": os.getpid(),
+                "windows": windows,
             }
             with (self.folder / "output").open("ab") as output:
                 self._process = subprocess.Popen(

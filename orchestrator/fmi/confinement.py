@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from orchestrator.fmi import wine
 from orchestrator.fmi.landlock import landlock_version, restrict
 from orchestrator.fmi.linux import drop_capabilities, no_new_privileges, on_known_machine
 from orchestrator.fmi.protection import (
@@ -70,7 +71,9 @@ class Means:
     supervised: bool = False
 
 
-def confine(means: Means, layers: Sequence[str], work: Path, readable: Iterable[Path]) -> None:
+def confine(
+    means: Means, layers: Sequence[str], work: Path, readable: Iterable[Path], *, windows: bool = False
+) -> None:
     """Close this process off; ``means`` is completed.
 
     Parameters
@@ -83,16 +86,21 @@ def confine(means: Means, layers: Sequence[str], work: Path, readable: Iterable[
         The folder in which it may write.
     readable
         What it may read beside the system's libraries and Python's own folders.
+    windows
+        Whether the FMU is for Windows: Wine's server (`wine`) is started here, with what is in force by then.
     """
     if sys.platform != "linux":
         means.landlock = means.seccomp = f"{sys.platform} has none"
         return
     no_new_privileges()
     means.version = landlock_version()
-    means.landlock = _tried("landlock" in layers, lambda: _restrict(means, work, readable))
+    outside = wine.prepare(work) if windows else []
+    means.landlock = _tried("landlock" in layers, lambda: _restrict(means, work, readable, outside))
     if means.landlock:
         means.version = 0
     drop_capabilities()
+    if windows:
+        wine.in_process.append(wine.Server(work, tied=True, programs=wine.PROGRAMS))
     means.seccomp = _tried(
         "seccomp" in layers and on_known_machine(),
         lambda: filter_calls(
@@ -115,12 +123,12 @@ def _tried(wanted: bool, means: Callable[[], None]) -> str:
     return ""
 
 
-def _restrict(means: Means, work: Path, readable: Iterable[Path]) -> None:
+def _restrict(means: Means, work: Path, readable: Iterable[Path], more: Sequence[Path]) -> None:
     if len(os.listdir("/proc/self/task")) > 1:
         raise OSError(0, "there is a second thread already")
     proc = ["/proc"] if means.own_processes else list(_OF_THE_KERNEL)
     own = [Path("/dev/shm")] if means.read_only else []
-    restrict([*map(Path, [*_SYSTEM, *proc]), *python_folders(), *readable], [work, Path(os.devnull), *own])
+    restrict([*map(Path, [*_SYSTEM, *proc]), *python_folders(), *readable], [work, Path(os.devnull), *own, *more])
 
 
 def python_folders() -> list[Path]:

@@ -14,6 +14,7 @@ import fmpy
 from fmpy.model_description import ModelDescription
 
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
+from orchestrator.fmi import wine
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
 from orchestrator.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.fmi.values import Scalar, typed
@@ -203,13 +204,29 @@ def read_description(path: Path | str) -> FmuDescription:
 
 def missing_binary(described: FmuDescription) -> str | None:
     """What an FMU lacks that it could run on this platform."""
-    if fmpy.platform in described.platforms:
+    if fmpy.platform in described.platforms or runs_under_wine(described):
         return None
     has = ", ".join(described.platforms) or "none"
     return (
         f"it has no binary for this platform ({fmpy.platform}), only for: {has}; "
-        f"ask its author for a {fmpy.platform} build"
+        f"ask its author for a {fmpy.platform} build{_or_wine(described)}"
     )
+
+
+def _or_wine(described: FmuDescription) -> str:
+    """What else would help, to the end of a sentence."""
+    if wine.PLATFORM not in described.platforms or not described.fmi_version.startswith("2"):
+        return ""
+    try:
+        wine.find_wine()
+    except wine.NoWineError as error:
+        return f", or run that for Windows: {error}"
+    return ""
+
+
+def runs_under_wine(described: FmuDescription) -> bool:
+    """Whether an FMU has a binary for Windows alone, and Wine runs it here."""
+    return wine.runs_here(described.platforms, fmpy.platform, described.fmi_version)
 
 
 def read_declared(path: Path | str) -> FmuDescription:

@@ -6,12 +6,13 @@ from pathlib import Path
 from fmus.toolchain.cache import cache_directory, intact
 from orchestrator.fmi.bound import BoundComponent, compiled_adapter
 from orchestrator.fmi.component import Component
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection
+from orchestrator.fmi.wine_program import compile_programs
 
 
 def is_ours(path: Path) -> bool:
@@ -42,6 +43,8 @@ def compile_adapters(description: FmuDescription) -> None:
         description = description.inner
     if description.fmi_version == "3.0":
         adapter_path()
+    if runs_under_wine(description):
+        compile_programs()
 
 
 def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:

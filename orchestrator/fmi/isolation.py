@@ -29,7 +29,7 @@ from orchestrator.fmi.answers import (
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, TAMPERED
@@ -74,7 +74,9 @@ class IsolatedComponent(RemoteCalls, Derived):
         fmu = self.description.path.resolve()
         request = {"fmu": str(fmu), "name": self.name, "guid": self.description.guid, "directory": str(directory)}
         worker = "orchestrator.fmi.isolation_worker"
-        self._process = ConfinedProcess(worker, request, [fmu, directory], self.limits)
+        self._process = ConfinedProcess(
+            worker, request, [fmu, directory], self.limits, windows=runs_under_wine(self.description)
+        )
         self._box = self._process.box
         self._box.client.patience = TO_BEGIN
         self.protections = protections(self._remote("the beginning of its process", "begin"))

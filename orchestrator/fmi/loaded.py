@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from fmus.toolchain.removal import remove_tree
 from orchestrator.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
-from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, in_words_of_2, load, unload
+from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, binary_path, in_words_of_2, load, unload
 from orchestrator.fmi.component import Derived, RealBatch
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.messages import Messages, callbacks_for, texts
 from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
+from orchestrator.fmi.wine import NoWineError
+from orchestrator.fmi.wine_program import WineProgram, proxy_path
 
 PYTHON_BACKED = "Python-backed"
 """Why one thread alone steps an FMU: Python's lock lets one thread run at a time."""
@@ -61,6 +63,7 @@ class LoadedComponent(Derived):
         self._resources = str(Path(directory or self._own_directory or "") / "resources")
         self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None
+        self._wine: WineProgram | None = None
         self._initialised = False
         calls.watch()
         try:
@@ -82,6 +85,8 @@ class LoadedComponent(Derived):
         """Load the binary; that of an FMU of FMI 3.0 goes behind an adapter."""
         self._compare_guid(directory)
         newer = self.description.fmi_version == "3.0"
+        if runs_under_wine(self.description):
+            return self._under_wine(directory)
         library = load(self.description, directory)
         missing, spare = absent_functions(self.description, library)
         if missing:
@@ -105,6 +110,18 @@ class LoadedComponent(Derived):
         else:
             unload(library)  # it is open a second time in FMPy's object, which gives it back
         return fmu
+
+    def _under_wine(self, directory: Path) -> Any:
+        """Functions that ask a program under Wine, which loads the binary for Windows."""
+        try:
+            self._wine = WineProgram(binary_path(self.description, directory))
+        except (NoWineError, ValueError) as error:
+            raise FmuFileError(f"{self.description.path}: its binary for Windows: {error}") from error
+        self._wine.attach()
+        return FMU2Tolerant(
+            set(), self._refuse_absent, guid=self.description.guid, unzipDirectory=str(directory),
+            modelIdentifier=self.description.model_identifier, instanceName=self.name, libraryPath=str(proxy_path()),
+        )  # fmt: skip
 
     def _refuse_absent(self, call: str) -> None:
         call = in_its_words(self.description, call)
@@ -199,6 +216,9 @@ class LoadedComponent(Derived):
                 fmu.freeInstance()
         if fmu is not None and self._resources in sys.path:
             sys.path.remove(self._resources)  # the host of a Python-backed FMU puts it there, once for each instance
+        if self._wine is not None:
+            self._wine.close()
+            self._wine = None
         if self._own_directory is not None:
             remove_tree(self._own_directory)
             self._own_directory = None

@@ -6,13 +6,17 @@
    last one: a communication step costs one exchange between the processes and not three. Many steps of one of several
    instances may be asked for at once (RUN). */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "clock.h"
 #include "fmi.h"
 #include "waiting.h"
 
-#ifdef _WIN32
+#ifdef UNDER_WINE /* which only answers */
+static int is_gone(int64_t process) { return 0; }
+static int is_orphan(int64_t parent) { return older_wine() && of_linux(LINUX_GETPPID, 0, 0, 0, 0) != parent; }
+#elif defined _WIN32
 static int is_gone(int64_t process) {
     DWORD code;
     return !GetExitCodeProcess((HANDLE)(intptr_t)process, &code) || code != STILL_ACTIVE;

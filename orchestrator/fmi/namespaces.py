@@ -7,6 +7,7 @@ none, and the other protections stand alone.
 import contextlib
 import os
 import struct
+from collections.abc import Iterable
 from pathlib import Path
 
 from orchestrator.fmi.linux import (
@@ -46,7 +47,7 @@ def enter_namespaces() -> None:
     (own / "gid_map").write_text(f"{group} {group} 1", encoding="ascii")
 
 
-def mount_read_only(folder: Path, size: int) -> list[str]:
+def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[str]:
     """Have a view of all files of one's own, where only a folder in memory can be changed.
 
     Parameters
@@ -55,6 +56,8 @@ def mount_read_only(folder: Path, size: int) -> list[str]:
         Where that folder is put, empty.
     size
         What it may hold [bytes].
+    more
+        Folders in whose place there is an empty one in memory as well.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def mount_read_only(folder: Path, size: int) -> list[str]:
     """
     unshare(NEW_MOUNTS)
     mount(None, "/", None, _PRIVATE | _ALL_BELOW)
-    sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)}
+    sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(more, min(size, _SHARED))
     own = [path for path in sizes if path.is_dir()]
     for path in own:
         options = f"size={sizes[path]},nr_inodes={_MOST_FILES},mode=0700"

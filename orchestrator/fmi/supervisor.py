@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fmus.toolchain.removal import remove_tree
+from orchestrator.fmi import wine
 from orchestrator.fmi.confinement import Means, confine
 from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
 from orchestrator.fmi.linux import adopt_orphans, die_with_parent
@@ -140,7 +141,8 @@ def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: i
     _attach(Path(os.devnull), 0)
     if not means.namespaces:
         try:
-            lacking = mount_read_only(work, int(request["limits"]["disk"]))
+            sockets = wine.socket_bases() if request["windows"] else []
+            lacking = mount_read_only(work, int(request["limits"]["disk"]), sockets)
             means.read_only, means.own_processes = "files" not in lacking, "processes" not in lacking
         except OSError:
             pass  # `confine` knows what that leaves open
@@ -176,7 +178,8 @@ def _attach(path: Path, descriptor: int) -> None:
 def _work(request: dict[str, Any], means: Means) -> NoReturn:
     """Close this process off and do what gfor asks."""
     folder = Path(request["folder"])
-    confine(means, request["layers"], folder / "work", map(Path, request["readable"]))
+    readable = map(Path, request["readable"])
+    confine(means, request["layers"], folder / "work", readable, windows=request["windows"])
     request["means"] = asdict(means)
     importlib.import_module(request["worker"]).main(request)
     _exit()

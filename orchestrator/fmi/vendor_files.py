@@ -1,12 +1,14 @@
 """A vendor's DLL, or a device's file around one, wherever an FMU can stand: its FMU is built once and kept."""
 
 import hashlib
+import sys
 from functools import cache
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
+from orchestrator.fmi import wine
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"
@@ -16,7 +18,28 @@ _KEPT = "dlls"
 """Not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own."""
 
 
-_READER = "orchestrator.fmi.dll_reading"
+READER = "orchestrator.fmi.dll_reading"
+"""Module whose process, closed off, reads a DLL; also one for Windows, under Wine."""
+
+
+def foreign_platforms(library: Path) -> tuple[str, ...]:
+    """Platforms other than this machine's whose DLLs run here.
+
+    Raises
+    ------
+    InputError
+        If a DLL for Windows needs Wine, which is not there.
+    """
+    try:
+        with library.open("rb") as file:
+            windows = file.read(2) == b"MZ" and sys.platform == "linux"
+        if windows:
+            wine.find_wine()
+    except OSError:
+        return ()  # who reads it says why it cannot
+    except wine.NoWineError as error:
+        raise InputError(f"{library}: {error}; or ask its author for a build for Linux") from error
+    return (wine.PLATFORM,) if windows else ()
 
 
 def is_vendor_file(path: Path) -> bool:
@@ -48,7 +71,7 @@ def as_fmu(path: Path) -> Path:
         kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
         if intact(kept):
             return kept
-        dll = read_dll(library, _READER)
+        dll = read_dll(library, READER, foreign_platforms(library))
         device = None if table is None else device_of(path, table, dll.interface)
         return keep(kept, _archive(dll_members(dll, device=device)))
     except (DllError, DeviceFileError) as error:

@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from fmus.control_dll.export import with_values
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.vendor_dll.interface import DATA_TYPES, layout
+from fmus.vendor_dll.memory import LocalLibrary
 from fmus.vendor_dll.reading import read_interface
 
 HOST = Path(__file__).with_name("host") / "host.c"
@@ -36,7 +37,7 @@ class ControlHost:
 
     def __init__(self, path, mode=1, **values):
         self.library = ctypes.CDLL(str(path))
-        info = self.interface = read_interface(self.library)
+        info = self.interface = read_interface(LocalLibrary(path))
         self.inputs, self.outputs = np.zeros(len(info.inputs)), np.zeros(len(info.outputs))
         self.ints, self.doubles = np.zeros(info.states[0], np.int32), np.zeros(info.states[2])
         laid = layout(info.parameters)

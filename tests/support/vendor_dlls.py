@@ -6,6 +6,11 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from fmus.toolchain.compiler import ENDINGS, FLAGS, TARGETS
+
+OWN_LIBRARY = {"win64": [flag for flag in FLAGS if flag != "-fvisibility=hidden"]}
+"""By other flags than the project's own the compiler would build its C library once more, in a minute."""
+
 INTERFACE = """
 #include <stdint.h>
 #include <stdlib.h>
@@ -52,24 +57,13 @@ def lag(name="lag", *, state="s->doubles[0]", doubles=1, sample_time=1e-4, begin
     return INTERFACE + LAG + info + head + body
 
 
-def compiled(source, folder, name="controller"):
+def compiled(source, folder, name="controller", platform="linux64"):
     """The library of a source, in a folder."""
-    text, library = folder / f"{name}.c", folder / f"{name}.so"
+    text, library = folder / f"{name}.c", folder / f"{name}{ENDINGS[platform]}"
     text.write_text(source, encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        "-O1",
-        "-shared",
-        "-fPIC",
-        "-g0",
-        str(text),
-        "-o",
-        str(library),
-        "-lm",
-    ]
+    target = () if platform == "linux64" else ("-target", TARGETS[platform][0])
+    flags = ("-O1", "-shared", "-fPIC", "-g0", "-ffp-contract=off", *OWN_LIBRARY.get(platform, ()))
+    command = [sys.executable, "-m", "ziglang", "cc", *target, *flags, str(text), "-o", str(library), "-lm"]
     subprocess.run(command, check=True, capture_output=True, cwd=folder)
     return library
 
@@ -131,19 +125,21 @@ voltage = ["e[1]", "e[2]", "e[3]"]
 
 
 @cache
-def _library(source):
+def _library(source, platform):
     with TemporaryDirectory() as folder:
-        return compiled(source, Path(folder)).read_bytes()
+        return compiled(source, Path(folder), platform=platform).read_bytes()
 
 
-def droop_device(folder, *, sample=1e-4, delay=0, wrap="*theta = fmod(*theta, turn);", hide="", changes=()):
+def droop_device(
+    folder, *, sample=1e-4, delay=0, wrap="*theta = fmod(*theta, turn);", hide="", changes=(), platform="linux64"
+):
     """File of a device: the droop behind an inductor and a transformer.
 
     ``changes`` replace text in it; ``hide`` may put the filtered power elsewhere.
     """
     source = INTERFACE + DROOP.replace("SAMPLE", repr(sample)).replace("WRAP", wrap).replace("HIDE", hide)
-    (folder / "droop.so").write_bytes(_library(source))
-    text = DEVICE.format(delay=delay)
+    (folder / f"droop{ENDINGS[platform]}").write_bytes(_library(source, platform))
+    text = DEVICE.format(delay=delay).replace("droop.so", f"droop{ENDINGS[platform]}")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)

@@ -1,6 +1,16 @@
 /* The vendor's library: a private copy for each instance, as many DLLs keep variables of their own. */
 #ifdef _WIN32
+/* Names that are ours, which Windows has as well. */
+#define WIN32_LEAN_AND_MEAN
+#define NOGDI
+#define NOUSER
+#define GUID WINDOWS_GUID
+#define BOOLEAN WINDOWS_BOOLEAN
+#define SIZE WINDOWS_SIZE
 #include <windows.h>
+#undef GUID
+#undef BOOLEAN
+#undef SIZE
 #define CALLED __cdecl
 typedef struct {
     HMODULE handle;

@@ -1,0 +1,260 @@
+"""The program under Wine that runs a Windows library, and what it is asked (`wine_talk.c`)."""
+
+import ctypes
+import mmap
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fmus.toolchain.compiler import TARGETS, compile_for, compile_here, joined_source
+from fmus.toolchain.temporary import own_folder, remove
+from fmus.vendor_dll.memory import Region
+from orchestrator.errors import InputError
+from orchestrator.fmi import wine
+from orchestrator.fmi.mailbox import DIED, HUNG, Client, mailbox_library
+
+_HERE = Path(__file__).parent
+_BOTH = (_HERE / "mailbox.c", _HERE / "wine_talk.c")
+_WRITABLE = 0x80000000  # IMAGE_SCN_MEM_WRITE
+LOAD, SYMBOL, CALL, READ, WRITE, ALLOCATE = range(6)
+
+
+class _Talk(ctypes.Structure):
+    _fields_ = (
+        ("command", ctypes.c_int64),
+        ("result", ctypes.c_int64),
+        ("a", ctypes.c_int64 * 4),
+        ("d", ctypes.c_double * 4),
+    )
+
+
+_ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0
+_idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []
+"""Programs without an instance, in a process that is closed off, with the files of their shared memory."""
+
+
+class WineEndedError(ValueError):
+    """The program under Wine has ended."""
+
+
+@cache
+def proxy_path() -> Path:
+    """The compiled functions of FMI 2.0 that ask the program under Wine."""
+    return compile_here(*_BOTH, _HERE / "wine_proxy.c")
+
+
+@cache
+def host_path() -> Path:
+    """The compiled program for Windows."""
+    source = "#define UNDER_WINE\n" + joined_source(*_BOTH, _HERE / "wine_host.c")
+    return compile_for(source, TARGETS[wine.PLATFORM][0], ".exe")
+
+
+def compile_programs() -> list[Path]:
+    """Compile both, or find them compiled; returns their paths.
+
+    Raises
+    ------
+    InputError
+        If they cannot be compiled here, or there is no Wine.
+    """
+    try:
+        wine.find_wine()
+        mailbox_library()
+        return [proxy_path(), host_path()]
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"libraries for Windows run under Wine, by a compiled program: {error}") from error
+
+
+@cache
+def proxy() -> Any:
+    """The loaded functions, to ask for what is no function of FMI."""
+    library = ctypes.CDLL(str(proxy_path()))
+    library.wine_attach.argtypes = [ctypes.c_void_p, ctypes.c_int64]
+    library.wine_attach.restype = None
+    library.wine_ask.argtypes = [ctypes.c_void_p, ctypes.c_int]
+    return library
+
+
+class WineProgram:
+    """The program under Wine, with one library loaded.
+
+    Parameters
+    ----------
+    library
+        The library for Windows.
+    patience
+        Time for one answer [s].
+
+    Raises
+    ------
+    NoWineError
+        If Wine does not start.
+    ValueError
+        If the library cannot be loaded.
+    """
+
+    def __init__(self, library: Path, patience: float = 1e300) -> None:
+        self._folder: Path | None = None
+        if wine.in_process:
+            self._server = wine.in_process[0]
+        else:
+            self._folder = own_folder("wine")
+            wine.prepare(self._folder)
+            self._server = wine.Server(self._folder, tied=False)
+        try:
+            self._begin(patience)
+            self.handle = self._load(library)
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, patience: float) -> None:
+        """Take a program that has nothing to do, or start one."""
+        if _idle:
+            self._path, self._process = _idle.pop()
+        else:
+            self._path = self._server.next_shared()
+            shared = f"Z:{self._path}".replace("/", "\\")
+            self._process = self._server.start(host_path(), shared, str(os.getpid()))
+        self._memory = self._shared(self._path)
+        self._client = Client(box=self.address, peer=self._process.pid, patience=patience)
+
+    def _shared(self, path: Path) -> mmap.mmap:
+        assert mailbox_library().mailbox_size() <= wine.SHARED
+        with path.open("r+b") as file:
+            memory = mmap.mmap(file.fileno(), 0)
+        self._head = ctypes.c_char.from_buffer(memory)
+        self.address = ctypes.addressof(self._head)
+        self._talk_at = mailbox_library().mailbox_offset(0)
+        self._talk = _Talk.from_buffer(memory, self._talk_at)
+        self._data = self._talk_at + ctypes.sizeof(_Talk)
+        return memory
+
+    def attach(self) -> None:
+        """Make the next instance of an FMU in this process one of the library."""
+        proxy().wine_attach(self.address, self._process.pid)
+
+    def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
+        """One question to the program.
+
+        Parameters
+        ----------
+        command
+            One of those of `wine_talk.c`.
+        arguments
+            Its numbers.
+        data
+            Its bytes.
+        answer
+            How many bytes are wanted.
+
+        Returns
+        -------
+        tuple of int and bytes
+            The result, and the bytes.
+
+        Raises
+        ------
+        WineEndedError
+            If the program has ended, or does not answer.
+        """
+        for k, value in enumerate(arguments):
+            self._talk.a[k] = value
+        self._memory[self._data : self._data + len(data)] = data
+        status = proxy().wine_ask(ctypes.byref(self._client), command)
+        if status == HUNG:
+            raise WineEndedError("gives no answer")
+        if status >= DIED:
+            raise WineEndedError("ends under Wine: it crashes or ends its own process")
+        return int(self._talk.result), bytes(self._memory[self._data : self._data + answer])
+
+    def _load(self, library: Path) -> int:
+        handle, _ = self.ask(LOAD, data=f"Z:{library}".encode() + b"\0")
+        if not handle:
+            code = int(self._talk.a[0])
+            why = {126: "a library that it needs is missing", 193: "it is for another processor or damaged"}.get(code)
+            raise ValueError(f"Wine cannot load it: Windows error {code}{f' ({why})' if why else ''}")
+        return handle
+
+    def close(self) -> None:
+        """End the program and Wine's server; in a process that is closed off, keep it for the next library."""
+        process: subprocess.Popen[bytes] | None = getattr(self, "_process", None)
+        if process is not None and self._folder is None and os.waitid(os.P_PID, process.pid, _ENDED) is None:
+            _idle.append((self._path, process))
+        elif process is not None:
+            process.kill()
+            process.wait()
+        self.__dict__.pop("_process", None)
+        if self._folder is not None:
+            self._server.close()
+            remove(self._folder)
+            self._folder = None
+
+
+class WineLibrary:
+    """A DLL for Windows under Wine, as `fmus.vendor_dll.memory.Library`.
+
+    Parameters
+    ----------
+    path
+        Its file.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be loaded.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._program = WineProgram(path)
+        self._functions: dict[str, int] = {}
+
+    def _function(self, name: str) -> int:
+        if name not in self._functions:
+            self._functions[name] = self._program.ask(SYMBOL, data=name.encode() + b"\0")[0]
+        return self._functions[name]
+
+    def has(self, name: str) -> bool:
+        """Whether it has a function."""
+        return self._function(name) != 0
+
+    def call(self, name: str, argument: int = 0) -> int:
+        """What a function returns for one pointer, as 64 bits."""
+        return self._program.ask(CALL, self._function(name), argument)[0]
+
+    def read(self, address: int, size: int) -> bytes:
+        """A stretch of memory."""
+        return self._program.ask(READ, address, size, answer=size)[1]
+
+    def text(self, address: int | None) -> bytes:
+        """A text that ends with a zero; empty where there is none."""
+        found = b""
+        while address and b"\0" not in found:
+            ahead = 64 - (address + len(found)) % 64  # what lies beyond may not be there
+            found += self.read(address + len(found), ahead)
+        return found.split(b"\0")[0]
+
+    def write(self, address: int, content: bytes) -> None:
+        """Change a stretch of memory."""
+        self._program.ask(WRITE, address, len(content), data=content)
+
+    def allocate(self, size: int) -> int:
+        """Address of new memory, all zero, which is never given back."""
+        return self._program.ask(ALLOCATE, size)[0]
+
+    def regions(self) -> list[Region] | None:
+        """Sections that may be written, by the table of the file's head."""
+        base = self._program.handle
+        head = self.read(base, 4096)
+        at = int.from_bytes(head[60:64], "little")
+        count = int.from_bytes(head[at + 6 : at + 8], "little")
+        table = at + 24 + int.from_bytes(head[at + 20 : at + 22], "little")
+        found = []
+        for place in range(table, min(table + 40 * count, len(head) - 39), 40):
+            size, start, flags = (int.from_bytes(head[place + k : place + k + 4], "little") for k in (8, 12, 36))
+            if flags & _WRITABLE:
+                found.append((base, base + start, size))
+        return found
