@@ -1,6 +1,6 @@
 """The DLLs for Windows: what both export, and that of 64 bits under Wine beside the FMU's library for Windows.
 
-That of 32 bits is not run: a Wine of 64 bits alone ends such programs without a word.
+That of 32 bits was run by hand: a Wine of 64 bits alone ends such programs without a word.
 """
 
 import os
