@@ -178,7 +178,8 @@ class _Worker:
                 result.stability.zeros,
             )
             warnings = (*warnings, *result.warnings)
-            return _Result(self._item_record(found, {}, point.residual, warnings, certain=True), found)
+            record = self._item_record(found, {}, point.residual, warnings, certain=True)
+            return _Result(replace(record, map_steps=result.model.period), found)
         whole = {name: self._bench.linearized(name) for name in master.components}
         narrow = {name: without_references(c) for name, c in whole.items()}
         model = continuous(Blocks(master, known=narrow, without_step=True))

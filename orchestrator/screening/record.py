@@ -91,6 +91,8 @@ class ItemRecord:
         where there is none.
     lasting
         Whether computing it again would give the same.
+    map_steps
+        Communication steps of the map whose modes these are; 0 of the system without a communication step.
     """
 
     status: Status
@@ -111,6 +113,7 @@ class ItemRecord:
     reference: int = -1
     links: tuple[int, ...] = ()
     lasting: bool = True
+    map_steps: int = 0
 
 
 _IN_ARRAYS = ("eigenvalues", "shares", "residues")

@@ -1,5 +1,7 @@
 """A screening in words: its verdict, and what it rests on."""
 
+from collections import Counter
+
 import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE
@@ -52,11 +54,25 @@ def what_was_counted(summary: Summary) -> str:
     return (
         f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
         f"below {100 * wanted.damping:g} % damping, of the "
-        f"system without a communication step: {searched} of {computed} items were searched from scratch, the others "
+        f"{_what_was_linearised(summary)}: {searched} of {computed} items were searched from scratch, the others "
         f"from a neighbour with a check that no mode is missed there. Growth at other frequencies was counted at "
         f"{summary.counted} of {computed} items, in systems of more than {DENSE} states where it is faster than "
         f"{GROWING:g} 1/s, or near 0."
     )
+
+
+def _what_was_linearised(summary: Summary) -> str:
+    """Of which system the modes are: without a communication step, or with it, over one or several."""
+    step = summary.result.plan.prepared.step_size
+    computed = [item.record.map_steps for item in summary.result.items if item.record.status is Status.COMPUTED]
+    found = []
+    for steps, number in sorted(Counter(computed).items()):
+        which = f"map over {steps} communication steps ({steps * step:g} s), after which sampled controllers repeat"
+        which = (
+            "map over a communication step" if steps == 1 else which if steps else "system without a communication step"
+        )
+        found.append(which if number == len(computed) else f"{which} at {number} of {len(computed)} items")
+    return ", of the ".join(found) or "system without a communication step"
 
 
 def _but_slowly(summary: Summary) -> str:

@@ -99,3 +99,26 @@ def test_where_all_eigenvalues_are_known_nothing_is_left_out(screened):
     assert verdict_sentence(summary).startswith("stable: nothing grows at any of 2 points and outages")
     assert "slower" not in verdict_sentence(summary)
     assert as_json(summary)["slowest_growth_counted"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ((0, 0), "damping, of the system without a communication step: "),
+        ((1, 1), "damping, of the map over a communication step: "),
+        (
+            (200, 200),
+            "damping, of the map over 200 communication steps (0.02 s), after which sampled controllers repeat: ",
+        ),
+        (
+            (0, 200),
+            "of the system without a communication step at 1 of 2 items, of the map over 200 communication steps",
+        ),
+    ],
+)
+def test_the_head_says_of_which_system_the_modes_are(screened, steps, said):
+    items = tuple(
+        replace(item, record=replace(item.record, map_steps=n)) for item, n in zip(screened.items, steps, strict=True)
+    )
+    assert screened.plan.prepared.step_size == 1e-4
+    assert said in what_was_counted(Summary(replace(screened, items=items)))

@@ -155,6 +155,8 @@ def test_a_screening_has_the_modes_of_each_point(folder, capsys):
     assert main(["screen", str(folder / "net.toml"), "--damping", "0.6", *options]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["stable"], found["counts"]) == (True, {"computed": 2})
+    assert main(["screen", str(folder / "net.toml"), "--damping", "0.6", *options[:-1]]) == 0
+    assert "of the map over 200 communication steps (0.02 s), after which sampled" in said(capsys)
 
 
 def test_a_sensitivity_is_the_difference_of_modes_over_the_period(folder, capsys):
