@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.examination import examine
+from orchestrator.analysis.external_exciters import settled_warnings, start_warnings
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.mode_names import Measure, Naming, name_modes, opposition
@@ -204,9 +205,11 @@ def linearised(
     prepared, master, frequency_range, critical, directional
         As `modes_of`.
     """
+    said = start_warnings(master)
     point = find_operating_point(master)
+    said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return Linearised(prepared, master, point, blocks, frequency_range, critical)
+    return Linearised(prepared, master, point, blocks, frequency_range, critical, said)
 
 
 def modes_from(
@@ -247,6 +250,8 @@ class Linearised:
     ----------
     prepared, master, point, blocks, frequency_range, critical
         As `modes_from`.
+    said
+        Warnings that come before those of the modes.
     """
 
     def __init__(
@@ -257,9 +262,10 @@ class Linearised:
         blocks: Blocks,
         frequency_range: tuple[float, float],
         critical: float | None,
+        said: tuple[str, ...] = (),
     ) -> None:
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
-        self._range, self._critical = frequency_range, critical
+        self._range, self._critical, self._said = frequency_range, critical, said
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
 
     def begin(self, pool: Executor) -> None:
@@ -326,6 +332,7 @@ class Linearised:
             named=named,
             references=dict(prepared.references),
             warnings=(
+                *self._said,
                 *map(str, prepared.questions),
                 *examined.warnings,
                 *naming.doubts,

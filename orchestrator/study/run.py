@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
+from orchestrator.analysis.external_exciters import start_warnings
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
@@ -183,7 +184,9 @@ def _run(
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
+        started = start_warnings(master) if reasons else ()
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
+        modes = replace(modes, warnings=(*started, *modes.warnings))
         if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
