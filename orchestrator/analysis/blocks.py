@@ -13,7 +13,7 @@ from orchestrator.analysis.component_linearization import (
 from orchestrator.analysis.delays import WireLink, links_of
 from orchestrator.analysis.equations import Indices
 from orchestrator.analysis.held_inputs import LineMap, over_parts
-from orchestrator.analysis.sampled import steps_of_period
+from orchestrator.analysis.sampled import repeating, steps_of_period
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.step_awareness import knows_step, other_step
@@ -57,6 +57,8 @@ class Blocks:
         In how many parts a component does the communication step.
     period
         Communication steps after which the system repeats; 1 where each step is like every other.
+    sampled
+        Names of the sampled components among them.
     declared
         By component and output: the inputs that its FMU says it depends on directly.
 
@@ -98,6 +100,7 @@ class Blocks:
         self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
         _check_driven(master, self._driven)
         self.period = steps_of_period(master, self.step_size, known)
+        self.sampled = tuple(name for name in repeating(master) if name not in set(known))
         self.components = self._linearized(master, known)
         # External inputs follow the coupled outputs, as if a further component gave them.
         first_external = len(master.output_names)
