@@ -1,6 +1,7 @@
 """A DLL for Windows on Linux, under Wine: the figures of a library for Linux, and what it may not do."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi import wine
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.isolation import IsolatedComponent
+from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.vendor_files import READER, foreign_platforms
 from tests.support.vendor_dlls import compiled, droop_device, lag
 from tests.vendor_dll.test_device import device_master, swing
@@ -112,6 +115,27 @@ def test_a_dll_that_fails_under_wine_is_named(under_wine, tmp_path, fault):
         with pytest.raises(ComponentError) as error:
             answers(component)
         assert all(words in str(error.value) for words in FAULTS[fault])
+
+
+def test_a_hang_under_wine_is_ended_with_all_its_processes(under_wine, tmp_path):
+    source = lag(do="for (volatile int go = s->time > 2.5e-4; go;) {}")
+    description = read_description(compiled(source, tmp_path, platform="win64"))
+    with IsolatedComponent("vendor", description, limits=Limits(seconds=1.0)) as component:
+        component.setup(0.0, None)
+        component.enter_initialization_mode()
+        component.exit_initialization_mode()
+        group = component.process_group
+        with pytest.raises(ComponentError, match="hang: no answer within 1 s"):
+            answers(component)
+    left = [line for line in Path("/proc").glob("[0-9]*/stat") if _in_group(line, group)]
+    assert not left
+
+
+def _in_group(stat, group):
+    try:
+        return stat.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()[2] == str(group)
+    except OSError:  # it has ended since
+        return False
 
 
 def test_a_dll_that_crashes_while_it_is_loaded_is_refused(under_wine, tmp_path):
