@@ -8,6 +8,7 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.errors import FmuFileError, InputError
+from orchestrator.fmi import wine
 from orchestrator.fmi.description import read_description
 
 XML = "modelDescription.xml"
@@ -120,9 +121,16 @@ def test_a_derivative_of_nothing(rewritten):
     refused(path, "ModelStructure/Derivatives lists 'der", "does not say which state it is the derivative of")
 
 
-def test_no_binary_for_this_platform(rewritten):
+def test_no_binary_for_this_platform(rewritten, monkeypatch):
+    """Without Wine; with it, the one for Windows is run."""
+
+    def missing():
+        raise wine.NoWineError(wine.MISSING)
+
+    monkeypatch.setattr(wine, "find_wine", missing)
     path = rewritten(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
-    refused(path, "no binary for this platform", fmpy.platform, "only for", f"{fmpy.platform} build")
+    words = ("no binary for this platform", fmpy.platform, "only for", f"{fmpy.platform} build")
+    refused(path, *words, "or run that for Windows", "install it")
 
 
 def test_no_binary_at_all(rewritten):
