@@ -193,7 +193,7 @@ def _code_of(tree):
     return " ".join(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
 
 
-POINTS = ("sweep.point", "screening.point", "coordinated_design.point", "certification.point",
+POINTS = ("sweep.point", "screening.point", "coordinated_design.point", "interactions.point", "certification.point",
           "certification.codes.bench_point", "certification.codes.change_point")  # fmt: skip
 """What computes a point that is kept."""
 
