@@ -129,8 +129,9 @@ def write_log_categories(root: Element, prefix: str) -> None:
 
 
 def _write_units(root: Element, model: Model) -> None:
-    """Every unit in use."""
-    used = {v.unit for v in model.variables} | {_derivative_unit(s) for s in model.states}
+    """Every unit in use; only real variables have one."""
+    without = {parameter.name for parameter in model.parameters if parameter.type != "Real"}
+    used = {v.unit for v in model.variables if v.name not in without} | {_derivative_unit(s) for s in model.states}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(used):
         element = SubElement(definitions, "Unit", name=unit)

@@ -14,6 +14,7 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.cli import COMMANDS
+from orchestrator.fmi import wine
 from orchestrator.fmi.description import read_description
 from tests.coupling.small_fmus import small_fmu
 
@@ -257,8 +258,13 @@ def test_info_on_model_exchange_only(refused, damaged):
     )
 
 
-def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged):
-    """A vendor's FMU for Windows alone can be looked at, and not run."""
+def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged, monkeypatch):
+    """A vendor's FMU for Windows alone can be looked at, and without Wine not be run."""
+
+    def missing():
+        raise wine.NoWineError(wine.MISSING)
+
+    monkeypatch.setattr(wine, "find_wine", missing)
     path = damaged(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
     code, out, _ = gfor("info", path)
     assert code == 0

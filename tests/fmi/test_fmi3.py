@@ -18,6 +18,7 @@ from orchestrator.errors import ComponentError, EndedError, FmuFileError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.fmi3 import adapter_path
 from orchestrator.fmi.instance import open_component
+from orchestrator.fmi.mailbox import mailbox_library
 from orchestrator.study.modes import modes_of, running
 
 H = 1e-4
@@ -162,6 +163,7 @@ def test_no_fmu_waits_for_a_compiler_while_it_is_checked(ours, gfor, monkeypatch
         monkeypatch.delenv(variable, raising=False)  # in the home folder, as a user has it
     fmu = ours("gfor", "3.0")
     adapter_path.__wrapped__()
+    mailbox_library.__wrapped__()
     monkeypatch.setenv("ZIG_LIB_DIR", str(fmu.parent))
     with pytest.raises(RuntimeError, match="the C compiler"):
         compile_library("int never_compiled_before;", host_platform())

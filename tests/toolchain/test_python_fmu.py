@@ -42,6 +42,7 @@ ALL_PATHS_OPEN = {
     "gfl_phasor": _FOLLOWING_OPEN | {"communication_step": 5e-3},
     "gfl_l2ep": _L2EP_OPEN,
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
+    "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "regfm_a1_phasor": {"communication_step": 5e-3, "RL": 0.01, "kpv": 0.5, "kpqmax": 0.01, "ImaxF": 1.0},
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.
