@@ -25,9 +25,13 @@ def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
 
 def is_interrupt(error: BaseException | None) -> bool:
     """Whether it is Ctrl-C or SIGTERM, or what a library in C made of one that came while it called Python."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
+    seen: set[int] = set()  # an error that was kept and is raised again may stand behind its own cause
+    while error is not None and id(error) not in seen:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        seen.add(id(error))
         error = error.__cause__ or error.__context__
-    return error is not None
+    return False
 
 
 def ending(error: BaseException) -> str:

@@ -9,6 +9,7 @@ import pytest
 from orchestrator.cli import run as command
 from orchestrator.cli import sweep as sweep_command
 from orchestrator.cli.checkpoints import Checkpoints
+from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.coupling.progress import Progress
 from orchestrator.points.store import PointStore
 from orchestrator.study import run as study
@@ -124,3 +125,10 @@ def test_a_design_of_which_nothing_is_kept(gfor, tmp_path, monkeypatch):
     words = ("design", "two_area", "--controller", "pod_p", "--out", tmp_path / "pod.toml")
     assert gfor(*words) == (130, "", "interrupted\n")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("behind", [ValueError("a"), KeyboardInterrupt()])
+def test_an_error_that_stands_behind_its_own_cause(behind):
+    error = RuntimeError("kept, and raised again")
+    error.__cause__, behind.__context__ = behind, error
+    assert is_interrupt(error) == isinstance(behind, KeyboardInterrupt)
