@@ -241,6 +241,12 @@ class JudgedInteractions:
         return first if first.fights or first.fall > SAME else None
 
     @property
+    def least_damped_pair(self) -> JudgedPair | None:
+        """The known pair with the lowest damping, alone or not; None where none has a mode that counts."""
+        known = [pair for pair in self.pairs if pair.is_known and pair.joint.critical is not None]
+        return min(known, key=lambda pair: pair.joint.least_damping or 0.0, default=None)
+
+    @property
     def unknown_pairs(self) -> list[JudgedPair]:
         """Pairs of which something is not known."""
         return [pair for pair in self.pairs if not pair.is_known]

@@ -112,7 +112,8 @@ def assignments(
         If there is nothing to swap, two devices have one name, or there are more than `MOST_ASSIGNMENTS`.
     """
     templates = first_of({name: places[name] for name in at})
-    if twice := [device.name for device in given if device.name in templates]:
+    vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well
+    if twice := [device.name for device in given if device.name in vendors]:
         raise InputError(
             f"--device {twice[0]}: a vendor of the case has this name already; give another one, as in NAME=FILE"
         )

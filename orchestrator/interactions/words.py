@@ -43,14 +43,29 @@ def modes_sentence(judgement: JudgedInteractions) -> str:
     return f"{head}{tail}: {'; '.join(shown)}{'; …' if len(found) > _SHOWN else ''}"
 
 
+def alone_sentence(judgement: JudgedInteractions) -> str:
+    """Which vendors' converters grow without those of the others; empty where none does."""
+    found = [(vendor, system) for vendor, system in judgement.alone.items() if system.stable is False]
+    if not found:
+        return ""
+    shown = [f"{vendor}, {damping_text(one)} % at {frequency_text(one)}" for vendor, one in found]
+    return f"UNSTABLE without the other vendors: {'; '.join(shown)}"
+
+
 def pairs_sentence(judgement: JudgedInteractions) -> str:
-    """Which pair is the worst."""
+    """Which pair is the worst, which grow, and which is damped least."""
     plan = judgement.result.plan
     if len(plan.vendors) < 2:
         return f"one vendor, {plan.vendors[0]}: there is no pair"
     worst, unknown = judgement.worst_pair, judgement.unknown_pairs
     known = len(judgement.pairs) - len(unknown)
     rest = "" if not unknown else f"; not known: {', '.join(pair.text for pair in unknown)}"
+    grow = [pair.text for pair in judgement.pairs if pair.joint.stable is False]
+    rest = f"; UNSTABLE: {', '.join(grow)}{rest}" if grow and (worst is None or len(grow) > 1) else rest
+    least = judgement.least_damped_pair
+    if least is not None and least is not worst and len(judgement.pairs) > 1 and least.joint.stable is not False:
+        where = f"{damping_text(least.joint)} % at {frequency_text(least.joint)}"
+        rest = f"; the least damped pair is {least.text}, {where}{rest}"
     if worst is not None:
         among = f" of {known} pairs" if known > 1 else ""
         return f"worst pair{among}: {worst.sentence()}{rest}"
@@ -87,7 +102,11 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
 def sentences(judgement: JudgedInteractions) -> list[str]:
     """All of them, the verdict on the system as it is first."""
     every = [
-        whole_sentence(judgement), modes_sentence(judgement), pairs_sentence(judgement), swap_sentence(judgement),
+        whole_sentence(judgement),
+        modes_sentence(judgement),
+        alone_sentence(judgement),
+        pairs_sentence(judgement),
+        swap_sentence(judgement),
         stand_in_sentence(judgement),
-    ]  # fmt: skip
+    ]
     return [text for text in every if text]

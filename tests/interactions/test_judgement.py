@@ -42,7 +42,9 @@ ALL = dict.fromkeys(("A", "B", "C"), system(mode(8.0))) | dict.fromkeys(("A_B", 
 
 
 def test_without_a_fight_the_worst_pair_is_the_one_that_falls_furthest():
-    found = judged(**ALL | {"A_C": system(mode(7.0)), "B_C": system(mode(5.5)), "B": system(mode(6.0))}).judgement
+    result = judged(**ALL | {"A_C": system(mode(7.0)), "B_C": system(mode(5.5)), "B": system(mode(6.0))})
+    found = result.judgement
+    assert "the least damped pair is B + C, 5.50 % at 10 Hz" in " ".join(result.sentences)
     assert found.worst_pair.vendors == ("A", "C")  # by 1 point; B and C fall by 0.5
     assert found.worst_pair.fall == pytest.approx(1.0, abs=1e-9)
 
@@ -55,7 +57,10 @@ def test_where_no_pair_falls_there_is_no_worst_one():
 
 def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
     grows = system(mode(-2.0), stability={"stable": False}, growing=mode(-2.0))
-    found = judged(**ALL | {"A": grows, "A_B": grows}).judgement
+    result = judged(**ALL | {"A": grows, "A_B": grows})
+    found = result.judgement
+    assert "UNSTABLE without the other vendors: A, -2.00 % at 10 Hz" in result.sentences
+    assert "no worst pair: none of 3 is damped less together than each alone; UNSTABLE: A + B" in result.sentences
     pair = next(one for one in found.pairs if one.vendors == ("A", "B"))
     assert pair.fights is False
     assert pair.fall == pytest.approx(0.0, abs=1e-9)
