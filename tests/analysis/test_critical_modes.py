@@ -52,6 +52,28 @@ def test_a_crowd_that_is_too_large_for_one_disc_is_cut(monkeypatch):
     assert [m.eigenvalue for m in found] == pytest.approx([m.eigenvalue for m in full], abs=1e-7)
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-13, 1e-11])
+def test_a_mode_on_the_point_of_the_search_leaves_the_others_their_digits(apart, monkeypatch):
+    points = []
+    with monkeypatch.context() as seen:
+        plain = critical_modes.Search
+        seen.setattr(critical_modes, "Search", lambda model, centre: points.append(centre) or plain(model, centre))
+        find_critical_modes(model(), 0.75, 0.85)
+    (point,) = points
+    low, high = 2 * np.pi * 0.75, 2 * np.pi * 0.85
+    modes = [*(complex(-0.05 * w, w) for w in np.linspace(4.6, 5.6, 9)), point + apart]
+    blocks = [[[s.real, s.imag], [-s.imag, s.real]] for s in modes]
+    A = scipy.linalg.block_diag(*blocks, *([[-d]] for d in np.linspace(20, 60, 240)))
+    rng = np.random.default_rng(4)
+    Q, P = (np.linalg.qr(rng.standard_normal(A.shape))[0] for _ in range(2))
+    T = Q @ np.diag(np.logspace(0, 1, len(A))) @ P
+    system = LinearModel.from_matrix(T @ A @ np.linalg.inv(T), tuple(f"x{k}" for k in range(len(A))), None)
+    found = [mode.eigenvalue for mode in find_critical_modes(system, 0.75, 0.85)]
+    wanted = [mode for mode in modes if low <= mode.imag <= high]
+    assert len(found) == len(wanted) == 6
+    assert max(min(abs(one - mode) for mode in found) for one in wanted) < 1e-9
+
+
 def test_only_modes_below_the_damping_asked_for():
     found = find_critical_modes(model(), 0.1, 2.0, damping=0.06)
     assert [round(m.frequency_hz, 2) for m in found] == [0.31, 0.72]
