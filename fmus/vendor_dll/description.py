@@ -19,6 +19,8 @@ from fmus.vendor_dll.source import (
 )
 from fmus.vendor_dll.state_trial import Trial
 
+_LONGEST_WHY = 500
+
 
 def dll_description(
     interface: DllInterface,
@@ -83,7 +85,9 @@ def dll_description(
     sampled = {"sampleTime": repr(interface.sample_time)} if interface.sample_time > 0 else {}
     if circuit is not None:  # its phase quantities repeat with the network's period
         sampled["frequency"] = "f_n"
-    told = {"settable": "true", "valueReferences": states, "keptIn": trial.state}
+    told = {"settable": "true", "valueReferences": states, "keptIn": trial.state} | (
+        {"why": _plain(trial.why)} if trial.why else {}
+    )
     SubElement(annotation, "DiscreteStates", told | sampled)
     listed = SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
@@ -98,6 +102,11 @@ def dll_description(
         for index in known:
             SubElement(initial, "Unknown", index=str(index))
     return text_of(root)
+
+
+def _plain(words: str) -> str:
+    """What a file of XML can hold, as a DLL's own words may be in it."""
+    return "".join(c if c.isprintable() else " " for c in words)[:_LONGEST_WHY]
 
 
 def _dependencies(variables: tuple[HostVariable, ...], circuit: Model | None) -> dict[int, list[int]]:

@@ -1,23 +1,18 @@
 """An IEEE/CIGRE DLL as an FMU for co-simulation by FMI 2.0."""
 
 import hashlib
-import json
-import os
 import re
-import signal
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from pathlib import Path
-from typing import Any
 
 from fmus.toolchain.archive import digest_of, guid_of, write_archive
 from fmus.toolchain.c_text import identity_source
 from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, recipe
-from fmus.toolchain.temporary import own_folder, remove
+from fmus.vendor_dll.asking import ask
 from fmus.vendor_dll.description import dll_description
 from fmus.vendor_dll.device import Device
 from fmus.vendor_dll.interface import DATA_TYPES, DllInterface
@@ -26,7 +21,7 @@ from fmus.vendor_dll.state_trial import Trial
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
 _LONGEST = 60
-"""A DLL that takes longer to tell what it is, or for the trial [s]."""
+"""Time for a DLL to tell what it is, or for the trial, from when it is loaded [s]."""
 
 _FORMATS = (
     (b"\x7fELF\x02", "linux64", "a library for 64-bit Linux"),
@@ -89,15 +84,14 @@ def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -
     """
     path = Path(path).absolute()
     platform = platform_of(path, also)
-    answer, end = _ask(path, reader, "--try")
-    if end and not answer:
-        answer, again = _ask(path, reader)
-        if again and not answer:
-            raise DllError(
-                f"{path.name}: the process that reads it {end}: it crashes while it is "
-                "loaded, or its structures are of another layout; ask its author for a DLL that loads"
-            )
-        answer["trial"] = Trial("not tried", why=f"with inputs that move, the process that ran it {end}").as_json()
+    asked = ask(path, reader, _LONGEST, "--try")
+    answer = asked.found
+    if not answer:
+        again = ask(path, reader, _LONGEST)
+        if not again.found:
+            raise DllError(f"{path.name}: the process that reads it {again.end}: {again.why}")
+        why = f"with inputs that move, the process that ran it {asked.end}: {asked.why}"
+        answer = again.found | {"trial": Trial("not tried", why=why, passing=asked.passing).as_json()}
     if "error" in answer:
         raise DllError(f"{path.name}: {answer['error']}")
     interface = DllInterface.from_json(answer["interface"])
@@ -152,36 +146,6 @@ def _is_32_bit(path: Path) -> bool:
         head = file.read(4096)
     at = int.from_bytes(head[60:64], "little")
     return head[at : at + 4] == b"PE\0\0" and head[at + 4 : at + 6] == b"\x4c\x01"
-
-
-def _ask(path: Path, reader: str, *more: str) -> tuple[dict[str, Any], str]:
-    """The answer of the reading process, and how it ended where it gave none."""
-    folder = own_folder("dll")
-    try:
-        answer = folder / "answer.json"
-        command = [sys.executable, "-m", reader, str(path), str(answer), *more]
-        # Not sys.path: Python-backed FMUs lengthen it, and Linux takes no variable of more than 128 KiB.
-        search = filter(None, [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH")])
-        try:
-            done = subprocess.run(
-                command,
-                check=False,
-                cwd=folder,
-                timeout=_LONGEST,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
-            )
-        except subprocess.TimeoutExpired:
-            return {}, f"does not end within {_LONGEST} s"
-        if answer.exists():
-            found: dict[str, Any] = json.loads(answer.read_text(encoding="utf-8"))
-            return found, ""
-        name = signal.Signals(-done.returncode).name if done.returncode < 0 else f"exit code {done.returncode}"
-        return {}, f"ends with {name}"
-    finally:
-        remove(folder)
 
 
 def dll_fmu(

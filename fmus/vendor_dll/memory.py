@@ -2,7 +2,7 @@
 
 import ctypes as c
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -10,6 +10,30 @@ _WRITABLE, _LOADED, _RELOCATED_ONLY = 2, 1, 0x6474E552  # PF_W, PT_LOAD, PT_GNU_
 
 Region = tuple[int, int, int]
 """Base of the library, start and size of a stretch of its memory."""
+
+
+Note = Callable[[str], None]
+"""Takes what the DLL is doing, in words that follow "while"."""
+
+
+def unheard(_doing: str) -> None:
+    """Note nothing."""
+
+
+class LibraryEndedError(ValueError):
+    """The process that a DLL is in has ended.
+
+    Parameters
+    ----------
+    words
+        How.
+    passing
+        The reason lies in this machine, not in the DLL.
+    """
+
+    def __init__(self, words: str, *, passing: bool = False) -> None:
+        super().__init__(words)
+        self.passing = passing
 
 
 class Library(Protocol):
@@ -44,6 +68,8 @@ class LocalLibrary:
     ----------
     path
         Its file.
+    note
+        Told what is done with it.
 
     Raises
     ------
@@ -51,8 +77,9 @@ class LocalLibrary:
         If it cannot be loaded.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._library = path, c.CDLL(str(path))
+    def __init__(self, path: Path, note: Note = unheard) -> None:
+        note("it is loaded")
+        self._path, self._library, self._note = path, c.CDLL(str(path)), note
         self._kept: list[Any] = []
 
     def has(self, name: str) -> bool:
@@ -63,7 +90,10 @@ class LocalLibrary:
         """What a function returns for one pointer, as 64 bits."""
         function = getattr(self._library, name)
         function.restype, function.argtypes = c.c_int64, [c.c_void_p]
-        return int(function(argument))
+        self._note(f"{name} runs")
+        found = int(function(argument))
+        self._note(f"what {name} returned is read")
+        return found
 
     def read(self, address: int, size: int) -> bytes:
         """A stretch of memory."""

@@ -10,8 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fmus.vendor_dll.asking import note_beside
 from fmus.vendor_dll.interface import CALLS, DATA_TYPES, DllInterface, DllParameter, Number, Signal
-from fmus.vendor_dll.memory import Library, LocalLibrary
+from fmus.vendor_dll.memory import Library, LocalLibrary, Note
 from fmus.vendor_dll.state_trial import Trial, tried
 
 _TEXTS = (
@@ -21,6 +22,8 @@ _TEXTS = (
 _MOST = 100_000
 """More signals or parameters than this are taken for a structure of another layout."""
 
+_NOTE = 80
+"""Size of a note [bytes]."""
 
 _Text = Callable[[int | None], str]
 _Row = TypeVar("_Row", bound=c.Structure)
@@ -140,13 +143,26 @@ def read(library: Library, *, with_trial: bool) -> dict[str, Any]:
     return {"interface": interface.as_json(), "trial": trial.as_json()}
 
 
-def answer_for(load: Callable[[], Library], answer: Path, *, with_trial: bool) -> None:
+def _noting(path: Path) -> Note:
+    """Writes into a file, which is there from the first word on, and whole at any time."""
+    files: list[Any] = []
+
+    def note(doing: str) -> None:
+        if not files:
+            files.append(path.open("wb", buffering=0))
+        files[0].seek(0)
+        files[0].write(doing.encode().ljust(_NOTE))
+
+    return note
+
+
+def answer_for(load: Callable[[Note], Library], answer: Path, *, with_trial: bool) -> None:
     """Write what `read` finds into a file, or the error.
 
     Parameters
     ----------
     load
-        Loads the DLL.
+        Loads the DLL, and notes what it does from then on.
     answer
         The file.
     with_trial
@@ -154,11 +170,13 @@ def answer_for(load: Callable[[], Library], answer: Path, *, with_trial: bool) -
     """
     found: dict[str, Any]
     try:
-        found = read(load(), with_trial=with_trial)
+        found = read(load(_noting(note_beside(answer))), with_trial=with_trial)
     except (OSError, ValueError) as error:
         found = {"error": str(error)}
     answer.write_text(json.dumps(found), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    answer_for(lambda: LocalLibrary(Path(sys.argv[1])), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"])
+    answer_for(
+        lambda note: LocalLibrary(Path(sys.argv[1]), note), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"]
+    )

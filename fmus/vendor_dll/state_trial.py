@@ -39,6 +39,8 @@ class Trial:
         Start and size of each stretch of the library's memory that belongs to the state [bytes].
     why
         Reason in words where nothing was tried.
+    passing
+        That reason lies in this machine at this time, so that the DLL is tried again at the next call.
     """
 
     state: str
@@ -46,6 +48,7 @@ class Trial:
     floats: tuple[int, ...] = ()
     regions: tuple[tuple[int, int], ...] = ()
     why: str = ""
+    passing: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """For another process."""
@@ -56,7 +59,7 @@ class Trial:
         """What `as_json` gave."""
         places = {name: tuple(data[name]) for name in ("doubles", "floats")}
         regions = tuple((start, size) for start, size in data["regions"])
-        return cls(data["state"], **places, regions=regions, why=data["why"])
+        return cls(data["state"], **places, regions=regions, why=data["why"], passing=data["passing"])
 
 
 class _Instance(c.Structure):
@@ -147,7 +150,7 @@ def tried(library: Library, interface: DllInterface) -> Trial:
         try:
             return _tried(_Host(library, interface, largest), library)
         except ValueError as error:
-            refused = Trial("not tried", why=str(error))
+            refused = Trial("not tried", why=str(error), passing=getattr(error, "passing", False))
     return refused
 
 

@@ -44,7 +44,9 @@ def run(options: argparse.Namespace) -> int:
     if missing := missing_binary(description):
         console.print(f"[bold]It cannot run here[/bold]: {escape(missing)}", highlight=False)
     if description.kept_in:
-        console.print(f"a vendor's DLL: {KEPT_IN.get(description.kept_in, description.kept_in)}", highlight=False)
+        why = f" ({description.kept_why})" if description.kept_why else ""
+        kept = KEPT_IN.get(description.kept_in, description.kept_in)
+        console.print(escape(f"a vendor's DLL: {kept}{why}"), highlight=False)
     if found.linear_model is not None:
         console.print(escape(_in_words(found.linear_model)), highlight=False)
     for table in fmu_variables(description):

@@ -125,6 +125,8 @@ class FmuDescription:
         Parameter with the frequency at which its phase quantities repeat [Hz]; empty where it has none.
     kept_in
         Where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
+    kept_why
+        Why that was not tried, or is hidden, in words.
     """
 
     path: Path
@@ -155,6 +157,7 @@ class FmuDescription:
     sample_time: float | None = None
     frequency: str = ""
     kept_in: str = ""
+    kept_why: str = ""
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -374,7 +377,8 @@ def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, Var
             f"{path}: DiscreteStates under VendorAnnotations has sampleTime {(told or '')[:20]!r} and frequency "
             f"{frequency[:40]!r}; a time above 0 and a variable's name are needed: export it again"
         )
-    return {"sample_time": sample_time, "frequency": frequency, "kept_in": listed.get("keptIn", "")[:20]}
+    kept = {"kept_in": listed.get("keptIn", "")[:20], "kept_why": listed.get("why", "")[:500]}
+    return {"sample_time": sample_time, "frequency": frequency, **kept}
 
 
 def _states(path: Path, md: ModelDescription) -> list[str]:

@@ -9,25 +9,26 @@ from pathlib import Path
 
 from fmus.vendor_dll.memory import LocalLibrary
 from fmus.vendor_dll.reading import answer_for
+from orchestrator.errors import InputError
 from orchestrator.fmi import wine
 from orchestrator.fmi.confinement import LAYERS, Means, confine
 
 
 def _read(library: Path, answer: Path, *, with_trial: bool) -> None:
     confine(Means(), LAYERS, answer.parent, [library])
-    answer_for(lambda: LocalLibrary(library), answer, with_trial=with_trial)
+    answer_for(lambda note: LocalLibrary(library, note), answer, with_trial=with_trial)
 
 
 def _read_under_wine(library: Path, answer: Path, *, with_trial: bool) -> None:
     from orchestrator.fmi.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
 
-    programs = compile_programs()
     try:
+        programs = compile_programs()
         confine(Means(), LAYERS, answer.parent, [library, *programs], windows=True)
-    except wine.NoWineError as error:
+    except (wine.NoWineError, InputError) as error:
         answer.write_text(json.dumps({"error": str(error)}), encoding="utf-8")
         return
-    answer_for(lambda: WineLibrary(library), answer, with_trial=with_trial)
+    answer_for(lambda note: WineLibrary(library, note), answer, with_trial=with_trial)
     wine.in_process[0].close()
 
 

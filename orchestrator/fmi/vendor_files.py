@@ -1,6 +1,7 @@
 """A vendor's DLL, or a device's file around one, wherever an FMU can stand: its FMU is built once and kept."""
 
 import hashlib
+import logging
 import sys
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,12 @@ DEVICE_ENDING = ".toml"
 _KEPT = "dlls"
 """Not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own."""
 
+_FOR_NOW = "for-now"
+"""Folder beside a kept FMU with one whose DLL could not be tried at that time; each process tries it once."""
+
+_log = logging.getLogger("gfor")
+_tried_now: dict[Path, Path] = {}
+"""FMUs for now that this process made, by where they would be kept for good."""
 
 READER = "orchestrator.fmi.dll_reading"
 """Module whose process, closed off, reads a DLL; also one for Windows, under Wine."""
@@ -28,13 +35,16 @@ def foreign_platforms(library: Path) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        If a DLL for Windows needs Wine, which is not there.
+        If a DLL for Windows needs Wine, which is not there, or its program cannot be compiled.
     """
     try:
         with library.open("rb") as file:
             windows = file.read(2) == b"MZ" and sys.platform == "linux"
         if windows:
+            from orchestrator.fmi.wine_program import compile_programs  # noqa: PLC0415 - numpy, for others in vain
+
             wine.find_wine()
+            compile_programs()  # once, for minutes: before the DLL's time is taken
     except OSError:
         return ()  # who reads it says why it cannot
     except wine.NoWineError as error:
@@ -71,9 +81,16 @@ def as_fmu(path: Path) -> Path:
         kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
         if intact(kept):
             return kept
+        if (for_now := _tried_now.get(kept)) is not None and intact(for_now):
+            return for_now
         dll = read_dll(library, READER, foreign_platforms(library))
         device = None if table is None else device_of(path, table, dll.interface)
-        return keep(kept, _archive(dll_members(dll, device=device)))
+        content = _archive(dll_members(dll, device=device))
+        if not dll.trial.passing:
+            return keep(kept, content)
+        _log.warning("%s: its state is not saved this time: %s; the next call tries it anew", path, dll.trial.why)
+        _tried_now[kept] = keep(kept.parent / _FOR_NOW / kept.name, content)
+        return _tried_now[kept]
     except (DllError, DeviceFileError) as error:
         raise InputError(str(error)) from error
 

@@ -3,14 +3,16 @@
 import ctypes
 import mmap
 import os
+import signal
 import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.compiler import TARGETS, compile_for, compile_here, joined_source
 from fmus.toolchain.temporary import own_folder, remove
-from fmus.vendor_dll.memory import Region
+from fmus.vendor_dll.memory import LibraryEndedError, Note, Region, unheard
 from orchestrator.errors import InputError
 from orchestrator.fmi import wine
 from orchestrator.fmi.mailbox import DIED, HUNG, Client, mailbox_library
@@ -31,11 +33,19 @@ class _Talk(ctypes.Structure):
 
 
 _ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0
+_FROM_OUTSIDE = tuple(
+    -getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT") if hasattr(signal, name)
+)
+"""How a process is ended by others."""
+_TO_END = 2.0
+"""For a program that no longer answers to end [s]."""
+_WORDS = 4000
+"""Most bytes of its last words that are read."""
 _idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []
 """Programs without an instance, in a process that is closed off, with the files of their shared memory."""
 
 
-class WineEndedError(ValueError):
+class WineEndedError(LibraryEndedError):
     """The program under Wine has ended."""
 
 
@@ -87,6 +97,8 @@ class WineProgram:
         The library for Windows.
     patience
         Time for one answer [s].
+    note
+        Told when Wine has started, and the library is loaded.
 
     Raises
     ------
@@ -96,7 +108,7 @@ class WineProgram:
         If the library cannot be loaded.
     """
 
-    def __init__(self, library: Path, patience: float = 1e300) -> None:
+    def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
         self._folder: Path | None = None
         if wine.in_process:
             self._server = wine.in_process[0]
@@ -106,6 +118,9 @@ class WineProgram:
             self._server = wine.Server(self._folder, tied=False)
         try:
             self._begin(patience)
+            if note is not None:
+                self.ask(ALLOCATE, 1)  # it answers as soon as Wine has started
+                note("it is loaded")
             self.handle = self._load(library)
         except BaseException:
             self.close()
@@ -168,8 +183,29 @@ class WineProgram:
         if status == HUNG:
             raise WineEndedError("gives no answer")
         if status >= DIED:
-            raise WineEndedError("ends under Wine: it crashes or ends its own process")
+            raise self._ended()
         return int(self._talk.result), bytes(self._memory[self._data : self._data + answer])
+
+    def _ended(self) -> WineEndedError:
+        try:
+            code = self._process.wait(_TO_END)
+        except subprocess.TimeoutExpired:
+            code = 0
+        if code in _FROM_OUTSIDE:
+            name = signal.Signals(-code).name
+            return WineEndedError(
+                f"its process under Wine ends with {name}: something else ended it, such as the system for want of "
+                "memory; try again",
+                passing=True,
+            )
+        return WineEndedError(f"its process under Wine ends: {self._said() or 'it crashes or ends its own process'}")
+
+    def _said(self) -> str:
+        """Last words of the program, in the mailbox's log: the crash."""
+        at = mailbox_library().mailbox_offset(1)
+        size = int.from_bytes(self._memory[at + 4 : at + 8], sys.byteorder)
+        words = self._memory[at + 8 : at + 8 + min(max(size, 0), _WORDS)].split(b"\0")
+        return words[2].decode("utf-8", "replace") if len(words) > 2 else ""
 
     def _load(self, library: Path) -> int:
         handle, _ = self.ask(LOAD, data=f"Z:{library}".encode() + b"\0")
@@ -201,6 +237,8 @@ class WineLibrary:
     ----------
     path
         Its file.
+    note
+        Told what is done with it.
 
     Raises
     ------
@@ -208,13 +246,36 @@ class WineLibrary:
         If it cannot be loaded.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._program = WineProgram(path)
+    def __init__(self, path: Path, note: Note = unheard) -> None:
+        self._doing, self._note = "Wine starts", note
+        try:
+            self._program = WineProgram(path, note=self._now)
+        except WineEndedError as error:
+            raise self._named(error) from error
         self._functions: dict[str, int] = {}
+
+    def _now(self, doing: str) -> None:
+        self._doing = doing
+        self._note(doing)
+
+    def _named(self, error: WineEndedError) -> WineEndedError:
+        """With what the DLL was doing, and what that means."""
+        if error.passing:
+            return WineEndedError(f"while {self._doing}, {error}", passing=True)
+        remedy = "ask its author for a DLL that does not"
+        if self._doing.startswith("what"):
+            remedy = "its structures are of another layout; ask its author for a DLL of the interface's layout"
+        return WineEndedError(f"while {self._doing}, {error}; {remedy}")
+
+    def _ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
+        try:
+            return self._program.ask(command, *arguments, data=data, answer=answer)
+        except WineEndedError as error:
+            raise self._named(error) from error
 
     def _function(self, name: str) -> int:
         if name not in self._functions:
-            self._functions[name] = self._program.ask(SYMBOL, data=name.encode() + b"\0")[0]
+            self._functions[name] = self._ask(SYMBOL, data=name.encode() + b"\0")[0]
         return self._functions[name]
 
     def has(self, name: str) -> bool:
@@ -223,11 +284,15 @@ class WineLibrary:
 
     def call(self, name: str, argument: int = 0) -> int:
         """What a function returns for one pointer, as 64 bits."""
-        return self._program.ask(CALL, self._function(name), argument)[0]
+        function = self._function(name)
+        self._now(f"{name} runs")
+        found = self._ask(CALL, function, argument)[0]
+        self._now(f"what {name} returned is read")
+        return found
 
     def read(self, address: int, size: int) -> bytes:
         """A stretch of memory."""
-        return self._program.ask(READ, address, size, answer=size)[1]
+        return self._ask(READ, address, size, answer=size)[1]
 
     def text(self, address: int | None) -> bytes:
         """A text that ends with a zero; empty where there is none."""
@@ -239,11 +304,11 @@ class WineLibrary:
 
     def write(self, address: int, content: bytes) -> None:
         """Change a stretch of memory."""
-        self._program.ask(WRITE, address, len(content), data=content)
+        self._ask(WRITE, address, len(content), data=content)
 
     def allocate(self, size: int) -> int:
         """Address of new memory, all zero, which is never given back."""
-        return self._program.ask(ALLOCATE, size)[0]
+        return self._ask(ALLOCATE, size)[0]
 
     def regions(self) -> list[Region] | None:
         """Sections that may be written, by the table of the file's head."""

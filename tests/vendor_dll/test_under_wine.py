@@ -144,6 +144,12 @@ def test_a_dll_that_crashes_while_it_is_loaded_is_refused(under_wine, tmp_path):
         read(compiled(lag(head=head), tmp_path, platform="win64"))
 
 
+def test_a_crash_under_wine_names_the_function_that_was_called(under_wine, tmp_path):
+    source = lag().replace("{ return &INFO; }", "{ *(volatile int *)16 = 0; return &INFO; }")
+    with pytest.raises(DllError, match=r"while Model_GetInfo runs, .* under Wine ends: crash .* memory that is not"):
+        read(compiled(source, tmp_path, platform="win64"))
+
+
 ESCAPE = """
 #include <stdio.h>
 static int attempted(void) {
