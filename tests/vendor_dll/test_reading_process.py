@@ -59,6 +59,7 @@ def test_a_trial_that_was_killed_from_outside_is_no_lasting_verdict(tmp_path):
 
 def test_a_start_that_takes_too_long_is_not_laid_on_the_dll(tmp_path, monkeypatch):
     monkeypatch.setattr(asking, "BEFORE_IT_STARTS", 0.0)
+    monkeypatch.setattr(asking, "note_beside", lambda answer: answer.with_name("not there yet"))
     with pytest.raises(DllError, match=r"time ran out before the DLL was loaded.*try again"):
         read_dll(compiled(lag(head="__attribute__((constructor)) static void b(void) { for (;;) {} } "), tmp_path))
 
