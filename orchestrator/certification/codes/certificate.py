@@ -61,9 +61,7 @@ class CodeCertificate:
     @property
     def missing(self) -> tuple[str, ...]:
         """What keeps a test that nothing fails from being passed."""
-        done = {v.row.name for v in self.verdicts if v.judged}
-        rows = tuple(f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only)
-        return rows + self.code.left_out + self.departures
+        return missing_of(self.code, self.verdicts, self.departures)
 
     @property
     def verdict(self) -> str:
@@ -77,21 +75,64 @@ class CodeCertificate:
 
     def sentence(self) -> str:
         """The result as a sentence."""
-        judged = [v for v in self.verdicts if v.judged]
-        bad = [v for v in judged if not v.accepted]
-        subject = f"The converter {self.description.model_name!r}"
-        rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
-        if bad:
-            names = "; ".join(f"{v.row.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
-            said = f"{subject} {FAILS} {self.code.title}: {rows} Not accepted: {names}."
-        elif self.verdict == INCOMPLETE:
-            said = f"The test is {INCOMPLETE}: {len(self.missing)} parts of {self.code.title} were not tested. "
-            said += f"{subject}: {rows}"
-        else:
-            said = f"{subject} {PASSES} {self.code.title}: {rows}"
-        if self.acceptance is not None and self.refused:
-            said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
-        return said
+        return sentence_of(self.code, self.description.model_name, self.verdicts, self.missing, self.acceptance)
+
+
+def missing_of(code: GridCode, verdicts: Sequence[RowVerdict], departures: Sequence[str]) -> tuple[str, ...]:
+    """What keeps a test that nothing fails from being passed.
+
+    Parameters
+    ----------
+    code
+        The code.
+    verdicts
+        On the rows that were run.
+    departures
+        From `departures_of`.
+    """
+    done = {v.row.name for v in verdicts if v.judged}
+    rows = tuple(f"row {r.name}" for r in code.rows if r.name not in done and not r.shown_only)
+    return (*rows, *code.left_out, *departures)
+
+
+def sentence_of(
+    code: GridCode,
+    model: str,
+    verdicts: Sequence[RowVerdict],
+    missing: Sequence[str],
+    acceptance: Acceptance | None,
+) -> str:
+    """The result as a sentence.
+
+    Parameters
+    ----------
+    code
+        The code.
+    model
+        Name of the converter's model.
+    verdicts
+        On the rows that were run.
+    missing
+        From `missing_of`.
+    acceptance
+        The acceptance tests of the FMU; None where there were none.
+    """
+    judged = [v for v in verdicts if v.judged]
+    bad = [v for v in judged if not v.accepted]
+    verdict = verdict_of([bool(v.accepted) for v in judged], len(missing))
+    subject = f"The converter {model!r}"
+    rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
+    if bad:
+        names = "; ".join(f"{v.row.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
+        said = f"{subject} {FAILS} {code.title}: {rows} Not accepted: {names}."
+    elif verdict == INCOMPLETE:
+        said = f"The test is {INCOMPLETE}: {len(missing)} parts of {code.title} were not tested. "
+        said += f"{subject}: {rows}"
+    else:
+        said = f"{subject} {PASSES} {code.title}: {rows}"
+    if acceptance is not None and not acceptance.trusted:
+        said += f" Acceptance tests failed: {', '.join(acceptance.faults)}; do not rely on the FMU as it is."
+    return said
 
 
 def departures_of(values: Mapping[str, Value], f_n: float, code: GridCode) -> tuple[str, ...]:

@@ -1,18 +1,21 @@
 """Whether a code's certificate still holds: its hashes, and its verdict judged again from its responses."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from orchestrator.acceptance.runner import file_hash
+from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import departures_of, verdict_of
+from orchestrator.certification.codes.certificate import departures_of, missing_of, sentence_of, verdict_of
 from orchestrator.certification.codes.record import FORMAT, finding_json
-from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.codes.row import GridCode
+from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.verification import Verification
 from orchestrator.errors import InputError
@@ -28,7 +31,7 @@ def read_code_certificate(path: Path) -> tuple[Path, dict[str, Any]] | None:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         return None
     wanted = {"code": str, "rows": list, "verdict": str, "values": dict, "declared": dict, "files": dict, "f_n": float,
-              "missing": list, "sentence": str, "departures": list}  # fmt: skip
+              "missing": list, "sentence": str, "departures": list, "left_out": list, "model": str}  # fmt: skip
     bad = [name for name, kind in wanted.items() if not isinstance(content.get(name), kind)]
     if bad or content["code"] not in {*CODES, *BY_DECLARATION}:
         raise InputError(
@@ -65,11 +68,15 @@ def verify_code(folder: Path, content: dict[str, Any]) -> Verification:
 
 
 def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
-    code, faults, accepted = code_for(content["code"], content.get("declared", {})), [], []
+    code = code_for(content["code"], content.get("declared", {}))
     rows = {row.name: row for row in code.rows}
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
+        kept = [str(name).removeprefix("time_") for name in data.coords]
+        faults, verdicts = _of_the_table(code, content, kept), []
         for stated in content["rows"]:
-            row = rows[stated["row"]]
+            row = rows.get(stated["row"])
+            if row is None:
+                continue
             prefix = f"{row.name}."
             signals = {str(n).removeprefix(prefix): data[n].values for n in data.data_vars if str(n).startswith(prefix)}
             times = data[f"time_{row.name}"].values
@@ -78,15 +85,50 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
             same = [finding_json(f) for f in again.findings] == stated["criteria"]
             if not same or (again.judged, again.accepted) != (stated["judged"], stated["accepted"]):
                 faults.append(f"row {row.name}: its response gives other findings than {JSON} states")
-            if again.judged:
-                accepted.append(bool(again.accepted))
-    if content["departures"] != list(departures_of(content["values"], content["f_n"], code)):
+            verdicts.append(again)
+    return faults + _of_the_verdict(code, content, verdicts)
+
+
+def _of_the_table(code: GridCode, content: dict[str, Any], kept: Sequence[str]) -> list[str]:
+    """Rows of the record against the code's table, the files and the responses: `gfor certify` writes all of a table.
+
+    Row files of another code may lie in the folder, from an earlier certificate; those of the record's files may not.
+    """
+    recorded, table = [stated["row"] for stated in content["rows"]], [row.name for row in code.rows]
+    files = [row.name for row in code.rows if case_name(row.name) in content["files"]]
+    files += [name for name in content["files"] if name.startswith("row_") and name not in map(case_name, table)]
+    compared = (
+        ("rows of the code's table that the record has not", [name for name in table if name not in recorded]),
+        ("rows of the record that the code's table has not", [name for name in recorded if name not in table]),
+        ("rows that the record has twice", [n for k, n in enumerate(recorded) if n in recorded[:k]]),
+        ("files of rows that the record has not", [name for name in files if name not in recorded]),
+        (f"rows of {RESPONSES} that the record has not", [name for name in kept if name not in recorded]),
+    )
+    return [f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in compared if names]
+
+
+def _of_the_verdict(code: GridCode, content: dict[str, Any], verdicts: Sequence[RowVerdict]) -> list[str]:
+    """What is said of all rows together: what is missing, the verdict, and its sentence with the counts."""
+    departures = departures_of(content["values"], content["f_n"], code)
+    missing = missing_of(code, verdicts, departures)
+    wanted = verdict_of([bool(v.accepted) for v in verdicts if v.judged], len(missing))
+    sentence = sentence_of(code, content["model"], verdicts, missing, _acceptance(content["acceptance"]))
+    faults = []
+    if content["departures"] != list(departures):
         faults.append("the departures from the code are not those of its values and its rated frequency")
-    done = {stated["row"] for stated in content["rows"] if stated["judged"]}
-    absent = [row.name for row in code.rows if not row.shown_only and row.name not in done]
-    wanted = verdict_of(accepted, len(absent) + len(code.left_out) + len(content["departures"]))
+    if content["missing"] != list(missing):
+        faults.append(f"'missing' is not what its rows leave: {'; '.join(missing) or 'nothing'}")
+    if content["left_out"] != list(code.left_out):
+        faults.append("'left_out' is not what the code's table leaves out")
     if wanted != content["verdict"]:
         faults.append(f"the verdict is {content['verdict']!r}; its rows come to {wanted!r}")
-    if wanted not in content["sentence"]:
-        faults.append(f"the sentence does not say {wanted!r}, to which its rows come")
+    if sentence != content["sentence"]:
+        faults.append(f"the sentence is not the one to which its rows come: {sentence!r}")
     return faults
+
+
+def _acceptance(report: dict[str, Any] | None) -> Acceptance | None:
+    if report is None:
+        return None
+    failed = tuple(dict.fromkeys(check["fault"] for check in report["checks"] if check["verdict"] == "fail"))
+    return Acceptance(report["trusted"], failed, report)

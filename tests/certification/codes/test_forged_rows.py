@@ -1,0 +1,111 @@
+"""Certificates of codes from which rows were taken, or into which some were put, with all hashes made to fit."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from orchestrator.acceptance.runner import file_hash
+from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
+from orchestrator.certification.codes.record import save_certificate
+from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
+from orchestrator.certification.request import CertificationRequest
+from orchestrator.results.storage import save_netcdf
+
+CODE = CODES["fingrid"]
+
+
+class _Described:
+    model_name = "still"
+
+
+@pytest.fixture
+def fails(tmp_path, monkeypatch):
+    """A certificate of Fingrid's table on powers that never move: jumps are not opposed, and the rest is met."""
+    results = {}
+    for row in CODE.rows:
+        programme = row.programme(50.0)
+        times = np.arange(0, programme.stop + 1e-3, 1e-3)
+        one, angle = np.ones(times.shape), programme.source_angle(times, 50.0)
+        signals = {"p": 0.5 * one, "q": 0.1 * one, "v": one, "v_re": np.cos(angle), "v_im": np.sin(angle)}
+        results[row.name] = BenchResult(row.name, times, signals)
+        (tmp_path / case_name(row.name)).write_text("", encoding="utf-8")
+    fmu = tmp_path / "converter.fmu"
+    fmu.write_bytes(b"")
+    verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
+    request = CertificationRequest(fmu)
+    save_certificate(CodeCertificate(request, CODE, _Described(), 50.0, results, verdicts), tmp_path)
+    assert verify_code(*read_code_certificate(tmp_path)).holds
+    return tmp_path
+
+
+def sealed(folder, content):
+    """Make the page's mark and all hashes fit."""
+    page = folder / HTML
+    old = figures_hash(json.loads((folder / JSON).read_text(encoding="utf-8")))
+    page.write_text(page.read_text(encoding="utf-8").replace(old, figures_hash(content)), encoding="utf-8")
+    content["files"] = {name: file_hash(folder / name) for name in content["files"]}
+    content["seal"] = seal_of(content)
+    (folder / JSON).write_text(json.dumps(content), encoding="utf-8")
+    return " ".join(verify_code(*read_code_certificate(folder)).faults)
+
+
+def without(content, name):
+    """The record without a row, and with the verdict, sentence and missing parts to which the others come."""
+    content["rows"] = [row for row in content["rows"] if row["row"] != name]
+    content["verdict"], content["missing"] = "incomplete", [f"row {name}", *CODE.left_out]
+    content["sentence"] = (
+        f"The test is incomplete: 2 parts of {CODE.title} were not tested. "
+        "The converter 'still': 3 of 3 judged rows are accepted."
+    )
+    return content
+
+
+def test_a_failed_row_that_was_taken_out_is_named(fails, request):
+    _, content = read_code_certificate(fails)
+    assert content["verdict"] == "fails"
+    faults = sealed(fails, without(content, "jumps"))
+    for what in ("of the code's table that", "of rows that", f"of {RESPONSES} that"):
+        assert f"{what} the record has not: jumps" in faults
+    code, said, _ = request.getfixturevalue("gfor")("verify", fails, "--files-only")
+    assert code == 5
+    assert "The certificate does not hold" in said
+
+
+def test_a_failed_row_that_was_taken_out_with_its_file_and_response_is_named(fails):
+    """The rest is a certificate that could have been written, but for the table, of which `gfor certify` runs all."""
+    _, content = read_code_certificate(fails)
+    del content["files"][case_name("jumps")]
+    (fails / case_name("jumps")).unlink()
+    with xr.open_dataset(fails / RESPONSES, engine="scipy") as data:
+        rest = data.load().drop_vars([n for n in data.variables if "jumps" in str(n)])
+    save_netcdf(rest, fails / RESPONSES)
+    assert sealed(fails, without(content, "jumps")) == "rows of the code's table that the record has not: jumps"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("more", "that the code's table has not: more"), ("dip", "that the record has twice: dip")]
+)
+def test_a_row_that_is_too_much_is_named(fails, name, words):
+    _, content = read_code_certificate(fails)
+    content["rows"].append(content["rows"][0] | {"row": name})
+    (fails / case_name("more")).write_text("", encoding="utf-8")
+    content["files"][case_name(name)] = ""
+    assert words in sealed(fails, content)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [("sentence", "The converter 'still' fails: 9 of 9 judged rows are accepted.", "the sentence is not"),
+     ("missing", [], "'missing' is not what its rows leave"), ("left_out", [], "'left_out' is not what")],
+)  # fmt: skip
+def test_a_count_or_a_part_that_is_not_of_the_rows_is_named(fails, key, value, words):
+    _, content = read_code_certificate(fails)
+    content[key] = value
+    assert words in sealed(fails, content)
