@@ -5,6 +5,7 @@ import pytest
 
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps
 from orchestrator.certification.codes.row_verdict import judge_row
 
@@ -80,6 +81,61 @@ def test_a_plant_that_trips_in_silence_is_not_stable(at, lasts):
     assert not found[0].accepted
     assert f"feeds in nothing from t = {at:g} s on" in found[0].text
     assert not any(f.accepted for f in found)
+
+
+@pytest.mark.parametrize("left", [0.0, 1e-3])
+@pytest.mark.parametrize("lasts", [0.09, 0.1])
+def test_a_plant_that_is_gone_in_parts_or_leaves_a_little_has_tripped(left, lasts):
+    """0.09 s in every 0.1 s, and 0.1 % of its power: a second of it."""
+    gone = (TIMES >= 3) & (TIMES < 4) & (lasts > (TIMES - 3) % 0.1)
+    found = judged(np.where(gone, left, 1) * opposing(), q=np.where(gone, left, 1) * 0.1).findings
+    assert not found[0].accepted
+    assert "feeds in nothing from t = 3" in found[0].text
+    assert not any(f.accepted for f in found)
+
+
+def test_a_power_that_a_droop_takes_to_nothing_is_no_trip():
+    """A droop of 4 % at 51 Hz and half power, for two seconds; with the rated frequency the same is a trip."""
+    at_51_hz = np.where((TIMES > 2) & (TIMES < 5), 2 * np.pi * (TIMES - 2), 0.0)
+    gone = (TIMES >= 2.5) & (TIMES < 4.5)
+    for angle, tripped in ((at_51_hz, None), (0 * TIMES, pytest.approx(2.5))):
+        signals = {"p": np.where(gone, 1e-3, 0.5), "q": np.where(gone, 1e-4, 0.1), "v": np.ones(TIMES.shape),
+                   "v_re": np.cos(angle), "v_im": np.sin(angle)}  # fmt: skip
+        assert MeasuredRow(TIMES, signals, 50.0, (1.0,)).tripped == tripped
+
+
+def slipping(angle):
+    """ERCOT's jumps on a plant behind 0.15 pu whose voltage inside turns by an angle of the time [rad]."""
+    programme = jumps(3.0, 0.5, (-10.0, 10.0))
+    times = np.arange(0, programme.stop + 1e-3, 1e-3)
+    outer = np.exp(1j * programme.source_angle(times, 60.0))
+    inside = np.exp(1j * (0.25 + angle(times)))
+    current = (inside - outer) / (0.15j + programme.impedance)
+    v = inside - 0.15j * current
+    power = v * np.conj(current)
+    signals = {"p": power.real, "q": power.imag, "v": np.abs(v), "v_re": v.real, "v_im": v.imag}
+    (row,) = [row for row in CODES["ercot"].rows if row.name == "phase_jumps"]
+    return judge_row(row, BenchResult(row.name, times, signals), 60.0).findings[0]
+
+
+@pytest.mark.parametrize("turns", [1, -1, 3])
+@pytest.mark.parametrize(("begin", "told"), [(1.6, 1), (7.0, 6), (0.2, 0), (5.7, 1)])
+def test_a_turn_out_and_back_within_a_hold_or_before_the_first_event_is_a_slip(turns, begin, told):
+    """In 0.2 s each; the ends of all holds are where they were, but for the one in whose end it turns."""
+    found = slipping(lambda t: 2 * np.pi * turns * np.interp(t - begin, [0, 0.2, 0.3, 0.5], [0, 1, 1, 0]))
+    assert not found.accepted
+    assert f"it slips after t = {told} s" in found.text
+
+
+def test_a_turn_that_is_done_before_the_first_event_is_a_slip():
+    found = slipping(lambda t: 2 * np.pi * np.clip((t - 0.2) / 0.3, 0, 1))
+    assert "it slips after t = 0 s" in found.text
+
+
+@pytest.mark.parametrize("degrees", [60, -60, 120])
+def test_a_swing_that_turns_back_is_no_slip(degrees):
+    """One second long, as after a jump."""
+    assert slipping(lambda t: np.radians(degrees) * np.exp(-np.clip(t - 1, 0, None) / 0.3) * (t > 1)).accepted
 
 
 def test_a_plant_at_rest_without_power_has_not_tripped():
