@@ -15,9 +15,9 @@ from orchestrator.black_box.coupled_modes import modes_with_boxes
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import ComponentTable
-from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
 from orchestrator.interactions.exchange import exchanged_case, require_same_flow
 from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.failure import why_failed
 from orchestrator.points.key import same_case
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import ModesResult, compute_modes, running
@@ -167,13 +167,9 @@ def compute_system(task: SystemTask) -> SystemRecord:
     with alone():
         try:
             return _record(_modes(case, task))
-        except CaseError as error:
-            of_fmu = isinstance(error.__cause__, ComponentError)  # which may start another time
-            return SystemRecord(error="; ".join(str(problem) for problem in error.problems), lasting=not of_fmu)
-        except CosimError as error:
-            return SystemRecord(error=str(error), lasting=isinstance(error, AnalysisError))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other systems
-            return SystemRecord(error=f"{type(error).__name__}: {error}", lasting=False)
+            text, lasting = why_failed(error)
+            return SystemRecord(error=text, lasting=lasting)
 
 
 def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:

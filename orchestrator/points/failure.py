@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from orchestrator.errors import CosimError
+from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
 
 
 class Failing(Protocol):
@@ -30,3 +30,18 @@ def failure_kept(result: Failing) -> Iterator[None]:
         result.failure = str(error)
     except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
         result.failure = f"{type(error).__name__}: {error}"
+
+
+def why_failed(error: Exception) -> tuple[str, bool]:
+    """What ended the computation of a point, and whether the same would come out again.
+
+    Parameters
+    ----------
+    error
+        An FMU may start another time; what is wrong in a case or in its equations stays so.
+    """
+    if isinstance(error, CaseError):
+        return "; ".join(str(problem) for problem in error.problems), not isinstance(error.__cause__, ComponentError)
+    if isinstance(error, CosimError):
+        return str(error), isinstance(error, AnalysisError)
+    return f"{type(error).__name__}: {error}", False

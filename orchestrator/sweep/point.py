@@ -12,8 +12,8 @@ from orchestrator.analysis.threads import alone
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
 from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.failure import why_failed
 from orchestrator.points.key import fingerprint, key_of, reference_to, same_case, scenario_content
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import ModesResult, compute_modes
@@ -162,13 +162,9 @@ def compute_point(task: SweepPointTask) -> PointRecord:
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
             return _record(compute_modes(prepared, task.frequency_range))
-        except CaseError as error:
-            of_fmu = isinstance(error.__cause__, ComponentError)  # which may start another time
-            return PointRecord(error="; ".join(str(problem) for problem in error.problems), lasting=not of_fmu)
-        except CosimError as error:
-            return PointRecord(error=str(error), lasting=isinstance(error, AnalysisError))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
-            return PointRecord(error=f"{type(error).__name__}: {error}", lasting=False)
+            text, lasting = why_failed(error)
+            return PointRecord(error=text, lasting=lasting)
 
 
 def _record(result: ModesResult) -> PointRecord:
