@@ -25,6 +25,7 @@ from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.process_end import ProcessFault
 from orchestrator.fmi.protection import Protection
 from orchestrator.fmi.refusal import FATAL, check_log, refusal
 from orchestrator.fmi.remote_calls import RemoteCalls
@@ -45,7 +46,7 @@ class ProcessEndedError(Exception):
         What happened, in which call and when.
     """
 
-    def __init__(self, fault: str, how: str) -> None:
+    def __init__(self, fault: ProcessFault, how: str) -> None:
         self.fault, self.how = fault, how
         super().__init__(f"{fault}: {how}")
 
@@ -252,17 +253,17 @@ class FmuProcess:
     # -- how it ended ----------------------------------------------------------------------------
 
     def _tampered(self, seen: str) -> ProcessEndedError:
-        return self._end("tampering", f"it wrote into the memory between the processes: {seen}")
+        return self._end(ProcessFault.TAMPERING, f"it wrote into the memory between the processes: {seen}")
 
     def _given_up(self, how: str) -> ProcessEndedError:
-        return self._end("hang", how)
+        return self._end(ProcessFault.HANG, how)
 
     def _died(self, call: str) -> ProcessEndedError:
         fault, how = self._process.fault()
-        said = "" if fault == "output flood" else self._process.last_words()
+        said = "" if fault is ProcessFault.OUTPUT else self._process.last_words()
         return self._end(fault, f"{how} in {self._where(call)}{f'; it wrote: {said}' if said else ''}")
 
-    def _end(self, fault: str, how: str) -> ProcessEndedError:
+    def _end(self, fault: ProcessFault, how: str) -> ProcessEndedError:
         self._process.end()
         self._ended = ProcessEndedError(fault, how)
         return self._ended
@@ -270,7 +271,7 @@ class FmuProcess:
     def close(self) -> None:
         """End the process and remove what was written for it."""
         self._process.close()
-        self._ended = self._ended or ProcessEndedError("exit", "its process was closed")
+        self._ended = self._ended or ProcessEndedError(ProcessFault.EXIT, "its process was closed")
 
 
 class HostedComponent(RemoteCalls, Derived):

@@ -17,7 +17,7 @@ from orchestrator.fmi.confinement import LAYERS
 from orchestrator.fmi.environment import environment
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.mailbox import Mailbox, mailbox_library, shared_memory
-from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.process_end import ProcessFault, fault_of_exit, last_line
 from orchestrator.fmi.protection import Protection
 
 _PATIENCE = 5.0
@@ -109,11 +109,11 @@ class ConfinedProcess:
             self._process.wait(seconds)
         return not self.running
 
-    def fault(self) -> tuple[str, str]:
+    def fault(self) -> tuple[ProcessFault, str]:
         """Name of the fault that ended it, and what happened, once it has ended or is about to."""
         if not self.wait(_PATIENCE):
             self.end()
-            return "tampering", "it said that it ended, and had not"
+            return ProcessFault.TAMPERING, "it said that it ended, and had not"
         return fault_of_exit(self._process.returncode, self._limits)
 
     def last_words(self) -> str:

@@ -1,6 +1,7 @@
 """How the process of a foreign FMU ended, in words."""
 
 import signal
+from enum import StrEnum
 from pathlib import Path
 
 from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
@@ -11,7 +12,21 @@ _WINDOWS_FAULTS = 0x80000000
 """On Windows, a process that dies of a fault ends with that fault's status, which is at least this."""
 
 
-def fault_of_exit(code: int, limits: Limits) -> tuple[str, str]:
+class ProcessFault(StrEnum):
+    """Every way in which the process of an FMU can end, or be given up."""
+
+    CRASH = "crash"
+    EXIT = "exit"
+    HANG = "hang"
+    TAMPERING = "tampering"
+    OUTPUT = "output flood"
+    CPU = "processor time"
+    MEMORY = "memory"
+    TASKS = "too many processes"
+    DISK = "disk"
+
+
+def fault_of_exit(code: int, limits: Limits) -> tuple[ProcessFault, str]:
     """Name of the fault that ended a process, and what happened.
 
     Parameters
@@ -26,23 +41,26 @@ def fault_of_exit(code: int, limits: Limits) -> tuple[str, str]:
     A process that wrote to a null pointer gives ``("crash", "its process died with SIGSEGV")``.
     """
     if code == FLOODED:
-        return "output flood", f"more than {limits.messages} log messages"
+        return ProcessFault.OUTPUT, f"more than {limits.messages} log messages"
     if code < 0 and -code == getattr(signal, "SIGXFSZ", None):
-        return "output flood", f"more than {limits.output} bytes written"
+        return ProcessFault.OUTPUT, f"more than {limits.output} bytes written"
     if code < 0 and -code == getattr(signal, "SIGXCPU", None):
-        return "processor time", f"more than {limits.cpu:g} s in one process"
+        return ProcessFault.CPU, f"more than {limits.cpu:g} s in one process"
     if code == TOO_MUCH_MEMORY:
-        return "memory", f"its processes used more than {limits.memory} bytes together, and were ended"
+        return ProcessFault.MEMORY, f"its processes used more than {limits.memory} bytes together, and were ended"
     if code == TOO_MANY_TASKS:
-        return "too many processes", f"more than {limits.tasks} processes and threads, which were ended"
+        return ProcessFault.TASKS, f"more than {limits.tasks} processes and threads, which were ended"
     if code == TOO_MUCH_DISK:
         much = f"{limits.disk} bytes or {MOST_FILES} files and folders"
-        return "disk", f"its files came to more than {much}, or could not be counted; its processes were ended"
+        return (
+            ProcessFault.DISK,
+            f"its files came to more than {much}, or could not be counted; its processes were ended",
+        )
     if code < 0:
-        return "crash", f"its process died with {_name_of_signal(-code)}"
+        return ProcessFault.CRASH, f"its process died with {_name_of_signal(-code)}"
     if code >= _WINDOWS_FAULTS:
-        return "crash", f"its process died with code {code:#x}"
-    return "exit", f"it ended its process with exit code {code}"
+        return ProcessFault.CRASH, f"its process died with code {code:#x}"
+    return ProcessFault.EXIT, f"it ended its process with exit code {code}"
 
 
 def _name_of_signal(number: int) -> str:

@@ -1,13 +1,16 @@
 """Whose matter a finding is: the FMU's, this machine's, or that of a forbidden call. Each with its wrong twin."""
 
+import ast
 import json
 import zipfile
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from fmus.toolchain.compiler import host_platform
-from orchestrator.acceptance.runner import check_fmu
+from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.runner import _REFUSED, check_fmu
 from orchestrator.errors import ComponentError, HostileFmuError
 from orchestrator.fmi.archive import extract
 from orchestrator.fmi.description import read_description
@@ -216,3 +219,29 @@ def test_a_relay_switches_when_the_step_lets_it(gallery):
     assert result(report, "internal_step").verdict == "not applicable"
     for wrong in ("tank_by_calls", "tank_beside_a_counter"):
         assert checked(gallery(wrong)[0], *only).faults == ["step-dependent answer"], wrong
+
+
+# -- every fault has a remedy ------------------------------------------------------------------------
+
+
+@linux
+def test_an_fmu_that_leaves_a_process_with_each_instance_gets_a_verdict(tmp_path):
+    path = build(converter("forks", FAULT_FORK=1), tmp_path)
+    found = check_fmu(path, None, Limits(seconds=10.0, tasks=20), ("independence", "memory"), run_for=0.3)
+    assert found.failures[0].fault == "too many processes"
+    assert "more than 20 processes and threads" in found.failures[0].evidence
+    assert "have each process" in found.failures[0].remedy
+
+
+def faults_of(function):
+    """Names of faults that calls of a function state literally, in all modules."""
+    for path in (*Path("orchestrator/acceptance").rglob("*.py"), *Path("orchestrator/fmi").rglob("*.py")):
+        for call in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") == function:
+                yield from (a.value for a in call.args[1:2] if isinstance(a, ast.Constant))
+
+
+def test_every_fault_that_is_named_has_a_remedy():
+    named = {*faults_of("failed"), *faults_of("HostileFmuError"), "hostile archive", *_REFUSED.values()}
+    assert len(named) > 40
+    assert named - set(REMEDIES) == set()

@@ -4,9 +4,10 @@ import signal
 
 import pytest
 
+from orchestrator.acceptance.checks.faults import REMEDIES
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.messages import FLOODED
-from orchestrator.fmi.process_end import fault_of_exit, last_line
+from orchestrator.fmi.process_end import ProcessFault, fault_of_exit, last_line
 
 LIMITS = Limits(messages=100, output=2000)
 
@@ -44,3 +45,10 @@ def test_the_last_line_of_an_output(tmp_path, written, words):
     if written is not None:
         (tmp_path / "output").write_bytes(written)
     assert last_line(tmp_path / "output") == words
+
+
+def test_each_end_of_a_process_has_its_remedy():
+    """`gfor check` of an FMU that forks ended with `KeyError: 'too many processes'`."""
+    assert [fault for fault in ProcessFault if fault not in REMEDIES] == []
+    found = {fault_of_exit(code, LIMITS)[0] for code in (*range(-64, 256), 0xC0000005)}
+    assert found == set(ProcessFault) - {ProcessFault.HANG, ProcessFault.TAMPERING}

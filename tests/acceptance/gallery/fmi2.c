@@ -5,6 +5,10 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#ifdef FAULT_FORK
+#include <signal.h>
+#include <unistd.h>
+#endif
 #include <string.h>
 
 #ifdef _WIN32
@@ -89,6 +93,13 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 #ifdef FAULT_LEAK_FILE
     static FILE *volatile table;
     table = fopen("/dev/zero", "rb");
+#endif
+#ifdef FAULT_FORK
+    signal(SIGCHLD, SIG_IGN);
+    if (!fork()) {
+        sleep(20);
+        _exit(0);
+    }
 #endif
     instance_t *instance = calloc(1, sizeof *instance);
     instance->callbacks = callbacks;
