@@ -112,20 +112,35 @@ class Copy:
             return Outcome(NOT_APPLICABLE)
         if not self.passes_without(mutation.tests, limit):
             return Outcome(UNCLEAR)
+        return self._made(path, before, after, mutation.tests, limit)
+
+    def try_unchecked(self, mutation: Mutation, tests: tuple[str, ...], limit: float) -> Outcome:
+        """Make the mistake and run some tests; of those that pass without it only one that failed is asked."""
+        path = self.tree / mutation.file
+        before = path.read_text(encoding="utf-8")
+        after = mutation.applied(before)
+        if after is None:
+            return Outcome(NOT_APPLICABLE)
+        found = self._made(path, before, after, tests, limit)
+        if found.verdict == CAUGHT and not (found.by and self.passes_without((found.by,), limit)):
+            return replace(found, verdict=UNCLEAR)
+        return found
+
+    def _made(self, path: Path, before: str, after: str, tests: Sequence[str], limit: float) -> Outcome:
         # Built files are named by what they are made from, but not by the code that makes them: each gets a cache.
         cache = self._caches / "mutated"
         shutil.copytree(self._caches / "plain", cache, copy_function=os.link, dirs_exist_ok=True)
         begin = perf_counter()
         path.write_text(after, encoding="utf-8")
         try:
-            code, first = self._run(mutation.tests, limit, cache)
+            code, first = self._run(tests, limit, cache)
         finally:
             path.write_text(before, encoding="utf-8")
             shutil.rmtree(cache, ignore_errors=True)
         seconds = round(perf_counter() - begin, 1)
         if code is None:
             return Outcome(TOO_SLOW, seconds)
-        return Outcome(SURVIVED if code == 0 else CAUGHT, seconds, first)
+        return Outcome(SURVIVED if code in (0, 5) else CAUGHT, seconds, first)  # 5: nothing was selected
 
     def _run(self, tests: Sequence[str], limit: float, cache: Path) -> tuple[int | None, str]:
         """Exit code of pytest, None if it took too long, and the first test that failed."""

@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.coupling.events import ParameterChange
 from orchestrator.watch.confirmation import doubt
-from orchestrator.watch.oscillation import Oscillation
+from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen
 from orchestrator.watch.swing import Swing
 from orchestrator.watch.watch import judged
@@ -141,3 +141,14 @@ def test_chance_makes_no_decay_of_an_irregular_swing_that_lasts(seed):
     coarse = np.random.default_rng(seed).standard_normal(400)
     (finding,) = found(lambda t: 0.02 * np.interp(t, 0.05 * np.arange(400), coarse), 15.0)
     assert finding.kind == "sustained_oscillation"
+
+
+@pytest.mark.parametrize(("early", "late", "why"), [(-0.05, 0.25, "in one half of its end it decays"), (0.3, 0.1, "")])
+def test_one_half_that_decays_is_enough_for_a_doubt(early, late, why):
+    """The rate changes in the middle of the end; over the whole of it the strongest oscillation grows either way."""
+    t = np.arange(0, 24, 5e-3)
+    y = 0.01 * np.exp(np.where(t < 15, early, late) * (t - 15)) * np.sin(2 * np.pi * t)
+    end = t >= 6
+    seen = strongest_oscillation(t[end], y[end])
+    assert seen.rate > 0
+    assert doubt(Swing("a.y", 0.01, 1.0, (t, y), t[end], y[end]), seen) == why

@@ -126,6 +126,13 @@ def test_codes_of_ratio_and_impedance(codes, impedance, first, second, z, tap, w
     assert (line.tap, line.shift) == (pytest.approx(tap), pytest.approx(np.deg2rad(-30)))
 
 
+def test_an_angle_of_the_second_winding_turns_the_other_way(written):
+    """ANG1 − ANG2: two windings that turn alike shift nothing."""
+    head = "4,1,0,'1 ',1,1,1,0,0,2,'T',1,1,1"
+    data = written(with_transformer(head, "0.002,0.0576,100", "1.05,0,-30", "1.0,0,-30"))
+    assert next(x for x in data.lines if x.name == "line_4_1").shift == pytest.approx(0.0)
+
+
 @pytest.mark.parametrize(
     ("codes", "magnetisation", "nominal", "wanted"),
     [

@@ -248,3 +248,23 @@ def test_a_run_that_ends_early_is_not_accepted():
 def test_a_row_that_could_not_be_run_is_not_judged():
     row = MISO.rows[0]
     assert not judge_row(row, BenchResult(row.name, failure="no licence"), 60.0).judged
+
+
+def test_the_droop_is_measured_from_before_the_ramp_and_not_from_its_end():
+    """The power rises by 0.4 pu during the ramp and settles 0.2 pu above the start: the droop is +0.2 pu."""
+    power = 0.5 + np.clip(TIMES - 1.0, 0, 5) / 5 * 0.4 - 0.2 * (TIMES > 6.0)
+    found = c.follows_droop(1, 1)(response(power))
+    assert found.value == pytest.approx(0.2)
+    assert found.accepted
+    assert not c.follows_droop(1, -1)(response(power)).accepted
+
+
+@pytest.mark.parametrize(("voltage", "exponent", "accepted"), [(0.9, 2, True), (0.9, 1, False), (0.9, 0, False)])
+def test_the_load_after_the_last_machine_is_an_impedance(voltage, exponent, accepted):
+    """0.4 pu of the plants and 0.6 of the source before; after it the plants feed v² of that."""
+    gone = TIMES > 1.0
+    v = np.where(gone, voltage, 1.0)
+    row = response(np.where(gone, voltage**exponent / 2, 0.2), v=v)
+    signals = {**row.signals, "duplicate.p": row.signals["p"], "source.p": np.where(gone, 0.0, 0.6)}
+    found = c.meets_load()(MeasuredRow(row.times, signals, 60.0, (1.0,), ()))
+    assert found.accepted is accepted

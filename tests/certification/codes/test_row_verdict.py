@@ -7,7 +7,8 @@ from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps
-from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.codes.row import RowFinding
+from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -156,3 +157,10 @@ def test_a_fault_that_leaves_no_voltage_is_no_trip():
     dip = (TIMES >= 3) & (TIMES < 3.2)
     found = judged(np.where(dip, 0.0, opposing()), q=np.where(dip, 0.0, 0.1), v=np.where(dip, 0.0, 1.0))
     assert found.findings[0].accepted
+
+
+@pytest.mark.parametrize(("words", "accepted"), [((True, True), True), ((True, None), False), ((True, False), False)])
+def test_a_row_with_a_criterion_that_is_not_judged_is_not_accepted(words, accepted):
+    row = CODES["aemo"].rows[0]
+    findings = tuple(RowFinding(f"c{k}", "rule", "code", 1.0, 1.0, None, word, "") for k, word in enumerate(words))
+    assert RowVerdict(row, findings).accepted is accepted

@@ -1,0 +1,48 @@
+"""The droop of the voltage that check derives, on answers made from the law itself."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from orchestrator.acceptance.checks import droop as law
+from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE, DroopAnswer
+
+R, X, SLOPE = 0.01, 0.3, 0.06
+EFFECT = 0.05
+"""Active power that the lower frequency brings [pu]."""
+
+
+def answer(point, fall, slower, slope=SLOPE, inside=False):
+    """The device's settled answer to a change of the voltage and of the frequency, by bisection for its power."""
+    i_0 = complex(point.P, -point.Q)
+    e_0 = 1 + complex(R, X) * i_0
+    v, active = 1 - fall, point.P + (EFFECT if slower else 0.0)
+
+    def current(q):
+        return complex(active, -q) / v
+
+    def away(q):
+        i = current(q)
+        e = v + complex(R, X * (1 - slower)) * i
+        at, before = (e, e_0) if inside else (v, 1.0)
+        return abs(e) - abs(e_0) + slope * ((at * i.conjugate()).imag - (before * i_0.conjugate()).imag)
+
+    q = brentq(away, point.Q - 1.0, point.Q + 1.0)
+    i = current(q)
+    power = v * i.conjugate() - i_0.conjugate()
+    return DroopAnswer(i - i_0, power, power, 0.0, abs(power), ())
+
+
+@pytest.mark.parametrize("slope", [0.06, -0.06])
+@pytest.mark.parametrize("inside", [False, True])
+def test_the_slope_of_the_law_comes_out(slope, inside):
+    points = [law.OperatingAt(1.0, 0.0, P, Q) for P, Q in ((0.5, 0.0), (0.2, 0.1), (0.7, -0.1))]
+    found = [(p, answer(p, VOLTAGE, 0.0, slope, inside), answer(p, 0.0, FREQUENCY, slope, inside)) for p in points]
+    assert law.droop(found) == pytest.approx(slope, abs=1e-5)
+
+
+def test_the_reactance_falls_with_the_frequency():
+    """The law holds to rounding for its own answers; the reactance of the rated frequency leaves 1e-5 pu."""
+    point = law.OperatingAt(1.0, 0.0, 0.5, 0.1)
+    found = [(point, answer(point, VOLTAGE, 0.0), answer(point, 0.0, FREQUENCY))]
+    assert np.abs(law._errors(np.array([R, X, SLOPE]), found, False)).max() < 1e-12

@@ -1,0 +1,49 @@
+"""What a screening may be called, and how far around its range modes are followed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.screening.modes import CriticalRegion
+from orchestrator.screening.record import Status
+from orchestrator.screening.summary import Summary
+
+
+def summary(*verdicts, complete=True):
+    """Of items that are stable, unstable or without a verdict (None)."""
+    records = [SimpleNamespace(status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True) for v in verdicts]
+    items = [SimpleNamespace(record=record, trajectories=()) for record in records]
+    return Summary(SimpleNamespace(items=items, complete=complete))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "complete", "stable"),
+    [
+        ((True, True), True, True),
+        ((True, True), False, None),
+        ((True, None), True, None),
+        ((True, None), False, None),
+        ((True, False), True, False),
+        ((True, False), False, False),
+        ((None, False), True, False),
+    ],
+)
+def test_only_a_complete_screening_without_gaps_is_stable(verdicts, complete, stable):
+    assert summary(*verdicts, complete=complete).stable is stable
+
+
+def test_of_a_part_the_same_holds_for_what_is_there():
+    assert summary(True, complete=False).stable_here is True
+    assert summary(True, None, complete=False).stable_here is None
+
+
+def test_modes_are_followed_beyond_the_range_at_both_ends_and_above_the_damping():
+    wanted = CriticalRegion(0.1, 2.0, 0.2)
+    assert wanted.wider.lowest_hz < wanted.lowest_hz
+    assert wanted.wider.highest_hz > wanted.highest_hz
+    assert wanted.wider.damping > wanted.damping
+    for hertz, damping in ((0.095, 0.1), (2.1, 0.1), (1.0, 0.21)):
+        value = 2 * np.pi * hertz * complex(-damping / np.sqrt(1 - damping**2), 1)
+        assert not wanted.holds(value)
+        assert wanted.wider.holds(value)
