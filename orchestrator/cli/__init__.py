@@ -91,6 +91,8 @@ def _run(words: Sequence[str]) -> int:
     """Run; where it returns, no signal changes the exit code any more."""
     try:
         code = _done(words)
+        if calls.taken and code != INTERRUPTED:
+            raise KeyboardInterrupt  # somebody swallowed it on its way
         calls.over = True
     except BaseException as error:
         if not is_interrupt(error):
@@ -108,17 +110,26 @@ def _done(words: Sequence[str]) -> int:
             parser = _parser(next((word for word in words if not word.startswith("-")), None))
         options = parser.parse_args(words)
         return int(options.command(options))
-    except CosimError as error:
-        _print_error(str(error))
-        return error.exit_code
-    except SetupError as error:
-        _print_error(str(error))
-        return InputError.exit_code
-    except BrokenPipeError:
-        return 0
-    except OSError as error:  # of a file that no command expected to fail with
-        _print_error(_os_error(error))
-        return CosimError.exit_code
+    except (CosimError, SetupError, OSError) as error:
+        if is_interrupt(error):
+            raise
+        return _failed(error)
+
+
+def _failed(error: CosimError | SetupError | OSError) -> int:
+    """Say what was wrong; returns the exit code."""
+    match error:
+        case CosimError():
+            _print_error(str(error))
+            return error.exit_code
+        case SetupError():
+            _print_error(str(error))
+            return InputError.exit_code
+        case BrokenPipeError():
+            return 0
+        case OSError():  # of a file that no command expected to fail with
+            _print_error(_os_error(error))
+    return CosimError.exit_code
 
 
 def _print_anything() -> None:

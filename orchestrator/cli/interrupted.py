@@ -24,7 +24,9 @@ def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
 
 
 def is_interrupt(error: BaseException | None) -> bool:
-    """Whether it is Ctrl-C or SIGTERM, or what a library in C made of one that came while it called Python."""
+    """Whether it is Ctrl-C or SIGTERM, or came after one: a library in C may have made another error of it."""
+    if calls.taken:
+        return True
     seen: set[int] = set()  # an error that was kept and is raised again may stand behind its own cause
     while error is not None and id(error) not in seen:
         if isinstance(error, KeyboardInterrupt):

@@ -14,7 +14,7 @@ from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.cli import checkpoints, federates, like, run_request
 from orchestrator.cli.arguments import seconds, threads, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.terminal import (
     make_console,
@@ -234,7 +234,7 @@ def _early_end(
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    return isinstance(error, KeyboardInterrupt | RunInterruptedError)
+    return isinstance(error, RunInterruptedError) or is_interrupt(error)
 
 
 def _save_together(

@@ -1,7 +1,8 @@
-"""Ctrl-C and SIGTERM while an FMU is in a call: they wait until the call is over.
+"""Ctrl-C and SIGTERM while an FMU is in a call, or a library at work: they wait until our own code goes on.
 
 Python raises `KeyboardInterrupt` in whatever Python code runs next. In a call of a Python-backed FMU that is code of
-the FMU, which takes it for a failure of its own, reports ``fmi2Fatal``, and must not be called again.
+the FMU, which takes it for a failure of its own, reports ``fmi2Fatal``, and must not be called again. For libraries see
+`deferral`.
 """
 
 import ctypes
@@ -14,14 +15,16 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from orchestrator.fmi.deferral import Deferral, frame_of_ours
+
 
 class _Calls:
     """``with calls:`` goes around whatever calls FMUs of this process.
 
     Attributes
     ----------
-    terminated
-        Whether a SIGTERM was taken since the command began.
+    taken, terminated
+        Whether any signal was taken since the command began, and whether a SIGTERM was.
     over
         Whether all is done: then the exit code says how, and no signal changes it any more. It is set, not called,
         because Python takes signals where a function begins.
@@ -33,7 +36,8 @@ class _Calls:
         self._asked = ctypes.c_int(0)  # C that waits for another process looks at it as well
         self._kind: type[BaseException] = KeyboardInterrupt
         self._hook: Callable[[Any], None] | None = None
-        self.terminated = self.over = False
+        self._deferral = Deferral(self._raise)
+        self.taken = self.terminated = self.over = False
 
     @property
     def asked_address(self) -> int:
@@ -43,7 +47,7 @@ class _Calls:
     def watch(self) -> None:
         """Take Ctrl-C over from Python, where nobody else has; between calls it works as before.
 
-        Where Python would swallow it, as in a weak reference's end, it is asked for again.
+        Where Python would swallow it, as in a weak reference's end, it comes again at the next line of ours.
         """
         here = threading.current_thread() is threading.main_thread()
         if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
@@ -66,12 +70,12 @@ class _Calls:
         ending
             Whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
         """
-        self.terminated = self.over = False
+        self.taken = self.terminated = self.over = False
         if threading.current_thread() is not threading.main_thread():
             try:
                 yield
             finally:
-                self.over = False
+                self.taken = self.over = False
             return
         unraisable = sys.unraisablehook
         self.watch()
@@ -82,40 +86,61 @@ class _Calls:
             signal.signal(signal.SIGTERM, signal.SIG_IGN if ending else before)
             if ending:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
-            self.over = ending
+            self._deferral.drop()
+            self.taken, self.over = False, ending
             sys.unraisablehook = unraisable
 
     def _swallowed(self, otherwise: Callable[[Any], Any]) -> Callable[[Any], None]:
-        """An interrupt that came where Python lets no error out, as in a weak reference's end, is asked for again."""
+        """An interrupt that came where Python lets no error out, as in a weak reference's end, comes again."""
 
         def hook(raised: Any) -> None:
-            if issubclass(raised.exc_type, KeyboardInterrupt):
-                self._asked.value = 1
+            frame = sys._getframe().f_back
+            if raised.exc_type is not None and issubclass(raised.exc_type, self._kind):
+                if not self._wait(frame) and frame is not None:
+                    self._deferral.until(frame)
             else:
                 otherwise(raised)
 
         return hook
 
-    def leave(self) -> None:
-        """End the process from its main thread, but not in the middle of a call."""
+    def leave(self, frame: FrameType | None) -> None:
+        """End the process from its main thread, but not in the middle of a call; for a handler, with its frame."""
         self._kind = SystemExit
-        self._ask()
+        self._ask(frame)
 
     def _take(self, number: int, frame: FrameType | None) -> None:
-        if self.over:
+        if self.over or self._deferral.too_late():
             return
+        self.taken = True
         if number == signal.SIGTERM:
             if self.terminated:
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
                 os.kill(os.getpid(), signal.SIGTERM)
             self.terminated = True
-        self._ask()
+        self._ask(frame)
 
-    def _ask(self) -> None:
-        if self._depth and not self._asked.value:  # who asks twice does not want to wait
+    def _ask(self, frame: FrameType | None) -> None:
+        if self._asked.value or self._deferral.waits:  # who asks twice does not want to wait
+            self._asked.value = 0
+            self._deferral.drop()
+            raise self._kind
+        if not self._wait(frame):
+            raise self._kind
+
+    def _wait(self, frame: FrameType | None) -> bool:
+        """Have it raised at the end of the call, or at the next line of ours; False where neither is to come."""
+        if self._depth:
+            self._asked.value = 1
+            return True
+        if (ours := frame_of_ours(frame)) is None:
+            return False
+        self._deferral.until(ours)
+        return True
+
+    def _raise(self) -> None:
+        if self._depth:
             self._asked.value = 1
         else:
-            self._asked.value = 0
             raise self._kind
 
     def __enter__(self) -> None:

@@ -196,8 +196,10 @@ def _computed(function: Callable[[Task], Result], task: Task) -> Result:
     _Work.busy = True
     try:
         return function(task)
-    except (SystemExit, KeyboardInterrupt):  # all that the task had opened is closed by now
-        raise WorkerLeftError from None
+    except BaseException as error:
+        if _Work.leaving or isinstance(error, SystemExit | KeyboardInterrupt):
+            raise WorkerLeftError from None  # all that the task had opened is closed by now
+        raise
     finally:
         _Work.busy = False
 
@@ -207,7 +209,7 @@ def _leave(number: int, frame: FrameType | None) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # who asks twice does not want to wait
     _Work.leaving = True
     if _Work.busy:
-        calls.leave()
+        calls.leave(frame)
 
 
 def _start_worker() -> None:
