@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, damping_ratio, make_mode, oscillations
 from orchestrator.analysis.stability import grows
 from orchestrator.arrays import Complex
-from orchestrator.coordinated_design.open_loops import OpenLoops, PodPlace, Setting
+from orchestrator.coordinated_design.open_loops import LEAD, OpenLoops, PodPlace, Setting
 
 BANDS_HZ = (*ELECTROMECHANICAL_HZ, 10.0, 100.0)
 """Between these frequencies [Hz] other modes are compared with those that were there before."""
@@ -18,7 +18,12 @@ ALLOWED = 1e-3
 """The least damping ratio of a band may become worse by this where it is below the bound already."""
 
 UNMOVED = 0.02
-"""No loop moves a mode that all of them together move by less than this part of its size, by their largest gains."""
+"""Loops hardly move a mode that all of them together move by less than this part of its size, by their largest gains.
+It counts as others do; beside it a search raises the least damping of the rest."""
+
+_HELD = 1e-5
+"""No loop moves a mode that all of them move by less than this part of its size, with the most lead on top: where the
+converter is out of service. A search leaves it as it is."""
 
 Naming = Callable[[Sequence[str], list[Mode]], Mapping[str, Mode]]
 """Gives the modes that a case names, from the names of the states and the candidates."""
@@ -55,11 +60,14 @@ class Watched:
         Its column among the eigenvectors.
     floor
         Damping ratio that it may not fall below; None for a mode that the design damps.
+    hardly_moved
+        Whether the loops hardly move it.
     """
 
     value: complex
     place: int
     floor: float | None
+    hardly_moved: bool = False
 
     @property
     def damping(self) -> float:
@@ -131,11 +139,14 @@ class Worth:
         By how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither.
     point
         Number of the point with the least damping.
+    rest
+        Least damping ratio of those that the loops move more than hardly; at least ``worst``.
     """
 
     worst: float
     breach: float
     point: int = 0
+    rest: float = 1.0
 
     @property
     def allowed(self) -> bool:
@@ -158,10 +169,12 @@ def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, 
     point
         Number of the operating point.
     """
-    worst = min((mode.damping for mode in watched if mode.floor is None), default=1.0)
+    damped = [mode for mode in watched if mode.floor is None]
+    worst = min((mode.damping for mode in damped), default=1.0)
+    rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)
     short = max((mode.floor - mode.damping for mode in watched if mode.floor is not None), default=-1.0)
     more = growing - max(growing_before, 0.0)
-    return Worth(worst, max(short, more if more > _ROUNDING else -1.0), point)
+    return Worth(worst, max(short, more if more > _ROUNDING else -1.0), point, rest)
 
 
 class RatedPoint:
@@ -182,7 +195,8 @@ class RatedPoint:
 
     def __init__(self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None) -> None:
         self.number, self.loops, self._aim = number, loops, aim
-        self._fixed: tuple[complex, ...] = ()
+        self._held: tuple[complex, ...] = ()
+        self._hardly: tuple[complex, ...] = ()
         values, targets, left, right = self._spectrum({})
         self._before = growth(values)
         modes = split(values, targets, floors_of((), 0.0))
@@ -192,7 +206,9 @@ class RatedPoint:
         gains = np.array([largest.get(place, 0.0) for place in loops.places])
         damped = [mode for mode in modes if mode.floor is None]
         reach = [np.abs(self._residues(mode.place, left, right)) @ gains for mode in damped]
-        self._fixed = tuple(m.value for m, r in zip(damped, reach, strict=True) if r < UNMOVED * abs(m.value))
+        parts = [(mode.value, size / abs(mode.value)) for mode, size in zip(damped, reach, strict=True)]
+        self._held = tuple(value for value, part in parts if LEAD * part < _HELD)
+        self._hardly = tuple(value for value, part in parts if LEAD * part >= _HELD and part < UNMOVED)
 
     def _residues(self, place: int, left: Complex, right: Complex) -> Complex:
         """How far each loop moves an eigenvalue with all loops open [rad/s per pu]."""
@@ -202,10 +218,11 @@ class RatedPoint:
     def _split(self, values: Complex, targets: Iterable[int] | None) -> list[Watched]:
         """The modes; those that no loop moves are not damped but kept as they are."""
         found = split(values, targets, self._floors)
-        for value in self._fixed:
+        for value in (*self._held, *self._hardly):
             k = min(range(len(found)), key=lambda k: abs(found[k].value - value), default=None)
             if k is not None and abs(found[k].value - value) < UNMOVED * abs(value):
-                found[k] = replace(found[k], floor=damping_ratio(value) - ALLOWED)
+                held = {"floor": damping_ratio(value) - ALLOWED} if value in self._held else {"hardly_moved": True}
+                found[k] = replace(found[k], **held)
         return found
 
     def _spectrum(self, setting: Setting) -> tuple[Complex, list[int] | None, Complex, Complex]:
@@ -255,7 +272,8 @@ def together(worths: Iterable[Worth]) -> Worth:
     """The worth over all operating points: the least damping, and the worst breach."""
     found = list(worths)
     worst = min(found, key=lambda worth: worth.worst)
-    return Worth(worst.worst, max(worth.breach for worth in found), worst.point)
+    rest = min(worth.rest for worth in found)
+    return Worth(worst.worst, max(worth.breach for worth in found), worst.point, rest)
 
 
 def worth_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> Worth:

@@ -21,7 +21,7 @@ REDUCED = 300
 _FASTEST = 2 * np.pi * 30
 """Faster modes than this [rad/s] answer as they do at rest, unless loops move them."""
 
-_LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
+LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
 """Two stages of a lead/lag that leads most pass fast signals with this gain."""
 
 _GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
@@ -103,7 +103,9 @@ class OpenLoops:
     rest: Complex | None = None
 
     @classmethod
-    def of(cls, A: Matrix, U: Matrix, V: Matrix, places: Sequence[PodPlace], names: Sequence[str]) -> "OpenLoops":
+    def of(
+        cls, A: Matrix, U: Matrix, V: Matrix, places: Sequence[PodPlace], names: Sequence[str], D: Matrix | None = None
+    ) -> "OpenLoops":
         """The system of full matrices, reduced where it is large.
 
         Parameters
@@ -114,11 +116,11 @@ class OpenLoops:
             Of the m loops.
         names
             Of the n states.
+        D
+            Shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
         """
-        none = np.zeros((len(places), len(places)))
-        if len(A) <= REDUCED:
-            return cls(A, U, V, none, tuple(places), tuple(names))
-        return _reduced(A, U, V, tuple(places), tuple(names)) or cls(A, U, V, none, tuple(places), tuple(names))
+        whole = cls(A, U, V, np.zeros((len(places), len(places))) if D is None else D, tuple(places), tuple(names))
+        return (_reduced(whole) if len(A) > REDUCED else None) or whole
 
     def closed(self, setting: Setting) -> Vector:
         """The matrix of the system with some loops closed.
@@ -193,8 +195,9 @@ class OpenLoops:
         return np.concatenate([expanded, vector[r:]])
 
 
-def _reduced(A: Matrix, U: Matrix, V: Matrix, places: tuple[PodPlace, ...], names: tuple[str, ...]) -> OpenLoops | None:
+def _reduced(whole: OpenLoops) -> OpenLoops | None:
     """The system without modes that no loop moves, and with fast ones at rest; None where its modes are ill-defined."""
+    A, U, V = whole.A, whole.U, whole.V
     seen = _seen_by(A, V)
     inner = A[np.ix_(seen, seen)]
     values, right = np.linalg.eig(inner)
@@ -204,7 +207,7 @@ def _reduced(A: Matrix, U: Matrix, V: Matrix, places: tuple[PodPlace, ...], name
     reach = _GAIN * np.linalg.norm(entries, axis=1) * np.linalg.norm(exits, axis=0)
     fast, hertz = np.abs(values) > _FASTEST, np.abs(values.imag) / (2 * np.pi)
     moved = reach > _MOVED * np.maximum(np.abs(values), _SLOWEST)
-    swung = fast & (_LEAD * reach > _MOVED * np.abs(values))
+    swung = fast & (LEAD * reach > _MOVED * np.abs(values))
     kept = swung | (~fast & (moved | ((hertz > _SEEN[0]) & (hertz < _SEEN[1]))))
     resting = fast & ~swung
     at_rest = -(exits[:, resting] / values[resting]) @ entries[resting]
@@ -215,7 +218,9 @@ def _reduced(A: Matrix, U: Matrix, V: Matrix, places: tuple[PodPlace, ...], name
     from_all[:, seen], to_all[seen] = back, there
     unseen = np.linalg.eigvals(A[np.ix_(~seen, ~seen)]).astype(complex)
     rest = np.concatenate([values[~kept], unseen])
-    return OpenLoops(matrix, from_all @ U, V @ to_all, at_rest.real, places, names, to_all, from_all, rest)
+    return OpenLoops(
+        matrix, from_all @ U, V @ to_all, whole.D + at_rest.real, whole.places, whole.names, to_all, from_all, rest
+    )
 
 
 def _seen_by(A: Matrix, V: Matrix) -> NDArray[np.bool_]:

@@ -217,7 +217,8 @@ def _at(
             "them of all FMUs"
         )
     known = {name: without_references(bench.linearized(name)) for name in master.components}
-    model = continuous(Blocks(master, known=known, without_step=True))
+    blocks = Blocks(master, known=known, without_step=True)
+    model = continuous(blocks)
     if len(model.names) > _MOST_STATES:
         raise AnalysisError(f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "
                             f"{_MOST_STATES}")  # fmt: skip
@@ -225,7 +226,7 @@ def _at(
     if doubtful:
         text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
         warnings = (*warnings, text)
-    loops = measure(master, model, known, places) if places else None
+    loops = measure(master, model, blocks, places) if places else None
     found = _modes(case, model, loops, warnings, doubtful=bool(doubtful))
     return replace(found, warnings=(*warnings, *standing_apart(master, model, found.zeros)))
 

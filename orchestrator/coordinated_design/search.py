@@ -24,6 +24,8 @@ _RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
 _STEPS = 60
 _PRICE = 10.0
 """What a breach costs, in damping ratio."""
+_BESIDE = 1e-3
+"""Weight of the least damping of those modes that are moved more than hardly, beside that of all."""
 _NEAR, _NEAR_FLOOR = 0.3, 0.1
 """Modes whose damping ratio is farther away than this are left out of a linear program."""
 _APART = 0.2
@@ -31,7 +33,7 @@ _EDGE, _POLISHING = 0.1, 40
 _DIFFERENCE = 1e-6
 _WORTH = 1e-6
 _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.05, 0.15, 0.4, 1.0)
-_STARTS, _STARTS_OF_SEVERAL = 3, 6
+_STARTS, _STARTS_OF_SEVERAL = 4, 6
 _SPREAD, _MOST_SPREAD = 64, 256
 """Vectors that are spread over all ranges for each of several groups, and at most."""
 
@@ -47,7 +49,8 @@ class Tried:
     @property
     def merit(self) -> float:
         """One number: larger is better."""
-        return self.worth.worst - _PRICE * max(0.0, self.worth.breach)
+        worst = (1 - _BESIDE) * self.worth.worst + _BESIDE * self.worth.rest
+        return worst - _PRICE * max(0.0, self.worth.breach)
 
 
 class SettingSearch:
@@ -77,7 +80,7 @@ class SettingSearch:
         Parameters
         ----------
         starts
-            Number of vectors of the coarse scan that are improved; by default 3, for several groups 6.
+            Number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
         polish
             Whether the best is improved without sensitivities as well.
         """
@@ -85,9 +88,10 @@ class SettingSearch:
         scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)
         chosen = self._alone() if several else []
         most = len(chosen) + (starts or (_STARTS_OF_SEVERAL if several else _STARTS))
-        for one in scanned:
-            if len(chosen) < most and all(np.abs(one.x - other.x).max() > _APART for other in chosen):
-                chosen.append(one)
+        for part, number in ((slice(None), most if several else most // 2), (slice(1), most)):  # then with other turns
+            for one in scanned:
+                if len(chosen) < number and all(np.abs(one.x - other.x)[part].max() > _APART for other in chosen):
+                    chosen.append(one)
         found = max([scanned[0], *map(self.improved, chosen)], key=lambda one: (one.worth.allowed, one.merit))
         return self.improved(self._polished(found)) if polish else found
 
@@ -108,7 +112,8 @@ class SettingSearch:
         turns, count = self._wanted_turns(), len(self._space.groups)
         yield self._space.clipped(np.zeros(3 * count))
         for offset, centre, share in product(_TURNS, _CENTRES, _GAINS):
-            x = self._space.vector([turn + offset for turn in turns], [centre] * count, [0.0] * count)
+            angles = [(turn + offset + 180.0) % 360.0 - 180.0 for turn in turns]  # of 200° and −160°, one can be had
+            x = self._space.vector(angles, [centre] * count, [0.0] * count)
             x[2::3] = share
             yield self._space.clipped(x)
         if count > 1:
@@ -163,7 +168,9 @@ class SettingSearch:
         """The modes of one point that count, with the sensitivities of their damping ratios to all numbers of x."""
         setting = self._space.setting(x, searching=True)
         watched, left, right = point.watched(setting)
-        worst = min((mode.damping for mode in watched if mode.floor is None), default=1.0)
+        damped = [mode for mode in watched if mode.floor is None]
+        worst = min((mode.damping for mode in damped), default=1.0)
+        rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)
         base = point.loops.closed(setting)
         slopes = []
         for k in range(len(x)):
@@ -172,7 +179,8 @@ class SettingSearch:
             moved[k] += step
             slopes.append((point.loops.closed(self._space.setting(moved, searching=True)) - base) / step)
         for mode in watched:
-            near = mode.damping < (worst + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR)
+            least = worst if mode.hardly_moved else rest
+            near = mode.damping < (least + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR)
             if near and mode.place < left.shape[1]:
                 row, column = left[:, mode.place].conj(), right[:, mode.place]
                 shifts = [complex(row @ slope @ column / (row @ column)) for slope in slopes]
@@ -203,26 +211,33 @@ class SettingSearch:
 
 
 class _Program:
-    """A linear program: the change within a radius that raises the least damping ratio most."""
+    """A linear program: the change within a radius that raises the least damping ratio most.
+
+    Behind the change stand the least damping ratio of all modes, that of the modes that are moved more than hardly, and
+    the breach.
+    """
 
     def __init__(self, rows: Sequence[tuple[Watched, Numbers]], lowest: Numbers, highest: Numbers) -> None:
         self._lowest, self._highest = lowest, highest
         matrix, right = [], []
         for mode, slopes in rows:
             if mode.floor is None:  # t − slopes·d ≤ ζ
-                matrix.append([*(-slopes), 1.0, 0.0])
+                matrix.append([*(-slopes), 1.0, 0.0, 0.0])
                 right.append(mode.damping)
+                if not mode.hardly_moved:
+                    matrix.append([*(-slopes), 0.0, 1.0, 0.0])
+                    right.append(mode.damping)
             else:  # −slopes·d − s ≤ ζ − floor
-                matrix.append([*(-slopes), 0.0, -1.0])
+                matrix.append([*(-slopes), 0.0, 0.0, -1.0])
                 right.append(mode.damping - mode.floor)
-        self._matrix, self._right = np.array(matrix).reshape(len(rows), len(lowest) + 2), np.array(right)
+        self._matrix, self._right = np.array(matrix).reshape(len(right), len(lowest) + 3), np.array(right)
 
     def change(self, radius: float) -> Numbers | None:
         """The change of x; None where there is none."""
         limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
-        cost = np.zeros(len(limits) + 2)
-        cost[-2:] = -1.0, _PRICE
+        cost = np.zeros(len(limits) + 3)
+        cost[-3:] = _BESIDE - 1.0, -_BESIDE, _PRICE
         solved = scipy.optimize.linprog(
-            cost, self._matrix, self._right, bounds=[*limits, (None, 1.0), (0.0, None)], method="highs"
+            cost, self._matrix, self._right, bounds=[*limits, (None, 1.0), (None, 1.0), (0.0, None)], method="highs"
         )
         return None if solved.x is None else np.asarray(solved.x[: len(limits)])

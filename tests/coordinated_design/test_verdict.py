@@ -1,0 +1,47 @@
+"""What a design over points comes to, from modes that are given."""
+
+import numpy as np
+import pytest
+
+from orchestrator.coordinated_design.objective import Aim
+from orchestrator.coordinated_design.point import PointModes
+from orchestrator.coordinated_design.verdict import PointsVerdict, judged
+from orchestrator.screening.outages import Outage
+from orchestrator.screening.points_file import OperatingCase
+from orchestrator.screening.record import Status
+
+WHERE = [(OperatingCase("now", 1.0, {}, (), "points.csv:2"), Outage("intact"))]
+
+
+def modes(*pairs):
+    """A spectrum of frequencies [Hz] and damping ratios, with the free angle."""
+    values = [2 * np.pi * hertz * complex(-zeta, np.sqrt(1 - zeta**2)) for hertz, zeta in pairs]
+    return PointModes(Status.COMPUTED, values=np.array([*values, *np.conj(values), 0.0]), swinging=(0,), who=("sg1",))
+
+
+def verdict(before, after, wanted, least=0.05):
+    return PointsVerdict(list(judged(WHERE, [modes(*before)], [modes(*after)], Aim((), least), {})), wanted)
+
+
+@pytest.mark.parametrize(
+    ("beside", "left", "met"),
+    [
+        (0.20, 0.03, False),  # pushed below 5 %
+        (0.20, 0.06, True),  # lower, and still above
+        (0.04, 0.0395, True),  # was below already, and keeps what it has
+        (0.04, 0.03, False),
+        (0.20, -0.01, False),
+    ],
+)
+@pytest.mark.parametrize("wanted", [0.1, None])
+def test_a_design_that_harms_another_mode_is_not_met(beside, left, met, wanted):
+    """The mode at 5 Hz is not one that the design damps; the one at 1 Hz has all that is wanted."""
+    found = verdict([(1.0, 0.05), (5.0, beside)], [(1.0, 0.12), (5.0, left)], wanted)
+    assert found.worst == pytest.approx(0.12)
+    assert found.met is met
+    assert len(found.harmed) == (not met)
+
+
+def test_the_least_damped_of_all_modes_decides():
+    assert verdict([(0.86, 0.053), (0.93, 0.053)], [(0.86, 0.062), (0.93, 0.198)], 0.1).met is False
+    assert verdict([(0.86, 0.053), (0.93, 0.053)], [(0.86, 0.11), (0.93, 0.198)], 0.1).met is True
