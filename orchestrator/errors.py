@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -10,16 +11,58 @@ TERMINATED = 143
 """Exit code after SIGTERM."""
 
 
+class ErrorKind(StrEnum):
+    """What is wrong. Programs decide by the kind; the text is for people."""
+
+    INPUT = "input"
+    VALUES = "values"
+    UNITS = "units"
+    POWER_FLOW = "power flow"
+    START = "start"
+    STEADY_STATE = "steady state"
+    HIDDEN_STATES = "hidden states"
+    ANALYSIS = "analysis"
+    FMU = "FMU"
+    NOT_FINITE = "not finite"
+    HANG = "hang"
+    WORKER_LOST = "worker lost"
+    OTHER = "other"
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the same would come out again: an FMU, a worker or the machine may do better another time."""
+        return self in _LASTING
+
+
+_LASTING = {ErrorKind.VALUES, ErrorKind.UNITS, ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE,
+            ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS}  # fmt: skip
+
+
 class CosimError(Exception):
-    """Base of all errors that are the user's to mend; the command line prints them without a traceback."""
+    """Base of all errors that are the user's to mend; the command line prints them without a traceback.
+
+    Parameters
+    ----------
+    message
+        What failed, where, the value seen, the rule and the remedy.
+    kind
+        The class's own where None.
+    """
 
     exit_code = 1
+    kind = ErrorKind.OTHER
+
+    def __init__(self, message: str = "", *, kind: ErrorKind | None = None) -> None:
+        super().__init__(message)
+        if kind is not None:
+            self.kind = kind
 
 
 class InputError(CosimError):
     """Something given to the program cannot be used; nothing was run."""
 
     exit_code = 2
+    kind = ErrorKind.INPUT
 
 
 class ResultsError(CosimError):
@@ -31,19 +74,19 @@ class FmuFileError(InputError):
 
 
 class UnsupportedFmuError(FmuFileError):
-    """An FMU cannot be run by this program, or on this machine, and may be sound; ``kind`` names what is missing."""
+    """An FMU cannot be run by this program, or on this machine, and may be sound; ``fault`` names what is missing."""
 
-    def __init__(self, message: str, kind: str) -> None:
-        super().__init__(message)
-        self.kind = kind
+    def __init__(self, evidence: str, fault: str, remedy: str) -> None:
+        super().__init__(f"{evidence}; {remedy}")
+        self.evidence, self.fault, self.remedy = evidence, fault, remedy
 
 
 class HostileFmuError(FmuFileError):
-    """A file is made so that unpacking or reading it would do harm; ``kind`` says how."""
+    """A file is made so that unpacking or reading it would do harm; ``fault`` says how."""
 
-    def __init__(self, message: str, kind: str = "hostile archive") -> None:
+    def __init__(self, message: str, fault: str = "hostile archive") -> None:
         super().__init__(message)
-        self.kind = kind
+        self.fault = fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +95,7 @@ class Problem:
 
     place: str
     text: str
+    kind: ErrorKind = ErrorKind.VALUES
 
     def __str__(self) -> str:
         return f"{self.place}: {self.text}" if self.place else self.text
@@ -64,30 +108,58 @@ TOO_MANY = Problem("", "there are more problems than are listed; mend these firs
 
 
 class CaseError(InputError):
-    """A case cannot be used; all its mistakes are listed together."""
+    """A case cannot be used; all its mistakes are listed together. Mistakes of several kinds make it `VALUES`."""
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
+        kinds = {problem.kind for problem in problems}
         count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
-        super().__init__(f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems))
+        message = f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems)
+        super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
+
+
+class StartError(CaseError):
+    """A component refuses to start with its values, or from its operating point."""
+
+    def __init__(self, source: str, problem: Problem, component: str) -> None:
+        self.component = component
+        super().__init__(source, [problem])
 
 
 class BindingError(CaseError):
     """A binding cannot be used; all its mistakes are listed together."""
 
 
+class PowerFlowError(InputError):
+    """There is no power flow."""
+
+    kind = ErrorKind.POWER_FLOW
+
+
 class ComponentError(CosimError):
     """A running FMU refused a call; the message carries the FMU's own log text."""
 
-    def __init__(self, component: str, call: str, status: str, log: str, time: float | None = None) -> None:
+    kind = ErrorKind.FMU
+
+    def __init__(
+        self,
+        component: str,
+        call: str,
+        status: str,
+        log: str,
+        time: float | None = None,
+        kind: ErrorKind | None = None,
+    ) -> None:
         self.component, self.call, self.status, self.log, self.time = component, call, status, log, time
         when = "" if time is None else f" at t = {time:.6g} s"
         said = log or "the FMU logged no text"
-        super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}")
+        super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}", kind=kind)
 
 
 class NotFiniteError(ComponentError):
     """A running FMU gave an output that is no finite number, and said nothing itself."""
+
+    kind = ErrorKind.NOT_FINITE
 
     def __init__(self, component: str, variable: str, value: float | None, time: float | None) -> None:
         self.variable, self.value = variable, value
@@ -136,3 +208,5 @@ class RunInterruptedError(CosimError):
 
 class AnalysisError(CosimError):
     """An operating point or a linear model cannot be computed."""
+
+    kind = ErrorKind.ANALYSIS

@@ -34,6 +34,7 @@ from orchestrator.errors import (
     ComponentError,
     CosimError,
     EndedError,
+    ErrorKind,
     FmuFileError,
     HostileFmuError,
     InputError,
@@ -180,7 +181,7 @@ def check_fmu(
         report.results.append(not_supported("archive", error))
         return report
     except FmuFileError as error:
-        fault = error.kind if isinstance(error, HostileFmuError) else "unreadable"
+        fault = error.fault if isinstance(error, HostileFmuError) else "unreadable"
         report.results.append(failed("archive", fault, str(error)))
         return report
     try:
@@ -223,7 +224,7 @@ def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -
     try:
         bound = bind(described, binding)
     except BindingError as error:
-        differ = any(", but the FMU declares" in p.text for p in error.problems)
+        differ = any(p.kind is ErrorKind.UNITS for p in error.problems)
         says = "; ".join(map(str, error.problems))
         result = failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
         remedy = (

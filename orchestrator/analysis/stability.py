@@ -158,17 +158,21 @@ class Stability:
 
     def sentence(self) -> str:
         """The verdict in words, with its figures."""
+        return f"{self.verdict}: {self.because()}"
+
+    def because(self) -> str:
+        """The figures behind the verdict's word."""
         if self.mode is None or self.stable is None:
-            return f"{self.verdict}: {self.reason or 'there is no eigenvalue but zeros'}"
+            return self.reason or "there is no eigenvalue but zeros"
         value = self.mode.eigenvalue
         where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
             tail += f"; {zeros_in_words(self.zeros)}"
         if self.stable:
-            return f"stable: the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
+            return f"the largest real part of all {self.eigenvalues} eigenvalues is {where}{tail}"
         more = f"; {self.growing} modes grow" if self.growing > 1 else ""
-        return f"UNSTABLE: a mode grows at {where}{more}; cause: {self._why()}{tail}"
+        return f"a mode grows at {where}{more}; cause: {self._why()}{tail}"
 
     def _why(self) -> str:
         rate = self.continuous_growth_rate

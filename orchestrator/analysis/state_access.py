@@ -2,7 +2,7 @@
 
 from orchestrator.analysis.embedded_model import embedded_model
 from orchestrator.arrays import Matrix
-from orchestrator.errors import AnalysisError
+from orchestrator.errors import AnalysisError, ErrorKind
 from orchestrator.fmi.component import Component, RealBatch
 
 _MEASURE = (
@@ -43,7 +43,7 @@ class StateAccess:
 
     def __init__(self, component: Component) -> None:
         if reason := obstacle(component):
-            raise AnalysisError(reason)
+            raise AnalysisError(reason, kind=ErrorKind.HIDDEN_STATES)
         self._settable = component.description.states_are_settable
         self.batch = RealBatch(component, component.description.states)
         self._buffer = RealBatch(component, component.description.states)

@@ -17,7 +17,7 @@ from orchestrator.arrays import Matrix
 from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
-from orchestrator.errors import AnalysisError
+from orchestrator.errors import AnalysisError, ErrorKind
 
 _SHIFT = 1e-7
 """Far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode."""
@@ -98,9 +98,10 @@ def find_operating_point(
         if present := described(master.system.wires):
             raise AnalysisError(
                 f"no steady state found with {'; '.join(present)}: leave it out, or let it begin later, as an event "
-                f"([[events]] with a time); {changes}"
+                f"([[events]] with a time); {changes}",
+                kind=ErrorKind.STEADY_STATE,
             )
-        raise AnalysisError(f"no steady state found: {changes}; {what_to_check(master)}")
+        raise AnalysisError(f"no steady state found: {changes}; {what_to_check(master)}", kind=ErrorKind.STEADY_STATE)
     values = dict(zip(names, x.tolist(), strict=True))
     return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
 
@@ -114,7 +115,8 @@ def _periodic_point(master: Master, steps: int, tolerance: float, accept: float,
         worst = ", ".join(f"{found.names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3])
         raise AnalysisError(
             f"no steady state found: {_newton_in_words(found.iterations)} a period of {period:g} s, after which "
-            f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}"
+            f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}",
+            kind=ErrorKind.STEADY_STATE,
         )
     values = {name: x for name, x in zip(found.names, found.x.tolist(), strict=True) if not name.endswith(HELD)}
     return OperatingPoint(found.residual, found.residual / period, found.first, found.iterations, values)
@@ -123,7 +125,7 @@ def _periodic_point(master: Master, steps: int, tolerance: float, accept: float,
 def what_to_check(master: Master) -> str:
     """Where to look for the reason why an initialised system does not stand still."""
     if master.late_starts:
-        late = "; ".join(master.late_starts.values())
+        late = "; ".join(late.text for late in master.late_starts.values())
         return (
             f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
             "mode (`gfor check --only initial_outputs` shows it alone)"

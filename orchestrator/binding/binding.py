@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.binding.scales import PER_UNIT, Bases, amount, unit_of
+from orchestrator.binding.scales import PER_UNIT, Bases, UnitsDifferError, amount, unit_of
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
-from orchestrator.errors import BindingError, Problem
+from orchestrator.errors import BindingError, ErrorKind, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
 from orchestrator.fmi.port import (
     START,
@@ -122,7 +122,8 @@ class _Reader:
         try:
             yield
         except ValueError as error:
-            self._problems.append(Problem(place, str(error)))
+            kind = ErrorKind.UNITS if isinstance(error, UnitsDifferError) else ErrorKind.VALUES
+            self._problems.append(Problem(place, str(error), kind))
 
     def _variable(self, name: str, *causalities: str, kind: str = "Real") -> VariableInfo:
         info = self._fmu.variables.get(name)

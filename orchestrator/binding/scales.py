@@ -16,6 +16,10 @@ _VALUES = {
 """Factor of each kind of voltage to the line-to-line rms voltage."""
 
 
+class UnitsDifferError(ValueError):
+    """A binding gives another unit than the FMU declares."""
+
+
 def unit_of(info: VariableInfo, given: str | None) -> str:
     """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one.
 
@@ -33,7 +37,7 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
     if declared in ("", "1", "-"):
         return given
     if (given == PER_UNIT) != (declared in _NO_UNIT) or (given != PER_UNIT and factor(declared, given, info.name) != 1):
-        raise ValueError(
+        raise UnitsDifferError(
             f"unit = {given!r}, but the FMU declares {info.name} in {declared!r}; give the declared one, "
             "or have the FMU's modelDescription.xml corrected"
         )

@@ -10,7 +10,7 @@ from orchestrator.cases.network_data import NetworkData
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
 from orchestrator.coupling.system import System
-from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, Problem
+from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
 
 Locate = Callable[..., str]
 COMMAND_LINE = "--set"
@@ -103,7 +103,7 @@ class Draft:
     whole: bool = True
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
-    def note(self, place: str, text: str) -> None:
+    def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         """Add a problem, once.
 
         Raises
@@ -111,7 +111,7 @@ class Draft:
         CaseError
             If there are more than `MOST_PROBLEMS`.
         """
-        problem = Problem(place, text)
+        problem = Problem(place, text, kind)
         if problem not in self.problems:
             self.problems.append(problem)
             if len(self.problems) > MOST_PROBLEMS:

@@ -8,7 +8,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import NewtonResult, solve
-from orchestrator.errors import InputError
+from orchestrator.errors import PowerFlowError
 
 Limits = Mapping[str, tuple[float, float]]
 """Least and most reactive power of the units at a bus together [pu, 100 MVA], by bus."""
@@ -77,7 +77,7 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
 
     Raises
     ------
-    InputError
+    PowerFlowError
         If the buses at a limit do not settle.
     """
     position = {bus: k for k, bus in enumerate(equations.buses)}
@@ -102,7 +102,7 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
             returns[bus] += 1
         current = _with_fixed(equations, at_limit, position)
         result = solve(current)
-    raise InputError(
+    raise PowerFlowError(
         f"power flow: the buses at a limit of reactive power do not settle in {_ROUNDS} rounds: "
         f"{', '.join(map(repr, list(at_limit)[:5]))}; widen their limits, or set reactive_limits = false"
     )

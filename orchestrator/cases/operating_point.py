@@ -7,7 +7,7 @@ from orchestrator.cases.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.start_values import start_from_power_flow
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import ErrorKind, InputError, Problem
 
 _USUAL_VOLTAGES = (0.8, 1.2)
 """Magnitudes [pu] of bus voltages that are not questioned."""
@@ -47,7 +47,8 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
             keep_limits=table.reactive_limits is True,
         )  # fmt: skip
     except InputError as error:
-        draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}")
+        kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
+        draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}", kind)
         return None
     question(draft, undecided)
     draft.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]

@@ -9,7 +9,7 @@ from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_failure import explain
 from orchestrator.cases.flow_limits import Excess, Limits, exceeded, solve_with_limits
 from orchestrator.cases.flow_newton import solve
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, PowerFlowError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
@@ -134,11 +134,11 @@ def solve_power_flow(
             fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
             return FlowEquations.of(buses, lines, drawn, fewer, active, held, slack_bus)
 
-        raise InputError(explain(equations, result, with_stray if any(s.stray for s in shunts) else None))
+        raise PowerFlowError(explain(equations, result, with_stray if any(s.stray for s in shunts) else None))
     voltages = dict(zip(equations.buses, map(complex, result.voltages), strict=True))
     flow = _shares(voltages, nodal_powers(voltages, lines, drawn, shunts), at_bus, slack_bus)
     if not flow.residual <= _TOLERANCE:
-        raise InputError(
+        raise PowerFlowError(
             f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
             "check for very small reactances"
         )

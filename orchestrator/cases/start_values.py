@@ -12,7 +12,7 @@ from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
-from orchestrator.errors import InputError
+from orchestrator.errors import ErrorKind, InputError
 
 
 def start_from_power_flow(
@@ -171,6 +171,7 @@ def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex
         if most is not None and abs(start[variable]) > most:
             raise InputError(
                 f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "
-                "raise its S_n, or move load and generation"
+                "raise its S_n, or move load and generation",
+                kind=ErrorKind.START,
             )
     plan.parameters |= start

@@ -8,6 +8,7 @@ from orchestrator.certification.margins import CriterionMargin, margins_of, narr
 from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
 from orchestrator.errors import InputError
+from orchestrator.points.failure import Failure
 
 NOT_TESTED, FIGURES = "not tested", "no verdict"
 """In place of a verdict: where a device could not be tested at all, and where a code gives figures alone."""
@@ -40,7 +41,7 @@ class MatrixCell:
     device: str
     code: str
     folder: str
-    failure: str | None = None
+    failure: Failure | None = None
     verdict: str = NOT_TESTED
     sentence: str = ""
     margins: Sequence[CriterionMargin] = ()

@@ -68,7 +68,8 @@ def _cell_json(cell: MatrixCell) -> dict[str, Any]:
     least = cell.narrowest
     return {
         "device": cell.device, "code": cell.code, "verdict": cell.verdict, "exit_code": cell.exit_code,
-        "sentence": cell.sentence, "failure": cell.failure, "judged": cell.judged, "missing": cell.missing,
+        "sentence": cell.sentence, "failure": None if cell.failure is None else str(cell.failure),
+        "judged": cell.judged, "missing": cell.missing,
         "acceptance_failed": cell.refused, "narrowest": None if least is None else asdict(least),
         "failed": [asdict(m) for m in cell.failed],
         "certificate": None if cell.failure is not None or cell.figures is not None else f"{cell.folder}/{JSON}",
@@ -108,7 +109,7 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
         [escape(cell.device), escape(cell.code.upper()), *_failed_html(m)]
         for cell in matrix.cells.values() for m in cell.failed
     ]  # fmt: skip
-    lost = [[escape(c.device), escape(c.code.upper()), escape(c.failure).replace("\n", "<br>")]
+    lost = [[escape(c.device), escape(c.code.upper()), escape(str(c.failure)).replace("\n", "<br>")]
             for c in matrix.cells.values() if c.failure is not None]  # fmt: skip
     columns = ["Device", "Code", "Where", "Criterion", "Found", "Margin"]
     width = 1 + len(matrix.devices)

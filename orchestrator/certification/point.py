@@ -17,7 +17,7 @@ from orchestrator.cases.case import Case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.points.executor import WorkerLostError
-from orchestrator.points.failure import failure_kept
+from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.points.key import same_case
 from orchestrator.points.signals import signal_arrays, take_signals
 from orchestrator.points.store import Arrays
@@ -103,7 +103,7 @@ class PointResult:
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     findings: list[dict[str, Any]] = field(default_factory=list)
-    failure: str | None = None
+    failure: Failure | None = None
 
     @property
     def lasting(self) -> bool:
@@ -113,7 +113,7 @@ class PointResult:
     @classmethod
     def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
         """The result of a point whose worker died."""
-        return cls(task.X_L, task.scenario, failure=str(error))
+        return cls(task.X_L, task.scenario, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""

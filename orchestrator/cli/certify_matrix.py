@@ -23,7 +23,7 @@ from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.certify_stiffness import measured_figures
 from orchestrator.cli.terminal import make_console, make_errors
 from orchestrator.errors import InputError
-from orchestrator.points.failure import failure_kept
+from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -140,7 +140,7 @@ def _take_needs(
 
 @dataclass
 class _Note:
-    failure: str | None = None
+    failure: Failure | None = None
 
 
 def _check_any(matrix: CertificateMatrix) -> None:

@@ -78,9 +78,7 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     if options.json:
         print(json.dumps(design.as_json(), indent=1, ensure_ascii=False))
     else:
-        colour = {True: "green", False: "red", None: "yellow"}[verdict.met]
-        word, _, rest = design.verdict.partition(":")
-        console.print(f"[bold {colour}]{word}[/]:{escape(rest)}", soft_wrap=True, highlight=False)
+        console.print(words.verdict_of(verdict).markup(), soft_wrap=True, highlight=False)
         console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
         for table in (words.settings_table(design.result), words.points_table(verdict)):
             console.print("", table)

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
         highlight=False,
     )
     if missing := missing_binary(description):
-        console.print(f"[bold]It cannot run here[/bold]: {escape(missing)}", highlight=False)
+        console.print(f"[bold]It cannot run here[/bold]: {escape('; '.join(missing))}", highlight=False)
     if description.kept_in:
         why = f" ({description.kept_why})" if description.kept_why else ""
         kept = KEPT_IN.get(description.kept_in, description.kept_in)

@@ -22,10 +22,9 @@ from orchestrator.fmi.devices import as_device
 from orchestrator.interactions import tables
 from orchestrator.interactions.request import RANGE_HZ, THRESHOLD, GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.interactions.words import verdict_of
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
-
-_COLOURS = {True: "green", False: "red", None: "yellow"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -135,10 +134,8 @@ def _present(found: Interactions, folder: Path, console: Console, *, as_json: bo
     if as_json:
         print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
         return
-    first, *rest = found.sentences
-    word, _, tail = first.partition(":")
-    console.print(f"[bold {_COLOURS[found.stable]}]{word}[/]:{escape(tail)}", soft_wrap=True, highlight=False)
-    for text in rest:
+    console.print(verdict_of(judgement).markup(), soft_wrap=True, highlight=False)
+    for text in found.sentences[1:]:
         console.print(escape(text), soft_wrap=True, highlight=False)
     console.print("", tables.modes_table(judgement), "", tables.systems_table(judgement), "")
     if result.plan.swapped:

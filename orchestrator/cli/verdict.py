@@ -7,9 +7,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.analysis.stability import Stability
+from orchestrator.report.verdict import COLOURS, VerdictSentence
 from orchestrator.study.modes import ModesResult
-
-_COLOURS = {True: "green", False: "red", None: "yellow"}
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
@@ -34,10 +33,8 @@ def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str
     """The lines that `print_stability` prints, as rich markup."""
     lines = [_headline(verdicts)] if len(verdicts) != 1 else []
     for title, verdict in verdicts.items():
-        colour = _COLOURS[verdict.stable]
-        word, _, rest = verdict.sentence().partition(":")
         head = "" if len(verdicts) == 1 else "  "
-        lines.append(f"{head}[bold {colour}]{word}[/]: {escape(title)}:{escape(rest)}")
+        lines.append(head + VerdictSentence(verdict.stable, verdict.verdict, verdict.because()).markup(title))
         if outside.get(title):
             lines.append(f"{head}  {escape(outside[title])}")
     return lines
@@ -48,7 +45,7 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
     for wanted, text in ((False, "UNSTABLE"), (None, "stability not known")):
         found = [title for title, verdict in verdicts.items() if verdict.stable is wanted]
         if found:
-            return f"[bold {_COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
+            return f"[bold {COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
     return f"[bold green]stable[/]: all {len(verdicts)}"
 
 

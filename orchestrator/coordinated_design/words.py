@@ -10,12 +10,18 @@ from orchestrator.coordinated_design.study import PointsDesign
 from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.report.tables import make_table
+from orchestrator.report.verdict import VerdictSentence
 
 _ROWS, _SHOWN = 12, 4
 
 
 def verdict_sentence(verdict: PointsVerdict) -> str:
     """The verdict on all points and outages in one sentence; the first word says it."""
+    return str(verdict_of(verdict))
+
+
+def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
+    """The verdict on all points and outages."""
     total, wanted = len(verdict.points), verdict.wanted
     limiting, worst = verdict.limiting, verdict.worst
     if limiting is None or limiting.target is None or worst is None:
@@ -25,12 +31,14 @@ def verdict_sentence(verdict: PointsVerdict) -> str:
         tail = f"; least damped: {limiting.where}: {limiting.target.words}{unmoved}"
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
     if verdict.met:
-        return f"REACHED: {aim}{tail}" if wanted is not None else f"better: at all {total} points and outages{tail}"
+        if wanted is not None:
+            return VerdictSentence(True, "REACHED", f"{aim}{tail}")
+        return VerdictSentence(True, "better", f"at all {total} points and outages{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
-        return f"not known: {', '.join(reasons)}{tail}"
+        return VerdictSentence(None, "not known", f"{', '.join(reasons)}{tail}")
     word = "NOT REACHED" if wanted is not None else "NO BETTER"
-    return f"{word}: {', '.join([aim] * bool(aim) + reasons)}{tail}"
+    return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{tail}")
 
 
 def _reasons(verdict: PointsVerdict) -> list[str]:

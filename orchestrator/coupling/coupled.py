@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.late_start import LateStart
 from orchestrator.coupling.memory import apart
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import ComponentPlan, Endpoint, System
@@ -75,7 +76,7 @@ class CoupledComponents:
         schedule.check(set(system.components))
         self.system, self.schedule, self.clock = system, schedule, Clock(step_size)
         self.components: dict[str, Component] = {}
-        self.late_starts: dict[str, str] = {}
+        self.late_starts: dict[str, LateStart] = {}
         self._release, self._stop_time = ExitStack(), stop_time
         try:
             self._instantiate(stop_time, opener)
@@ -180,8 +181,8 @@ class CoupledComponents:
         before = self.y.copy()
         for name, exchange in self.exchanges.items():
             exchange.outputs.read()
-            if text := _jump(self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]):
-                self.late_starts[name] = text
+            if late := _jump(self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]):
+                self.late_starts[name] = late
 
     def _take_start_values(self) -> None:
         """Let every output be what the inputs that it feeds start from."""
@@ -255,13 +256,14 @@ def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
             )  # fmt: skip
 
 
-def _jump(names: Sequence[str], before: Numbers, after: Numbers) -> str:
-    """Which of a component's outputs changed most as its initialisation ended; "" where all stayed."""
+def _jump(names: Sequence[str], before: Numbers, after: Numbers) -> LateStart | None:
+    """Which of a component's outputs changed most as its initialisation ended; None where all stayed."""
     apart = np.abs(after - before) / np.maximum(1.0, np.maximum(np.abs(before), np.abs(after)))
     if not apart.size or not apart.max() > _JUMP:
-        return ""
+        return None
     k = int(apart.argmax())
-    return (
+    text = (
         f"{names[k]} is {before[k]:.4g} before the end of initialisation and {after[k]:.4g} just after it, at the same "
         "inputs"
     )
+    return LateStart(names[k].partition(".")[2], text)

@@ -43,7 +43,7 @@ class Master(Stepper):
     tracks
         Where each of them went, step by step, since an observer last looked.
     late_starts
-        By component, in words, which output was another just after initialisation than just before its end, at the
+        By component, which output was another just after initialisation than just before its end, at the
         same inputs. Its partners were initialised with the first value.
     wires
         The connections that do more than carry a value.

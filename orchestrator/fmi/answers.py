@@ -36,7 +36,7 @@ def content_of(answer: Any, component: str) -> Any:
         at, how, log = _texts(content, 3)
         raise ComponentError(component, at, how, log)
     if kind == "unsupported":
-        raise UnsupportedFmuError(*_texts(content, 2))
+        raise UnsupportedFmuError(*_texts(content, 3))
     if kind == "input_error":
         raise InputError(*_texts([content], 1))
     if kind not in ("result", "done"):

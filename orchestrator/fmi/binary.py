@@ -90,13 +90,13 @@ def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
                     "linked with $ORIGIN in its path, ask its author"
                 )
             return UnsupportedFmuError(
-                f"{fmu}: it needs {name}, which this machine has not; install it", "missing system library"
+                f"{fmu}: it needs {name}, which this machine has not", "missing system library", "install it"
             )
     if found := _NEWER.search(text):
         return UnsupportedFmuError(
-            f"{fmu}: it needs {found.group(1)}, and this system is older; run it on a newer one, or ask for a build "
-            "that needs less",
+            f"{fmu}: it needs {found.group(1)}, and this system is older",
             "newer system needed",
+            "run it on a newer one, or ask for a build that needs less",
         )
     if found := _UNDEFINED.search(text):
         return FmuFileError(

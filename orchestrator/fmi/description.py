@@ -201,18 +201,18 @@ def read_description(path: Path | str) -> FmuDescription:
     """
     described = read_declared(path)
     if missing := missing_binary(described):
-        raise UnsupportedFmuError(f"{described.path}: {missing}", "another platform")
+        raise UnsupportedFmuError(f"{described.path}: {missing[0]}", "another platform", missing[1])
     return described
 
 
-def missing_binary(described: FmuDescription) -> str | None:
-    """What an FMU lacks that it could run on this platform."""
+def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
+    """What an FMU lacks that it could run on this platform, and the remedy."""
     if fmpy.platform in described.platforms or runs_under_wine(described):
         return None
     has = ", ".join(described.platforms) or "none"
     return (
-        f"it has no binary for this platform ({fmpy.platform}), only for: {has}; "
-        f"ask its author for a {fmpy.platform} build{_or_wine(described)}"
+        f"it has no binary for this platform ({fmpy.platform}), only for: {has}",
+        f"ask its author for a {fmpy.platform} build{_or_wine(described)}",
     )
 
 
@@ -259,9 +259,9 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
     version = _fmi_version(root)
     if version not in VERSIONS:
         raise UnsupportedFmuError(
-            f"{path}: it is an FMU of FMI {version[:20]}; this master runs co-simulation of FMI 2.0 and 3.0, ask for "
-            "one of these",
+            f"{path}: it is an FMU of FMI {version[:20]}",
             "another version of FMI",
+            "this master runs co-simulation of FMI 2.0 and 3.0, ask for one of these",
         )
     try:
         description = fmpy.read_model_description(_only(_with_initial(text, root)), validate=False)
@@ -278,8 +278,9 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
         kinds = [words for name, words in _OTHER_KINDS.items() if root.find(name) is not None]
         raise UnsupportedFmuError(
             f"{path}: it is not an FMU for co-simulation ({' and '.join(kinds) or 'of no kind'} only), which this "
-            "master needs; ask for that export",
+            "master needs",
             "no co-simulation",
+            "ask for that export",
         )
     return described
 

@@ -134,14 +134,15 @@ def refuse_other_clocks(description: FmuDescription) -> None:
     if others:
         raise UnsupportedFmuError(
             f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has "
-            "clocks that tick by the time only; ask for an export with periodic clocks",
+            "clocks that tick by the time only",
             "triggered clocks",
+            "ask for an export with periodic clocks",
         )
     if len(description.clocks) > MOST_CLOCKS:
         raise UnsupportedFmuError(
-            f"{description.path}: it has {len(description.clocks)} clocks, and this master has room for {MOST_CLOCKS}; "
-            "ask for an export with fewer",
+            f"{description.path}: it has {len(description.clocks)} clocks, and this master has room for {MOST_CLOCKS}",
             "too many clocks",
+            "ask for an export with fewer",
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.removal import remove_tree
-from orchestrator.errors import ComponentError, InputError, NotFiniteError
+from orchestrator.errors import ComponentError, ErrorKind, InputError, NotFiniteError
 from orchestrator.fmi.answers import (
     NotAnAnswerError,
     content_of,
@@ -56,6 +56,7 @@ class IsolatedComponent(RemoteCalls, Derived):
         self.name, self.description, self.limits = name, description, limits or Limits()
         self._process: ConfinedProcess | None = None
         self._end: str | None = None
+        self._end_kind = ErrorKind.FMU
         self._own_directory = extract(description.path) if directory is None else None
         self.protections: tuple[Protection, ...] = ()
         calls.watch()
@@ -101,7 +102,8 @@ class IsolatedComponent(RemoteCalls, Derived):
             self._give_up("interrupted: its process was ended")
             raise KeyboardInterrupt
         if status in (DIED, HUNG, TAMPERED):
-            raise ComponentError(self.name, call, self._how_it_ended(status), self._last_words(), time)
+            ended = self._how_it_ended(status)
+            raise ComponentError(self.name, call, ended, self._last_words(), time, self._end_kind)
         raise refusal(self, self._texts, status, call, time)
 
     def _texts(self, least: int = 0) -> list[str]:
@@ -119,6 +121,7 @@ class IsolatedComponent(RemoteCalls, Derived):
             return self._end
         assert self._process is not None
         if status == HUNG:
+            self._end_kind = ErrorKind.HANG
             return self._give_up(f"hang: no answer within {self._box.client.patience:g} s; its process was ended")
         if status == TAMPERED:
             return self._give_up("tampering: an answer that no call of FMI gives; its process was ended")
@@ -144,7 +147,7 @@ class IsolatedComponent(RemoteCalls, Derived):
     def _remote(self, call: str, command: str, *arguments: Any) -> Any:
         """Have something done in the other process that needs more than numbers."""
         if self._end is not None:
-            raise ComponentError(self.name, call, self._end, "")
+            raise ComponentError(self.name, call, self._end, "", kind=self._end_kind)
         self._box.clear_log()
         self._box.write_text([command, *arguments])
         with calls:

@@ -72,7 +72,7 @@ class Worker:
         except ComponentError as error:
             answer = {"component_error": [error.call, error.status, error.log]}
         except UnsupportedFmuError as error:
-            answer = {"unsupported": [str(error), error.kind]}
+            answer = {"unsupported": [error.evidence, error.fault, error.remedy]}
         except CosimError as error:
             answer = {"input_error": str(error)}
         except MemoryError:

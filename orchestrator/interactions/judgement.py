@@ -9,6 +9,7 @@ sum to 1.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from orchestrator.errors import ErrorKind
 from orchestrator.interactions.exchange import settings_of
 from orchestrator.interactions.places import NOT_VENDORS, by_group, first_of
 from orchestrator.interactions.point import SharedMode, SystemRecord
@@ -19,7 +20,6 @@ SAME = 0.01
 """A damping that falls by no more than this [points] is the same: what a perturbation leaves open."""
 
 
-_HIDES = "--black-box"
 """In the reason why a component that hides its states cannot be linearised."""
 
 
@@ -303,7 +303,8 @@ def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
         for name, record in result.records.items()
         if record.error is not None
     ]
-    if not plan.request.black_box and any(_HIDES in (record.error or "") for record in result.records.values()):
+    kinds = {record.failure.kind for record in result.records.values() if record.failure is not None}
+    if not plan.request.black_box and ErrorKind.HIDDEN_STATES in kinds:
         found.append("here too --black-box identifies the components that hide their states")
     if plan.swapped:
         found += [

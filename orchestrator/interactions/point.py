@@ -17,7 +17,7 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.interactions.exchange import exchanged_case, require_same_flow
 from orchestrator.points.executor import WorkerLostError
-from orchestrator.points.failure import why_failed
+from orchestrator.points.failure import Failure
 from orchestrator.points.key import same_case
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import ModesResult, compute_modes, running
@@ -101,8 +101,9 @@ class SystemRecord:
         Oscillations of the range, least damped first.
     growing
         The mode that grows fastest, at any frequency; None where nothing is known to grow.
-    stability
-        The verdict over the whole spectrum, as `Stability.as_json` gives it; empty where it failed.
+    stability, because
+        The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where it
+        failed.
     warnings
         What is to be borne in mind of it.
     identified
@@ -111,21 +112,29 @@ class SystemRecord:
         Their number.
     residual
         Of the steady state, as in `OperatingPoint`.
-    error
+    failure
         Why there are no modes; None where there are.
-    lasting
-        Whether computing it again would give the same.
     """
 
     modes: tuple[SharedMode, ...] = ()
     growing: SharedMode | None = None
     stability: dict[str, Any] = field(default_factory=dict)
+    because: str = ""
     warnings: tuple[str, ...] = ()
     identified: tuple[str, ...] = ()
     states: int = 0
     residual: float = float("nan")
-    error: str | None = None
-    lasting: bool = True
+    failure: Failure | None = None
+
+    @property
+    def error(self) -> str | None:
+        """The message of the failure."""
+        return None if self.failure is None else self.failure.text
+
+    @property
+    def lasting(self) -> bool:
+        """Whether computing it again would give the same."""
+        return self.failure is None or self.failure.lasting
 
     @property
     def stable(self) -> bool | None:
@@ -136,7 +145,7 @@ class SystemRecord:
     @classmethod
     def lost(cls, _: SystemTask, error: WorkerLostError) -> Self:
         """The record of a system whose worker died."""
-        return cls(error=str(error), lasting=False)
+        return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header for a `PointStore`; there are no arrays."""
@@ -149,7 +158,8 @@ class SystemRecord:
             growing = header["growing"]
             lists = {name: tuple(header[name]) for name in ("warnings", "identified")}
             modes = tuple(SharedMode(**mode) for mode in header["modes"])
-            own = lists | {"modes": modes, "growing": None if growing is None else SharedMode(**growing)}
+            own = lists | {"modes": modes, "growing": None if growing is None else SharedMode(**growing),
+                           "failure": Failure.restored(header["failure"])}  # fmt: skip
             return None if arrays else cls(**header | own)
         except (KeyError, TypeError, ValueError):
             return None
@@ -168,8 +178,7 @@ def compute_system(task: SystemTask) -> SystemRecord:
         try:
             return _record(_modes(case, task))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other systems
-            text, lasting = why_failed(error)
-            return SystemRecord(error=text, lasting=lasting)
+            return SystemRecord(failure=Failure.of(error))
 
 
 def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:
@@ -194,6 +203,7 @@ def _record(result: ModesResult) -> SystemRecord:
         modes=tuple(SharedMode.of(mode) for mode in result.modes if mode.is_oscillation),
         growing=SharedMode.of(stability.mode) if grows and stability.mode is not None else None,
         stability=stability.as_json(),
+        because=stability.because(),
         warnings=result.warnings,
         identified=tuple(name for name, source in result.linearised.items() if source == IDENTIFIED),
         states=result.model.number_of_states,

@@ -1,6 +1,7 @@
 """What a study of interactions says, in sentences."""
 
 from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem, place_of, plan_text
+from orchestrator.report.verdict import VerdictSentence
 
 _SHOWN = 3
 
@@ -22,12 +23,11 @@ def frequency_text(system: JudgedSystem) -> str:
     return "" if system.critical is None else place_of(system.critical)
 
 
-def whole_sentence(judgement: JudgedInteractions) -> str:
+def verdict_of(judgement: JudgedInteractions) -> VerdictSentence:
     """The verdict on the system as it is."""
     whole = judgement.whole.record
-    if whole.error is not None:
-        return f"not known: {whole.error}"
-    return str(whole.stability["sentence"])
+    word = {True: "stable", False: "UNSTABLE", None: "not known"}[whole.stable]
+    return VerdictSentence(whole.stable, word, whole.error or whole.because)
 
 
 def modes_sentence(judgement: JudgedInteractions) -> str:
@@ -102,7 +102,7 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
 def sentences(judgement: JudgedInteractions) -> list[str]:
     """All of them, the verdict on the system as it is first."""
     every = [
-        whole_sentence(judgement),
+        str(verdict_of(judgement)),
         modes_sentence(judgement),
         alone_sentence(judgement),
         pairs_sentence(judgement),

@@ -1,16 +1,61 @@
 """A point that cannot be computed says why; the other points stand."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
 
-from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
+import numpy as np
+
+from orchestrator.errors import CaseError, CosimError, ErrorKind
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a point could not be computed.
+
+    Attributes
+    ----------
+    kind
+        What is wrong.
+    text
+        The message.
+    lasting
+        Whether the same would come out again, so that it need not be tried.
+    """
+
+    kind: ErrorKind
+    text: str
+    lasting: bool
+
+    @classmethod
+    def of(cls, error: BaseException) -> Self:
+        """What an error means for the point at which it happened."""
+        if isinstance(error, CosimError):
+            text = "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
+            return cls(error.kind, text, error.kind.lasting)
+        if isinstance(error, np.linalg.LinAlgError):
+            return cls(ErrorKind.ANALYSIS, f"no eigenvalues: {error}", True)
+        return cls(ErrorKind.OTHER, f"{type(error).__name__}: {error}", False)
+
+    @classmethod
+    def lost(cls, error: Exception) -> Self:
+        """Of a point whose worker died."""
+        return cls(ErrorKind.WORKER_LOST, str(error), False)
+
+    @classmethod
+    def restored(cls, kept: Mapping[str, Any] | None) -> Self | None:
+        """The failure from its form as JSON, None where there was none."""
+        return None if kept is None else cls(ErrorKind(kept["kind"]), kept["text"], kept["lasting"])
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class Failing(Protocol):
     """The result of a point that may hold a failure in place of figures."""
 
-    failure: str | None
+    failure: Failure | None
 
 
 @contextmanager
@@ -22,26 +67,9 @@ def failure_kept(result: Failing) -> Iterator[None]:
     Parameters
     ----------
     result
-        Takes the reason; what was computed before the error stays in it.
+        Takes the failure; what was computed before the error stays in it.
     """
     try:
         yield
-    except CosimError as error:
-        result.failure = str(error)
     except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
-        result.failure = f"{type(error).__name__}: {error}"
-
-
-def why_failed(error: Exception) -> tuple[str, bool]:
-    """What ended the computation of a point, and whether the same would come out again.
-
-    Parameters
-    ----------
-    error
-        An FMU may start another time; what is wrong in a case or in its equations stays so.
-    """
-    if isinstance(error, CaseError):
-        return "; ".join(str(problem) for problem in error.problems), not isinstance(error.__cause__, ComponentError)
-    if isinstance(error, CosimError):
-        return str(error), isinstance(error, AnalysisError)
-    return f"{type(error).__name__}: {error}", False
+        result.failure = Failure.of(error)

@@ -10,9 +10,11 @@ from orchestrator.analysis.state_access import StateAccess
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.step_awareness import other_step
+from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.instance import is_ours
 from orchestrator.study.modes import running
+from orchestrator.study.start_errors import start_error
 
 DRIVEN, OBSERVED = ("droop.delta_P_ref", "droop.delta_Q_ref"), ("omega",)
 """Of a converter: where damping controllers act, and what they measure."""
@@ -35,8 +37,11 @@ class ScreeningBench:
         if self._master is not None and _same_fmus(self._master, prepared):
             try:
                 self._master.restart(prepared.system)
-            except BaseException:
+            except BaseException as error:
                 self.close()
+                found = start_error(prepared, error) if isinstance(error, ComponentError) else None
+                if found is not None:
+                    raise found from error
                 raise
             self._master.index, self._master.handed_over = 0, False
             return self._master

@@ -12,7 +12,8 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.system import System
-from orchestrator.errors import AnalysisError, CaseError, ComponentError, CosimError
+from orchestrator.errors import CosimError, ErrorKind
+from orchestrator.points.failure import Failure
 from orchestrator.screening.columns import Elements
 from orchestrator.screening.outages import cut_off
 from orchestrator.screening.record import Item, Status
@@ -23,8 +24,17 @@ ACCEPT = 1e-9
 
 _PACKAGE = Path(__file__).parent.parent
 
-_REFUSED = "parameters cannot be used"
-"""In the message of an FMU of ours that cannot start from an operating point, such as a converter beyond its limit."""
+_STATUS = {
+    ErrorKind.INPUT: Status.VALUES,
+    ErrorKind.VALUES: Status.VALUES,
+    ErrorKind.UNITS: Status.VALUES,
+    ErrorKind.POWER_FLOW: Status.POWER_FLOW,
+    ErrorKind.START: Status.STEADY_STATE,
+    ErrorKind.STEADY_STATE: Status.STEADY_STATE,
+    ErrorKind.HIDDEN_STATES: Status.MODES,
+    ErrorKind.ANALYSIS: Status.MODES,
+}
+"""What an error of each kind makes of an item; of any other kind, an FMU failed."""
 
 
 class ItemPreparation:
@@ -88,19 +98,10 @@ class ItemPreparation:
 
 def failure(error: Exception) -> tuple[Status, str, bool]:
     """What an error at an item means: its status, the text, and whether the same would come out again."""
-    if isinstance(error, CaseError):
-        text = "; ".join(str(problem) for problem in error.problems)
-        kind = Status.POWER_FLOW if "power flow" in text else Status.VALUES
-        return kind, text, not isinstance(error.__cause__, ComponentError)
-    if isinstance(error, AnalysisError):
-        return Status.STEADY_STATE if "no steady state" in str(error) else Status.MODES, str(error), True
-    if isinstance(error, CosimError):
-        if _REFUSED in str(error) or " cannot start: " in str(error):  # the same values are refused again
-            return Status.VALUES, str(error), True
-        return Status.FMU, str(error), False
-    if isinstance(error, np.linalg.LinAlgError):
-        return Status.MODES, f"no eigenvalues: {error}", True
-    return Status.INTERNAL, unexpected(error), False
+    found = Failure.of(error)
+    if not isinstance(error, (CosimError, np.linalg.LinAlgError)):
+        return Status.INTERNAL, unexpected(error), found.lasting
+    return _STATUS.get(found.kind, Status.FMU), found.text, found.lasting
 
 
 def unexpected(error: Exception) -> str:

@@ -8,16 +8,14 @@ from rich.table import Table
 from orchestrator.report.tables import PlainTable
 from orchestrator.screening.record import Status
 from orchestrator.screening.summary import Summary
-from orchestrator.screening.words import verdict_sentence, what_was_counted, where
+from orchestrator.screening.words import verdict_of, what_was_counted, where
 
 _ROWS, _SHOWN = 12, 4
-_COLOURS = {True: "green", False: "red", None: "yellow"}
 
 
 def verdict(summary: Summary) -> str:
     """The verdict as rich markup, and what it rests on."""
-    word, _, rest = verdict_sentence(summary).partition(":")
-    return f"[bold {_COLOURS[summary.stable]}]{word}[/]:{escape(rest)}\n{escape(what_was_counted(summary))}"
+    return f"{verdict_of(summary).markup()}\n{escape(what_was_counted(summary))}"
 
 
 def modes(summary: Summary) -> Table:

@@ -7,6 +7,7 @@ import numpy as np
 from orchestrator.analysis.critical_modes import DENSE
 from orchestrator.analysis.eigenvalue_count import GROWING
 from orchestrator.analysis.stability import zeros_in_words
+from orchestrator.report.verdict import VerdictSentence
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord, Status
 from orchestrator.screening.study import ScreenedItem
@@ -15,6 +16,11 @@ from orchestrator.screening.summary import ModeAt, Summary
 
 def verdict_sentence(summary: Summary) -> str:
     """The verdict on all points and outages in one sentence."""
+    return str(verdict_of(summary))
+
+
+def verdict_of(summary: Summary) -> VerdictSentence:
+    """The verdict on all points and outages."""
     total = len(summary.result.items)
     if summary.unstable:
         worst = summary.unstable[0]
@@ -22,7 +28,8 @@ def verdict_sentence(summary: Summary) -> str:
             if one.item.record.stable is False:
                 worst = one.item
                 break
-        return f"UNSTABLE: {_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}"
+        text = f"{_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}"
+        return VerdictSentence(False, "UNSTABLE", text)
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
     tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
@@ -32,7 +39,8 @@ def verdict_sentence(summary: Summary) -> str:
             f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
         )
     if summary.stable:
-        return f"stable: nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
+        text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
+        return VerdictSentence(True, "stable", text)
     left = summary.result.plan.number_of_items - total
     missing = [f"{number} {status}" for status, number in summary.counts.items() if status is not Status.COMPUTED]
     missing += [f"{left} not computed yet"] if left else []
@@ -44,7 +52,8 @@ def verdict_sentence(summary: Summary) -> str:
         )
     doubtful = sum(item.record.stable is None and item.record.counted for item in summary.result.items)
     missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
-    return f"not known: nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+    text = f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+    return VerdictSentence(None, "not known", text)
 
 
 def what_was_counted(summary: Summary) -> str:

@@ -1,14 +1,15 @@
 """What a component says that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import CaseError, ComponentError, Problem
+from orchestrator.errors import ComponentError, ErrorKind, Problem, StartError
+from orchestrator.fmi.instance import is_ours
 
 _INITIALISATION = "InitializationMode"
 _PREFACE = "parameters cannot be used: "
 """Begins what our models say of values that do not fit together."""
 
 
-def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError | None:
+def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
     """The error of a component that refused to initialise; None for any other call, and where its process died."""
     refused = error.status.removeprefix("fmi2").removeprefix("fmi3") in ("Error", "Discard", "an error in the log")
     if not refused or _INITIALISATION not in error.call or error.component not in prepared.places:
@@ -32,7 +33,9 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> CaseError 
                 f". Where that is too much for it, raise {_rating(prepared, name)}, change the voltages or loads "
                 "around it, or give a component its Q_0 in place of v_0"
             )
-    return CaseError(str(prepared.case.path), [Problem(prepared.places[name], text)])
+    # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
+    kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
+    return StartError(str(prepared.case.path), Problem(prepared.places[name], text, kind), name)
 
 
 def _rating(prepared: PreparedScenario, name: str) -> str:

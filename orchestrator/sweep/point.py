@@ -4,7 +4,7 @@ Everything here can be sent to another process or another machine.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
@@ -13,7 +13,7 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.points.executor import WorkerLostError
-from orchestrator.points.failure import why_failed
+from orchestrator.points.failure import Failure
 from orchestrator.points.key import fingerprint, key_of, reference_to, same_case, scenario_content
 from orchestrator.points.store import Arrays
 from orchestrator.study.modes import ModesResult, compute_modes
@@ -64,26 +64,35 @@ class PointRecord:
         Least damped first.
     named
         Names that the case gives to some of these modes, by index.
-    error
-        The message of the failure; None for a point with modes.
-    lasting
-        Whether computing the point again would give the same result; False if a worker, the machine or an FMU failed.
+    failure
+        Why there are none; None for a point with modes.
     residual
         Of the steady state, as in `OperatingPoint`.
     linearised
         How the linear model of every component was found.
-    stability
-        The verdict over the whole spectrum, as `Stability.as_json` gives it; empty where the point failed.
+    stability, because
+        The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where the
+        point failed.
     """
 
     modes: ModeSet | None = None
     named: dict[str, int] = field(default_factory=dict)
-    error: str | None = None
-    lasting: bool = True
+    failure: Failure | None = None
     residual: float = float("nan")
     warnings: tuple[str, ...] = ()
     linearised: dict[str, str] = field(default_factory=dict)
     stability: dict[str, Any] = field(default_factory=dict)
+    because: str = ""
+
+    @property
+    def error(self) -> str | None:
+        """The message of the failure."""
+        return None if self.failure is None else self.failure.text
+
+    @property
+    def lasting(self) -> bool:
+        """Whether computing the point again would give the same result."""
+        return self.failure is None or self.failure.lasting
 
     @property
     def is_unstable(self) -> bool:
@@ -93,11 +102,12 @@ class PointRecord:
     @classmethod
     def lost(cls, _: SweepPointTask, error: WorkerLostError) -> Self:
         """The record of a point whose worker died."""
-        return cls(error=str(error), lasting=False)
+        return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""
         header = {name: value for name, value in vars(self).items() if name != "modes"}
+        header["failure"] = None if self.failure is None else asdict(self.failure)
         return (header, {}) if self.modes is None else (header | {"names": self.modes.names}, self.modes.arrays())
 
     @classmethod
@@ -106,7 +116,8 @@ class PointRecord:
         try:
             names = tuple(header.pop("names", ()))
             modes = ModeSet(**arrays, names=names) if arrays else None
-            return cls(**header | {"warnings": tuple(header["warnings"]), "modes": modes})
+            failure = Failure.restored(header["failure"])
+            return cls(**header | {"warnings": tuple(header["warnings"]), "failure": failure, "modes": modes})
         except (KeyError, TypeError, ValueError):
             return None
 
@@ -163,8 +174,7 @@ def compute_point(task: SweepPointTask) -> PointRecord:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
             return _record(compute_modes(prepared, task.frequency_range))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
-            text, lasting = why_failed(error)
-            return PointRecord(error=text, lasting=lasting)
+            return PointRecord(failure=Failure.of(error))
 
 
 def _record(result: ModesResult) -> PointRecord:
@@ -176,4 +186,5 @@ def _record(result: ModesResult) -> PointRecord:
         warnings=result.warnings,
         linearised=result.linearised,
         stability=result.stability.as_json(),
+        because=result.stability.because(),
     )

@@ -56,7 +56,7 @@ def stability(samples: Samples) -> list[str]:
         title, places, known = escape(sweep.prepared.title), sweep.unstable(axes), sweep.counts(axes)
         rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
         if places:
-            worst = sweep.points[places[0]].stability["sentence"].removeprefix("UNSTABLE: ")
+            worst = sweep.points[places[0]].because
             where = escape(
                 f"at {len(places)} of {total} points{rest}; worst at {place_text(samples, places[0])}: {worst}"
             )

@@ -9,6 +9,7 @@ import numpy as np
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.filtered_recorder import FilteredRecorder
+from orchestrator.coupling.late_start import LateStart
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
@@ -70,7 +71,7 @@ class Watch:
         self.observers = (self.recorder, self._watcher)
 
     def findings(
-        self, failure: CosimError | None = None, late_starts: Mapping[str, str] | None = None
+        self, failure: CosimError | None = None, late_starts: Mapping[str, LateStart] | None = None
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
@@ -181,16 +182,15 @@ def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
     ]
 
 
-def _late(starts: Mapping[str, str]) -> Iterator[Finding]:
+def _late(starts: Mapping[str, LateStart]) -> Iterator[Finding]:
     """Components whose outputs were not there when their partners were initialised."""
-    for component, text in starts.items():
-        variable = text.split(" ", 1)[0].partition(".")[2]
+    for component, late in starts.items():
         message = (
-            f"{text}: the FMU of component {component!r} computes its outputs only as initialisation ends, so "
+            f"{late.text}: the FMU of component {component!r} computes its outputs only as initialisation ends, so "
             "everything else starts from a wrong value, and what is found to move from the start follows from it; "
             "`gfor check --only initial_outputs` shows it alone"
         )
-        yield Finding("undisturbed_motion", 0.0, component, variable, message)
+        yield Finding("undisturbed_motion", 0.0, component, late.variable, message)
 
 
 def _failure(error: CosimError | None) -> Sequence[Finding]:

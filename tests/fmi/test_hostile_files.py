@@ -38,7 +38,7 @@ def test_a_hostile_file_is_refused_and_nothing_is_written(name, plain, tmp_path)
             continue  # an archive like any other, with a document that is not read here
         with pytest.raises(HostileFmuError) as caught:
             opened()
-        assert caught.value.kind == kind
+        assert caught.value.fault == kind
         assert str(caught.value).startswith(f"{path}: ")
         assert not inner.exists()
     assert not list(tmp_path.rglob("outside.txt"))

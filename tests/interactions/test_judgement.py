@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.api.interactions import Interactions
+from orchestrator.errors import ErrorKind
 from orchestrator.interactions.judgement import JudgedSystem
 from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+from orchestrator.points.failure import Failure
 from tests.interactions.park import park, studied, swapped, written
 
 STABLE = {"stable": True, "sentence": "stable: …"}
@@ -19,6 +21,10 @@ def mode(percent, hertz=10.0, **components):
     imag = 62.83185307 * hertz / 10
     share = percent / 100
     return SharedMode(-share * imag / (1 - share**2) ** 0.5, imag, components or {"west": 0.5, "east": 0.5})
+
+
+def failed(text):
+    return SystemRecord(failure=Failure(ErrorKind.STEADY_STATE, text, lasting=True))
 
 
 def system(*modes, stability=STABLE, **more):
@@ -67,7 +73,7 @@ def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
     assert "UNSTABLE together, and A alone as well" in pair.sentence()
 
 
-@pytest.mark.parametrize("lost", [system(mode(9.0), stability=UNKNOWN), SystemRecord(error="no steady state found")])
+@pytest.mark.parametrize("lost", [system(mode(9.0), stability=UNKNOWN), failed("no steady state found")])
 def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
     found = judged(**ALL | {"A_B": lost, "A_C": system(mode(7.0))})
     assert found.worst_pair == ("A", "C")
@@ -84,7 +90,7 @@ def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
 def test_an_assignment_without_a_verdict_is_not_the_worst():
     result = swapped().result
     worst = SystemName(Kind.ASSIGNMENT, ("B", "B"))
-    lost = Interactions(replace(result, records=result.records | {worst: SystemRecord(error="lost")}))
+    lost = Interactions(replace(result, records=result.records | {worst: failed("lost")}))
     assert lost.worst_assignment in ({"west": "A", "east": "B"}, {"west": "B", "east": "A"})
     assert lost.judgement.assignments[-1].name == worst
     assert "1 has no verdict" in " ".join(lost.sentences)
@@ -113,7 +119,7 @@ def test_a_mode_belongs_to_those_who_take_part_by_the_threshold():
 def test_a_network_that_its_stand_ins_do_not_leave_stable_is_named():
     assert not park().warnings
     grows = system(stability={"stable": False, "sentence": "…"}, growing=mode(-2.0))
-    for none, words in ((grows, "is UNSTABLE"), (SystemRecord(error="no steady state"), "has no verdict")):
+    for none, words in ((grows, "is UNSTABLE"), (failed("no steady state"), "has no verdict")):
         told = " ".join(judged(NONE=none).warnings)
         assert f"the network with static_generation at all places {words}" in told
 

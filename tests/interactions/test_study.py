@@ -8,12 +8,13 @@ import pytest
 
 from orchestrator.api.interactions import Interactions
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError, InputError
+from orchestrator.errors import CaseError, ErrorKind, InputError
 from orchestrator.interactions.exchange import stand_in_at
 from orchestrator.interactions.point import SystemRecord, compute_system
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+from orchestrator.points.failure import Failure
 from orchestrator.study.modes import compute_modes
 from tests.interactions.park import folder, park, studied, swapped, written
 
@@ -190,9 +191,12 @@ def test_another_file_of_the_same_name_is_computed_anew(fmu_path, tmp_path):
 def test_a_device_that_hides_its_states_is_refused_with_the_remedy():
     """What a point says of it; the identification itself is that of `gfor modes --black-box`."""
     found = park().result
-    error = "component 'east': … `gfor modes CASE --black-box` identifies it from its inputs and outputs"
-    lost = replace(found, records={**found.records, WHOLE: SystemRecord(error=error)})
-    assert any("here too --black-box identifies" in text for text in Interactions(lost).warnings)
+    advice = []
+    for kind in (ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS):
+        failure = Failure(kind, "component 'east': … --black-box …", lasting=True)
+        lost = replace(found, records={**found.records, WHOLE: SystemRecord(failure=failure)})
+        advice.append(any("here too --black-box identifies" in text for text in Interactions(lost).warnings))
+    assert advice == [True, False]
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ def test_an_error_becomes_the_points_failure(error, said):
     with failure_kept(result):
         result.figure = 1
         raise error
-    assert result.failure == said
+    assert str(result.failure) == said
     assert result.figure == 1
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.errors import ErrorKind
 from orchestrator.points.store import PointStore
 from orchestrator.sweep import point
 from orchestrator.sweep.axes import parse_vary
@@ -47,10 +48,11 @@ def test_what_a_library_does_ends_one_point_only_and_is_tried_again(task, monkey
     assert (record.error, record.lasting, record.modes) == (words, False, None)
 
 
-def test_what_an_fmu_refuses_fails_alone_and_is_tried_again(tmp_path):
+def test_what_an_fmu_of_ours_refuses_fails_alone_and_is_kept(tmp_path):
     plan = plan_sweep(load_case(two_oscillators(tmp_path)), [parse_vary("slow.T=-1,1")])
     refused, fine = (compute_point(plan.task(plan.scenarios[0], (k,))) for k in (0, 1))
     assert "T must exceed 0" in refused.error
-    assert not refused.lasting
+    assert refused.failure.kind is ErrorKind.START
+    assert refused.lasting  # a model of ours refuses the same values again
     assert fine.error is None
     assert fine.modes is not None

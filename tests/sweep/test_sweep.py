@@ -11,9 +11,10 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import Case, load_case
-from orchestrator.errors import InputError
+from orchestrator.errors import ErrorKind, InputError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.failure import Failure
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
@@ -351,7 +352,8 @@ def test_a_dask_cluster_computes_what_one_process_does(tmp_path):
 )
 def test_a_point_that_failed_leaves_the_stability_open(case, verdicts, stable):
     """None stands for a point without modes, such as one whose FMU refuses the value."""
-    records = [PointRecord(error="refused") if v is None else PointRecord(stability={"stable": v}) for v in verdicts]
+    refused = PointRecord(failure=Failure(ErrorKind.START, "refused", lasting=True))
+    records = [refused if v is None else PointRecord(stability={"stable": v}) for v in verdicts]
     (prepared,) = load_case(case).prepare(["one"])
     assert ScenarioSweep(prepared, {(k,): record for k, record in enumerate(records)}).stable is stable
 

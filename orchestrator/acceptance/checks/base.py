@@ -164,8 +164,7 @@ def not_applicable(name: str, because: str) -> CheckResult:
 
 def not_supported(name: str, error: UnsupportedFmuError) -> CheckResult:
     """What this program or this machine cannot do, which says nothing about the FMU."""
-    evidence, _, remedy = str(error).rpartition("; ")
-    return CheckResult(name, Verdict.NOT_SUPPORTED, evidence or remedy, error.kind, remedy, whose=Whose.HERE)
+    return CheckResult(name, Verdict.NOT_SUPPORTED, error.evidence, error.fault, error.remedy, whose=Whose.HERE)
 
 
 def provoked(name: str, evidence: str) -> CheckResult:

@@ -10,9 +10,9 @@ from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
 from orchestrator.cases.schema import Value
 from orchestrator.certification.codes.bench_case import BENCH
-from orchestrator.errors import ComponentError, CosimError
+from orchestrator.errors import ComponentError, CosimError, ErrorKind
 from orchestrator.points.executor import WorkerLostError
-from orchestrator.points.failure import failure_kept
+from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.points.key import same_case
 from orchestrator.points.signals import signal_arrays, take_signals
 from orchestrator.points.store import Arrays
@@ -64,7 +64,7 @@ class BenchResult:
     signals: dict[str, Numbers] = field(default_factory=dict)
     findings: list[dict[str, Any]] = field(default_factory=list)
     seconds: float = 0.0
-    failure: str | None = None
+    failure: Failure | None = None
 
     @property
     def lasting(self) -> bool:
@@ -74,7 +74,7 @@ class BenchResult:
     @classmethod
     def lost(cls, task: BenchTask, error: WorkerLostError) -> Self:
         """The result of a row whose worker died."""
-        return cls(task.row, failure=str(error))
+        return cls(task.row, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""
@@ -108,7 +108,7 @@ def compute_row(task: BenchTask) -> BenchResult:
             try:
                 master.run(prepared.stop_time, prepared.events, watch.observers)
             except ComponentError as error:
-                if error.status.startswith("hang"):
+                if error.kind is ErrorKind.HANG:
                     raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
                 ended = error  # the converter gave up, or its values were no numbers: the row is not met
         _keep(result, watch)

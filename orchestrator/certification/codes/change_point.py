@@ -11,6 +11,7 @@ from orchestrator.certification.codes.all_codes import code_for
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.failure import Failure
 from orchestrator.points.store import Arrays
 from orchestrator.watch.finding import UNSTABLE
 
@@ -84,7 +85,7 @@ class ChangeResult:
 
     criteria: tuple[ChangedCriterion, ...] = ()
     mark: str = ""
-    failure: str | None = None
+    failure: Failure | None = None
 
     @property
     def lasting(self) -> bool:
@@ -94,7 +95,7 @@ class ChangeResult:
     @classmethod
     def lost(cls, _: ChangeTask, error: WorkerLostError) -> Self:
         """The result of a row whose worker died."""
-        return cls(failure=str(error))
+        return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""

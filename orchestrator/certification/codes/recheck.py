@@ -18,7 +18,8 @@ from orchestrator.certification.codes.row import GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.verification import Verification
-from orchestrator.errors import InputError
+from orchestrator.errors import ErrorKind, InputError
+from orchestrator.points.failure import Failure
 
 
 def read_code_certificate(path: Path) -> tuple[Path, dict[str, Any]] | None:
@@ -80,7 +81,8 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
             prefix = f"{row.name}."
             signals = {str(n).removeprefix(prefix): data[n].values for n in data.data_vars if str(n).startswith(prefix)}
             times = data[f"time_{row.name}"].values
-            result = BenchResult(row.name, times, signals, stated["findings"], failure=stated["unknown"] or None)
+            failure = Failure(ErrorKind.OTHER, stated["unknown"], False) if stated["unknown"] else None
+            result = BenchResult(row.name, times, signals, stated["findings"], failure=failure)
             again = judge_row(row, result, content["f_n"])
             same = [finding_json(f) for f in again.findings] == stated["criteria"]
             if not same or (again.judged, again.accepted) != (stated["judged"], stated["accepted"]):

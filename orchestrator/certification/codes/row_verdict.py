@@ -63,7 +63,7 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
         Rated frequency of the bench [Hz].
     """
     if result.failure:
-        return RowVerdict(row, unknown=result.failure)
+        return RowVerdict(row, unknown=str(result.failure))
     programme = row.programme(f_n)
     measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings),
                            source_angle=programme.source_angle(result.times, f_n))  # fmt: skip

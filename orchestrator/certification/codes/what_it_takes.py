@@ -267,7 +267,7 @@ def _confirmed(
     need: CriterionNeeds, sensitivity: MarginSensitivity, change: float, result: ChangeResult
 ) -> ConfirmedChange:
     again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
-    reason = result.failure or ("" if again else "; ".join(c.text for c in result.criteria))
+    reason = str(result.failure) if result.failure else ("" if again else "; ".join(c.text for c in result.criteria))
     return ConfirmedChange(
         sensitivity.parameter, change, _expected(sensitivity, change), again.margin if again else None,
         again.accepted if again else None, tuple(c.criterion for c in result.criteria if not c.accepted), reason,
