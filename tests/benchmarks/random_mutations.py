@@ -204,7 +204,7 @@ class Trial:
     """Tries mistakes out in one copy of the repository."""
 
     def __init__(self, root: Path, folder: Path, limit: float) -> None:
-        self._copy, self._limit, self._root = Copy(root, folder), limit, root
+        self._copy, self._limit = Copy(root, folder), limit
         kept = cache_directory("fmus").parent
         if kept.is_dir():
             shutil.copytree(kept, folder / "caches" / "plain", copy_function=_link, dirs_exist_ok=True)
@@ -212,7 +212,7 @@ class Trial:
     def outcome(self, mistake: Drawn, most: int) -> tuple[Outcome, int]:
         """Verdict and the stage that gave it (1, 2, 3)."""
         seconds = 0.0
-        for number, tests in enumerate(stages(mistake, self._root)[:most], start=1):
+        for number, tests in enumerate(stages(mistake, self._copy.tree)[:most], start=1):
             if len(tests) == 2:  # of no file
                 continue
             found = self._copy.try_unchecked(mistake, tests, self._limit)
@@ -254,7 +254,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         trial = Trial(ROOT, folder, options.limit)
         for mistake in share:
             before = kept.get(mistake.name)
-            if before and (before["verdict"] != SURVIVED or before["stage"] >= options.stages):
+            if before and (
+                before["verdict"] == CAUGHT or (before["verdict"] == SURVIVED and before["stage"] >= options.stages)
+            ):
                 continue
             outcome, stage = (
                 (Outcome(EQUIVALENT), 0) if mistake.name in read else trial.outcome(mistake, options.stages)
