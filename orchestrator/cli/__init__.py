@@ -77,6 +77,42 @@ examples:
   gfor check vendor.fmu --binding vendor.toml    whether it can be trusted in a co-simulation
 """
 
+QUESTIONS = """\
+gfor: co-simulation of grid-forming converters, from FMUs and a case file
+
+Is the network stable, and which swing is damped least?
+  gfor modes two_area                                 modes of each scenario of a built-in case
+  gfor modes two_area --scenario pod_p --set grid.X_L=0.3       with another value
+  gfor run two_area --scenario pod_p --stop 5         after a fault or a step: signals and plots, in results/two_area
+  gfor report results/two_area                        all that as one page for a browser
+
+What makes it better or worse?
+  gfor design two_area --controller pod_p             settings of a damping controller
+  gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
+  gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter
+  gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage
+
+Can this converter's FMU be trusted, and does it meet the grid code?
+  gfor info vendor.fmu                                what it declares
+  gfor bind vendor.fmu                                draft of its binding: what its variables mean
+  gfor check vendor.fmu --binding vendor.toml         acceptance tests
+  gfor certify vendor.fmu --binding vendor.toml       the damping test of a grid code
+  gfor verify results/certify_vendor                  whether a certificate still holds
+
+What does a recording say?
+  gfor identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
+  gfor compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
+
+How do I take the models elsewhere?
+  gfor build gfor --dest fmus                         an FMU for any FMI tool
+  gfor export-dll gfor --dest dlls                    a DLL for EMT programs
+  gfor linearize two_area --scenario gfor             A, B, C, D
+
+A case of your own: a file such as my_case.toml in the place of two_area; network data in RAW and DYR or CGMES.
+`gfor COMMAND --help` has a command's options, `gfor --help` all commands.
+"""
+"""What ``gfor`` alone prints."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
@@ -161,6 +197,11 @@ def _print_error(text: str) -> None:
     console.print(f"[bold red]error:[/bold red] {escape(text)}")
 
 
+def _first_page() -> int:
+    print(QUESTIONS, end="")
+    return 0
+
+
 class _Version(argparse.Action):
     """Prints the installed version; it is only looked up when it is asked for."""
 
@@ -181,8 +222,9 @@ class _Parser(argparse.ArgumentParser):
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
     parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
+    parser.set_defaults(command=lambda _: _first_page())
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=argparse.ArgumentParser)
+    commands = parser.add_subparsers(metavar="COMMAND", parser_class=argparse.ArgumentParser)
     for name, words in COMMANDS.items():
         command = commands.add_parser(name, help=words)
         if name == chosen:

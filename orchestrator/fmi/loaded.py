@@ -1,7 +1,6 @@
 """An FMU in this process: calls of FMI 2.0 on preallocated arguments, with the FMU's own words in every error."""
 
 import ctypes
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
@@ -16,6 +15,7 @@ from fmus.toolchain.removal import remove_tree
 from orchestrator.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
 from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, binary_path, in_words_of_2, load, unload
+from orchestrator.fmi.brought_modules import brought_by
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path
@@ -60,7 +60,7 @@ class LoadedComponent(Derived):
         self.lost = False
         self._messages = Messages()
         self._own_directory = None if directory else extract(description.path)
-        self._resources = str(Path(directory or self._own_directory or "") / "resources")
+        self._brought = brought_by(Path(directory or self._own_directory or "") / "resources")
         self._callbacks = callbacks_for(self._messages)
         self._fmu: Any = None
         self._wine: WineProgram | None = None
@@ -68,7 +68,7 @@ class LoadedComponent(Derived):
         calls.watch()
         try:
             self._fmu = self._loaded(Path(directory or self._own_directory or ""))
-            with calls:
+            with calls, self._brought.loading():
                 self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         except UnsupportedFmuError:
             self.close()
@@ -214,8 +214,7 @@ class LoadedComponent(Derived):
                 except FMICallException:
                     pass  # an FMU that failed may refuse to terminate; it is freed all the same
                 fmu.freeInstance()
-        if fmu is not None and self._resources in sys.path:
-            sys.path.remove(self._resources)  # the host of a Python-backed FMU puts it there, once for each instance
+            self._brought.close()
         if self._wine is not None:
             self._wine.close()
             self._wine = None

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shlex
 import subprocess
 import sys
 import zipfile
@@ -13,7 +14,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.cli import COMMANDS
+from orchestrator.cli import COMMANDS, _parser
 from orchestrator.fmi import wine
 from orchestrator.fmi.description import read_description
 from tests.coupling.small_fmus import small_fmu
@@ -44,6 +45,18 @@ def test_help_opens_with_examples_that_the_command_understands(gfor):
     assert len(lines) >= 5
     assert all(line.startswith("  gfor ") for line in lines)
     assert {line.split()[1] for line in lines} <= set(COMMANDS)
+
+
+def test_alone_it_answers_a_newcomers_questions_with_lines_that_parse(gfor):
+    code, out, err = gfor()
+    assert (code, err) == (0, "")
+    lines = [re.split(r" {2,}", line.strip())[0] for line in out.splitlines() if line.startswith("  gfor ")]
+    assert out.count("?\n") >= 4
+    assert len(lines) >= 15
+    assert len(out.splitlines()) <= 40
+    for line in lines:
+        command, *words = shlex.split(line)[1:]
+        _parser(command).parse_args([command, *words])
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -166,10 +179,6 @@ def test_an_unknown_case(refused, tmp_path):
         "modes", "none"
     )
     assert "none.toml: there is no such file" in refused("run", tmp_path / "none.toml")
-
-
-def test_no_command(refused):
-    assert "the following arguments are required: COMMAND" in refused()
 
 
 def test_an_unknown_command(refused):
