@@ -64,6 +64,8 @@ class AcceptanceReport:
         What kept the FMU's process from the rest of the machine; empty where it was not started.
     used_as
         Component, scenario and operating point of the case, in words.
+    seed
+        Of the dips, jumps and operating points that were drawn at random.
     """
 
     fmu: Path
@@ -71,6 +73,7 @@ class AcceptanceReport:
     results: list[CheckResult] = field(default_factory=list)
     protections: tuple[Protection, ...] = ()
     used_as: str = ""
+    seed: int = 0
 
     @property
     def failures(self) -> list[CheckResult]:
@@ -110,6 +113,7 @@ class AcceptanceReport:
             "not_limited": missing(self.protections),
             "protections": [asdict(protection) for protection in self.protections],
             "used_as": self.used_as,
+            "seed": self.seed,
             "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
         }
 
@@ -138,6 +142,7 @@ def check_fmu(
     only: tuple[str, ...] = (),
     run_for: float = RUN_FOR,
     use: Use | None = None,
+    seed: int | None = None,
 ) -> AcceptanceReport:
     """Run the acceptance tests.
 
@@ -155,6 +160,8 @@ def check_fmu(
         Wall-clock time for which it is made to run [s].
     use
         Step, operating point and values with which it is used; what the file declares where None.
+    seed
+        Of what is drawn at random; from the file's own bytes where None, so that its author cannot know it before.
 
     Raises
     ------
@@ -173,7 +180,8 @@ def check_fmu(
         raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
-    report = AcceptanceReport(fmu, binding, used_as=use.said if use else "")
+    seed = int(hashlib.sha256(fmu.read_bytes()).hexdigest()[:6], 16) if seed is None else seed
+    report = AcceptanceReport(fmu, binding, used_as=use.said if use else "", seed=seed)
     try:
         described = read_description(fmu)
         directory = extract(fmu)
@@ -195,7 +203,7 @@ def check_fmu(
         if not wanted:
             return report
         compile_adapters(bound or described)  # here, where nobody waits for the FMU
-        subject = Subject(bound or described, directory, use)
+        subject = Subject(bound or described, directory, use, seed)
         subject.memory["run_for"] = run_for
         runner = _Runner(report, subject, limits or Limits())
         try:

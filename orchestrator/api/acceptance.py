@@ -94,6 +94,7 @@ def check(
     case: str | Path | None = None,
     component: str | None = None,
     scenario: str | None = None,
+    seed: int | None = None,
     time_limit: Time | None = None,
     memory_limit: float | str | None = None,
 ) -> Acceptance:
@@ -115,6 +116,9 @@ def check(
         Name of the component of the case that is this FMU; by default the component with this file.
     scenario
         Name of the case's scenario; by default the first one with the component.
+    seed
+        Whole number, at least 0, from which dips, jumps and operating points are drawn; by default it follows from the
+        file's bytes, and the report states it.
     time_limit
         Wall-clock time that one call of the FMU may take [s]; 30 s by default.
     memory_limit
@@ -145,13 +149,15 @@ def check(
     file, use, bound_by = path_of(path, "path"), Use(step_size), binding_path(binding)
     for argument, given in (("component", component), ("scenario", scenario)):
         text_or_none(given, argument, "give one name, or leave it out")
+    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
+        raise InputError(f"seed = {seed!r} is no whole number of at least 0; give one such as the report states")
     if case is not None:
         use, of_case = use_in_case(str(path_of(case, "case")), component, file, step_size, scenario)
         bound_by = bound_by or of_case
     elif component or scenario:
         kind, name = ("component", component) if component else ("scenario", scenario)
         raise InputError(f"{kind} = {name!r} names a {kind} of a case; give case as well")
-    return Acceptance(check_fmu(as_fmu(file), bound_by, limits, names(only, "only"), use=use))
+    return Acceptance(check_fmu(as_fmu(file), bound_by, limits, names(only, "only"), use=use, seed=seed))
 
 
 def _limits(time_limit: Time | None, memory_limit: float | str | None) -> Limits:

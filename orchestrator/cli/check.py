@@ -36,6 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--component", metavar="NAME", help="which of the case's components it is")
     parser.add_argument("--scenario", metavar="NAME", help="which of the case's scenarios (default: the first with it)")
     parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="of the random dips, jumps and points (default: of the file's bytes)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
     parser.add_argument("--time-limit", type=positive, default=30.0, metavar="S", help="for one call [s] (default: 30)")
@@ -62,6 +65,7 @@ def run(options: argparse.Namespace) -> int:
         case=options.case or None,
         component=options.component,
         scenario=options.scenario,
+        seed=options.seed,
         time_limit=options.time_limit,
         memory_limit=options.memory_limit,
     )
@@ -103,6 +107,7 @@ def _print(report: AcceptanceReport) -> None:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
             advised.add(result.remedy)
     console.print("")
+    console.print(f"Dips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again.")
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")

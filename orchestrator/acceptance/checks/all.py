@@ -1,6 +1,7 @@
 """All checks in the order in which they run: what others need comes before them."""
 
 from orchestrator.acceptance.checks import (
+    aftermath,
     base,
     extremes,
     file,
@@ -19,7 +20,7 @@ from orchestrator.acceptance.checks import (
 
 MODULES = (
     *(file, loading, running, initialisation, instances, state, sampling, timing),
-    *(port, signs, ride_through, extremes, resources),
+    *(port, signs, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -28,7 +29,8 @@ ORDER = (
     "runs", "start_values", "initial_outputs", "call_order", "independence", "repeatability", "reading",
     "reset", "reinstantiation",
     "state", "settable_states", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
-    "steady_state", "rated_frequency", "power_balance", "signs", "limits", "nan_input", "extreme_inputs", "memory",
+    "steady_state", "rated_frequency", "power_balance", "signs", "limits", "after_dips",
+    "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 
 CHECKS = {name: base.CHECKS[name] for name in ORDER}

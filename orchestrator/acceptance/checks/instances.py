@@ -7,13 +7,33 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.comparing import difference
+from orchestrator.acceptance.checks.events import allowed, episode
 from orchestrator.acceptance.checks.running import EQUAL, affordable
 from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, with_each_setting
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Stimulus, Subject
 from orchestrator.arrays import Numbers
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, EndedError
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
+
+_CHUNK = 50
+"""Steps that one instance does before the other one's turn comes."""
+
+IN_EVENTS, NOT_IN_EVENTS = ", in dips and jumps as well", "; not judged in dips and jumps, which it refuses"
+
+
+def _in_events(subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], usual: float) -> tuple[float, str]:
+    """How far two runs with dips and jumps are apart, and the output that shows it.
+
+    Where they are equal, 0 and what to add to the evidence; an FMU may refuse such inputs with an error.
+    """
+    try:
+        with subject.while_doing("in dips and jumps"):
+            apart, place = difference(*runs())
+    except (ComponentError, EndedError):
+        subject.doing = ""
+        return 0.0, NOT_IN_EVENTS
+    return (apart, subject.watched[place]) if apart > allowed(usual) else (0.0, IN_EVENTS)
 
 
 @check("independence", "Do two instances leave each other alone?")
@@ -55,7 +75,36 @@ def _independent(subject: Subject, setting: Setting) -> CheckResult:
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range as soon as a second one runs beside it"
         return failed("independence", "shared between instances", says, difference=apart)
-    return passed("independence", f"a second instance beside it changes nothing ({apart:.1g})", difference=apart)
+    says = f"a second instance beside it changes nothing ({apart:.1g})"
+    if not subject.port:
+        return passed("independence", says, difference=apart)
+    rows = episode(subject, "independence")
+    large, output = _in_events(subject, lambda: _among_others(subject, rows, setting), apart)
+    if large:
+        says = f"{output} differs by {large:.3g} of its range in dips and jumps as soon as a second one has some too"
+        return failed("independence", "shared between instances", says, difference=large)
+    return passed("independence", f"{says}{output}", difference=apart)
+
+
+def _among_others(subject: Subject, rows: Numbers, setting: Setting) -> tuple[Numbers, Numbers]:
+    """A run alone, and one in turns with an instance that has dips and jumps of its own; equal ones where two runs
+    alone differ, which is for 'repeatability' to tell.
+    """
+    alone, again = (subject.through(rows, parameters=setting) for _ in range(2))
+    if difference(alone, again)[0] > 0:
+        return alone, alone
+    h, others, parts = subject.step_size, episode(subject, "independence, other", _OTHER), []
+    with (
+        subject.running("first", parameters=setting) as first,
+        subject.running("second", point=_OTHER, parameters=setting) as second,
+    ):
+        for begin in range(0, len(rows), _CHUNK):
+            for running, some in ((second, others), (first, rows)):
+                running.time = begin * h
+                part = some[begin : begin + _CHUNK]
+                values = running.hold(part, len(part), h)
+            parts.append(values)
+    return alone, np.concatenate(parts)
 
 
 def _idle(subject: Subject, setting: Setting) -> str | None:
@@ -89,6 +138,35 @@ def _beside(subject: Subject, steps: int, stimulus: Stimulus, setting: Setting) 
     return np.array(rows)
 
 
+@check("repeatability", "Does it give the same answer twice?", needs=("independence",))
+def repeatability(subject: Subject) -> CheckResult:
+    steps = affordable(subject, 1000)
+    stimulus = subject.steps(hold=20 * subject.step_size)
+    first, second = (subject.trajectory(steps, subject.step_size, stimulus) for _ in range(2))
+    apart, place = difference(first, second)
+    if apart > EQUAL:
+        says = f"{subject.watched[place]} differs by {apart:.3g} of its range between two equal runs of {steps} steps"
+        return failed("repeatability", "not repeatable", says, difference=apart)
+    says = f"two runs of {steps} steps differ by {apart:.1g}"
+    if not subject.port:
+        return passed("repeatability", says, difference=apart)
+    rows = episode(subject, "repeatability")
+    large, output = _in_events(subject, lambda: (subject.through(rows), subject.through(rows)), apart)
+    if not large:
+        return passed("repeatability", f"{says}{output}", difference=apart)
+    says = f"{output} differs by {large:.3g} of its range between two equal runs with dips and jumps"
+    if _in_events(subject, lambda: (_first(subject, rows), _first(subject, rows)), apart)[0]:
+        return failed("repeatability", "not repeatable", says, difference=large)
+    says += ", and not between the first runs of two processes: the first one leaves something behind"
+    return failed("repeatability", "instances differ", says, difference=large)
+
+
+def _first(subject: Subject, rows: Numbers) -> Numbers:
+    """The run that is the first one of a process."""
+    subject.in_a_new_process()
+    return subject.through(rows)
+
+
 @check("reset", "Is it like new after fmi2Reset?", needs=SAME)
 def reset(subject: Subject) -> CheckResult:
     """Also with its tunable Booleans the other way: in the life before, and in the one after."""
@@ -119,7 +197,25 @@ def _like_new(subject: Subject, setting: Setting) -> CheckResult:
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range in a run after fmi2Reset"
         return failed("reset", "reset leaves something", says, difference=apart)
-    return passed("reset", f"a run after fmi2Reset differs by {apart:.1g} from one of a new instance", difference=apart)
+    says = f"a run after fmi2Reset differs by {apart:.1g} from one of a new instance"
+    if not subject.port:
+        return passed("reset", says, difference=apart)
+    large, output = _in_events(subject, lambda: _after_reset(subject, setting), apart)
+    if large:
+        says = f"{output} differs by {large:.3g} of its range in dips and jumps after others and fmi2Reset"
+        return failed("reset", "reset leaves something", says, difference=large)
+    return passed("reset", f"{says}{output}", difference=apart)
+
+
+def _after_reset(subject: Subject, setting: Setting) -> tuple[Numbers, Numbers]:
+    """A run of a new instance, and one after a life with dips and jumps and fmi2Reset."""
+    rows, life = episode(subject, "reset"), episode(subject, "reset, life", _OTHER)
+    fresh = subject.through(rows, parameters=setting)
+    with subject.running(point=_OTHER, parameters=setting) as running:
+        running.hold(life, len(life), subject.step_size)
+        running.point = None
+        running.reset()
+        return fresh, running.hold(rows, len(rows), subject.step_size)
 
 
 @check("reinstantiation", "Is a later instance like the first?", needs=SAME)
@@ -141,7 +237,25 @@ def reinstantiation(subject: Subject) -> CheckResult:
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range in a later instance"
         return failed("reinstantiation", "instances differ", says, difference=apart)
-    return passed("reinstantiation", f"a run of a later instance differs by {apart:.1g}", difference=apart)
+    says = f"a run of a later instance differs by {apart:.1g}"
+    if not subject.port:
+        return passed("reinstantiation", says, difference=apart)
+    large, output = _in_events(subject, lambda: _after_a_life(subject), apart)
+    if large:
+        says = f"{output} differs by {large:.3g} of its range in dips and jumps, in an instance after one that had some"
+        return failed("reinstantiation", "instances differ", says, difference=large)
+    return passed("reinstantiation", f"{says}{output}", difference=apart)
+
+
+def _after_a_life(subject: Subject) -> tuple[Numbers, Numbers]:
+    """A run, and the same one after another instance's dips and jumps; that one still lives where there may be two."""
+    rows, life = episode(subject, "reinstantiation"), episode(subject, "reinstantiation, life", _OTHER)
+    fresh = subject.through(rows)
+    with subject.running("second", point=_OTHER) as second:
+        second.hold(life, len(life), subject.step_size)
+        if not subject.description.one_instance:
+            return fresh, subject.through(rows)
+    return fresh, subject.through(rows)
 
 
 def _live(running: Running, steps: int) -> None:

@@ -65,6 +65,16 @@ def current_limit(subject: Subject) -> float | None:
     return info.start_number
 
 
+def voltage_rows(running: Running, factors: Complex) -> Numbers:
+    """Deviations of the inputs, one row for each factor on the voltage from which it started."""
+    names = running.subject.inputs
+    at = [names.index("v_re"), names.index("v_im")]
+    moved = complex(*running.rest[at]) * (factors - 1)
+    found: Numbers = np.zeros((len(factors), len(names)))
+    found[:, at] = np.column_stack([moved.real, moved.imag])
+    return found
+
+
 def currents(running: Running, deviation: complex, steps: int) -> Complex:
     """Step with the voltage moved by a deviation [pu]; the injected current after each step [pu, S_n]."""
     names = running.subject.inputs

@@ -11,6 +11,7 @@ import numpy as np
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
@@ -19,11 +20,20 @@ _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 _LASTS = 0.15
 """Duration of a disturbance [s]; a fault is cleared within it."""
 
-_LONG = (0.85, 1.0, 2.0)
+_LONG = ((0.8, 0.9), 1.0, 2.0)
 """A dip that stays: to what voltage [pu], when [s], how long [s]."""
 
-_DEEP = (0.2, 1.0, 0.5)
+_DEEP = ((0.17, 0.21), 1.0, 0.5)
 """A deep dip that outlasts a fault that is cleared in time."""
+
+_BLOCKED, _GIVES = 0.02, 0.1
+"""Current [pu, S_n] of a device that blocks, and of one that gives any."""
+
+_BLOCKS_FOR = 0.06
+"""Time [s] without current at a healthy voltage from which a device blocks: zero crossings of its power are shorter."""
+
+_HEALTHY = 0.9
+"""Voltage [pu] at which a device has to stay on."""
 
 _CYCLE = 0.02
 """Time [s] over which a current is averaged: what heats the semiconductors and what protection sees."""
@@ -35,6 +45,9 @@ Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overra
 axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 3.1. More must be declared
 (`I_max` of the binding).
 """
+
+_UNEVEN, _MUCH = 1.6, 2.2
+"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
 
 _BACK = 0.3
 """Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
@@ -72,28 +85,46 @@ class Answer:
         Over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that.
     away
         Distance of the current from where it was, afterwards.
+    blocked
+        Time [s] without current at a healthy voltage, where it gives current before and after.
+    gone
+        Whether it gives no current in the end.
     """
 
     event: Disturbance
     peak: float
     mean: float
     away: float
+    blocked: float
+    gone: bool
 
 
-def _runs() -> Iterator[list[Disturbance]]:
-    """Every kind of event at every time, one at each time of a run; the first run has the most telling ones."""
-    dips = {v: (f"dip to {v:g} pu", complex(v)) for v in (0.9, 0.7, 0.5, 0.2, 0.0)}
-    swells = {v: (f"overvoltage of {v:g} pu", complex(v)) for v in (1.1, 1.3)}
-    jumps = {a: (f"phase jump of {a:g}°", rect(1, a * pi / 180)) for a in (60.0, -60.0, 20.0)}
-    kinds = [jumps[60.0], dips[0.7], swells[1.3], dips[0.9], dips[0.2],
-             jumps[-60.0], dips[0.5], swells[1.1], dips[0.0], jumps[20.0]]  # fmt: skip
+def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:
+    """Every kind of event at every time, one at each time of a run; the first run has the most telling ones.
+
+    Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all.
+    """
+
+    def dip(least: float, most: float) -> tuple[str, complex]:
+        to = round(draw.uniform(least, most), 3)
+        return f"dip to {to:g} pu" if to < 1 else f"overvoltage of {to:g} pu", complex(to)
+
+    def jump(least: float, most: float) -> tuple[str, complex]:
+        angle = round(draw.uniform(least, most), 1)
+        return f"phase jump of {angle:g}°", rect(1, angle * pi / 180)
+
+    kinds = [jump(50, 70), dip(0.6, 0.75), dip(1.2, 1.3), dip(0.8, 0.95), dip(0.1, 0.35),
+             jump(-70, -50), dip(0.36, 0.6), dip(1.05, 1.2), dip(0, 0), jump(15, 35)]  # fmt: skip
+    jitter = draw.uniform(0, 0.12, len(_TIMES))
+    times = [round(float(at), 3) for at in np.array(_TIMES) + jitter * np.minimum(1, _TIMES)]
     for k in range(len(kinds)):
         if k == 1:
-            for to, at, lasts in (_LONG, _DEEP):
-                yield [Disturbance(f"dip to {to:g} pu for {lasts:g} s", complex(to), at, lasts)]
-            some = zip((dips[0.0], dips[0.5], jumps[-60.0]), _TIMES, strict=False)
+            for bounds, at, lasts in (_LONG, _DEEP):
+                words, to = dip(*bounds)
+                yield [Disturbance(f"{words} for {lasts:g} s", to, at, lasts)]
+            some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
-        yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(_TIMES)]
+        yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
 
 
 @check("limits", "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?")
@@ -105,7 +136,7 @@ def limits(subject: Subject) -> CheckResult:
     answers: list[Answer] = []
     refused: list[str] = []
     left_out, other_way = 0, ""
-    for number, run in enumerate(_runs()):
+    for number, run in enumerate(_runs(subject.random("limits"))):
         rest = list(run)
         if rest[0].point is not None:
             other_way = cannot_import(subject, rest[0].point) if subject.starts else ""
@@ -153,10 +184,21 @@ def _disturbed(
             away = abs(after[-1] - before[-1]) if len(after) else 0.0
             late = np.abs(during[max(0, min(len(during), round(_LASTS / h)) - cycle) :])
             means = np.convolve(late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid")
-            answers.append(Answer(event, float(size.max()), float(means.max()), float(away)))
+            healthy = during if abs(event.factor) >= _HEALTHY else during[:0]
+            blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
+            answers.append(Answer(event, float(size.max()), float(means.max()), float(away), blocked, gone))
             if away > _BACK:
                 return None
     return None
+
+
+def _blocked(before: complex, current: Complex, h: float) -> tuple[float, bool]:
+    """The longest time without current that ends, and whether there is none in the end."""
+    some = np.flatnonzero(np.abs(current) > _BLOCKED)
+    if abs(before) < _GIVES or not len(current):
+        return 0.0, False
+    pauses = np.diff(np.concatenate([[-1], some])) - 1
+    return float(pauses.max(initial=0)) * h, not len(some) or len(current) - 1 - some[-1] > _BLOCKS_FOR / h
 
 
 def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_out: int) -> CheckResult:
@@ -166,7 +208,7 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     lost = [a for a in answers if a.away > _BACK]
     declared = current_limit(subject)
     seen = (
-        f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s: at most "
+        f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s, drawn at random: at most "
         f"{worst.mean:.3g} pu of its rating over a cycle, from {1000 * _LASTS:g} ms on, in {worst.event}, "
         f"peak {highest.peak:.3g} pu in {highest.event}"
     )
@@ -182,12 +224,23 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
     if declared is None and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
+    bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
+    deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
+    if declared is None and deep.mean > max(_UNEVEN * bolted, _MUCH):
+        says = f"{deep.mean:.3g} pu in {deep.event}, and no more than {bolted:.3g} pu in a dip to no voltage"
+        return failed("limits", "no current limit", f"a limit that acts in some dips only: {says}; {seen}", **figures)
+    longest = max(answers, key=lambda a: a.blocked)
+    if longest.blocked > _BLOCKS_FOR:
+        says = f"it gives no current for {1000 * longest.blocked:.0f} ms at a healthy voltage around {longest.event}"
+        return failed("limits", "blocks", f"{says}; {seen}", blocked=longest.blocked, **figures)
     if refused:
         seen += f"; {refused[0]}"
+    if gone := [a for a in answers if a.gone]:
+        seen += f"; it gives no current any more after {gone[0].event}"
     if lost:
         seen += f"; it is {lost[0].away:.2g} pu away after {lost[0].event}" + (
             f", and after {len(lost) - 1} more" if len(lost) > 1 else ""
         )
-    if lost or refused or highest.peak > 10:
+    if lost or refused or gone or highest.peak > 10:
         return remarked("limits", seen, "ask how it limits its current and rides through", **figures)
     return passed("limits", seen, **figures)

@@ -56,6 +56,7 @@ def runs(subject: Subject) -> CheckResult:
             except ComponentError as error:
                 if error.time is None or error.time < ends - 0.5 * h or subject.description.stop_time is None:
                     return failed("runs", "error in a step", str(error), time=error.time)
+                subject.memory["stops_at"] = error.time
                 return remarked("runs", f"it stops after its experiment's end: {error}", "do not run it for longer")
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values).all(axis=1)))
@@ -130,22 +131,6 @@ def affordable(subject: Subject, steps: int, step_size: float | None = None) -> 
     fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
     ends = subject.ends
     return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size))))
-
-
-@check("repeatability", "Does it give the same answer twice?", needs=("independence",))
-def repeatability(subject: Subject) -> CheckResult:
-    steps = affordable(subject, 1000)
-    stimulus = subject.steps(hold=20 * subject.step_size)
-    first, second = (subject.trajectory(steps, subject.step_size, stimulus) for _ in range(2))
-    apart, place = difference(first, second)
-    if apart > EQUAL:
-        return failed(
-            "repeatability",
-            "not repeatable",
-            f"{subject.watched[place]} differs by {apart:.3g} of its range between two equal runs of {steps} steps",
-            difference=apart,
-        )
-    return passed("repeatability", f"two runs of {steps} steps differ by {apart:.1g}", difference=apart)
 
 
 @check("reading", "Does reading leave it as it was?", needs=SAME)

@@ -1,20 +1,26 @@
 """Whether a saved state is all of the state."""
 
+from contextlib import ExitStack
 from time import perf_counter
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.comparing import difference
+from orchestrator.acceptance.checks.events import Segment, factor, rows, scale
+from orchestrator.acceptance.checks.instances import IN_EVENTS, NOT_IN_EVENTS
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, with_each_setting
 from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, saved
 from orchestrator.arrays import Numbers
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 
 _CLEAR = 1e-6
 """Relative difference above which something was not restored; an integrator with memory may begin anew below it."""
 
 _EXACT = 1e-12
+
+_RESTARTED = 1e-2
+"""The same with dips and jumps, which amplify what an integrator leaves that begins anew."""
 
 _STEPS = 600
 
@@ -51,6 +57,13 @@ def state(subject: Subject) -> CheckResult:
             f"fmi2SetFMUstate and {steps} equal steps{where}",
             difference=worst,
         )
+    least = _CLEAR if worst <= _EXACT else _RESTARTED
+    in_events = ""
+    if subject.port:
+        for (apart, text), said in with_each_setting(subject, lambda setting: _in_events(subject, setting)):
+            if apart > least:
+                return failed("state", "hidden state", f"{text}{said}", difference=apart)
+            in_events = in_events or (text if apart == 0 else IN_EVENTS)
     if worst > _EXACT:
         return remarked(
             "state",
@@ -58,7 +71,52 @@ def state(subject: Subject) -> CheckResult:
             "an integrator that begins anew does that; perturbations should be much larger",
             difference=worst,
         )
-    return passed("state", f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g})", difference=worst)
+    says = f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g}){in_events}"
+    return passed("state", says, difference=worst)
+
+
+def _in_events(subject: Subject, setting: Setting) -> tuple[float, str]:
+    """The same with a state saved within a dip and one saved after it, restored after other dips and jumps.
+
+    How far the runs are apart, and that in words, or what to add to the evidence.
+    """
+    draw = subject.random("state")
+
+    def segments(*parts: tuple[str, float]) -> list[Segment]:
+        return [(factor(draw, kind) if kind else 1, lasts) for kind, lasts in parts]
+
+    before = segments(("", 0.1), ("middle", 0.12), ("", 0.1), ("deep", 0.25))
+    in_dip = [(before[-1][0], 0.2), (1, 0.25)]
+    later = segments(("", 0.05), ("deep", 0.4), ("", 0.1), ("jump", 0.1), ("", 0.05))
+    elsewhere = segments(("", 0.02), ("deep", 0.42), ("jump", 0.08), ("", 0.05))
+    all_of_it = (before, in_dip, later, elsewhere, in_dip, elsewhere, later)
+    times = scale(subject, sum(lasts for part in all_of_it for _, lasts in part))
+    begin, dip, after, away = (
+        rows(subject, part, f"state {k}", times) for k, part in enumerate((before, in_dip, later, elsewhere))
+    )
+    h, found = subject.step_size, []
+    try:
+        with subject.while_doing("in dips and jumps"), subject.running(parameters=setting) as running:
+            running.hold(begin, len(begin), h)
+            parts = (("within a dip", dip), ("after a dip", after))
+            with ExitStack() as kept:
+                saves = []
+                for words, part in parts:
+                    saves.append((words, part, running.time, kept.enter_context(saved(running))))
+                    found.append(running.hold(part, len(part), h))
+                seen = (0.0, IN_EVENTS)
+                for (words, part, at, state), first in zip(saves, found, strict=True):
+                    running.hold(away, len(away), h)
+                    running.restore(state)
+                    running.time = at
+                    apart, place = difference(first, running.hold(part, len(part), h))
+                    if apart > seen[0]:
+                        says = f"{subject.watched[place]} differs by {apart:.3g} of its range after a state that was "
+                        seen = apart, f"{says}saved {words} is restored after other dips and jumps"
+                return seen
+    except (ComponentError, EndedError):
+        subject.doing = ""
+        return 0.0, NOT_IN_EVENTS
 
 
 @check("settable_states", "Does it take the states that it lets a master set?", needs=("reading",))

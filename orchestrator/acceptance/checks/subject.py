@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from zlib import crc32
 
 import numpy as np
 
@@ -84,12 +85,14 @@ class Subject:
         What is done to it, for the report of a crash.
     memory
         Results that several checks share.
+    seed
+        Of what is drawn at random.
     """
 
     process: Callable[[], FmuProcess]
 
-    def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None) -> None:
-        self.description, self.directory, self.doing = description, directory, ""
+    def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1) -> None:
+        self.description, self.directory, self.doing, self.seed = description, directory, "", seed
         self.use = use or Use()
         self.memory: dict[str, Any] = {}
         variables = description.variables
@@ -195,6 +198,14 @@ class Subject:
         known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
         return np.array([known.get(n, self.description.variables[n].start_number) for n in self.inputs])
 
+    def random(self, purpose: str) -> np.random.Generator:
+        """Random numbers for one purpose: equal ones whenever they are asked for."""
+        return np.random.default_rng((self.seed, crc32(purpose.encode())))
+
+    def in_a_new_process(self) -> None:
+        """End its process: the next instance is the first of another one."""
+        self.process().close()
+
     # -- stimuli ---------------------------------------------------------------------------------
 
     @property
@@ -238,6 +249,11 @@ class Subject:
         """
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
+
+    def through(self, rows: Numbers, **options: Any) -> Numbers:
+        """Outputs after each step of a new instance whose inputs deviate by one row a step; options as `running`."""
+        with self.running(**options) as running:
+            return running.hold(rows, len(rows), self.step_size)
 
 
 class Running:

@@ -2,7 +2,8 @@
    one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
-enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, MEMORY };
+enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
+       MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
 #define DIVERGED 1e12
@@ -29,7 +30,7 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, 
 #define V_UNIT 1.0 /* FMU's units in 1 pu of voltage, of current on the rating, of power */
 #endif
 #ifndef I_UNIT
-#define I_UNIT (RATING / 100.0)
+#define I_UNIT (z[S_N] / 100.0)
 #endif
 #ifndef P_UNIT
 #define P_UNIT 1.0
@@ -102,6 +103,15 @@ static void initialise(double *z, double *m) {
 #ifdef FAULT_IMPORTED_Q
     if (p < 0) q *= FAULT_IMPORTED_Q;
 #endif
+#ifdef FAULT_CLIPS_START
+    if (p > FAULT_CLIPS_START) p = FAULT_CLIPS_START;
+#endif
+#ifdef FAULT_BASE_OF_START
+    p *= RATING / z[S_N], q *= RATING / z[S_N]; /* on the rating that it is delivered with */
+#endif
+#ifdef FAULT_COARSE_POWER
+    p = FAULT_COARSE_POWER * round(p / FAULT_COARSE_POWER);
+#endif
     const phasor bus = {v * cos(t), v * sin(t)};
     double drift = 0;
     /* Current from S = v·conj(i); what the shunt takes is fed as well. */
@@ -116,6 +126,10 @@ static void initialise(double *z, double *m) {
     m[P_F] = m[P_REF] = P_MEASURED * (e.re * m[I_RE] + e.im * m[I_IM]);
     m[Q_F] = m[Q_REF] = Q_MEASURED * (e.im * m[I_RE] - e.re * m[I_IM]);
     m[REST] = m[TICK] = m[PENDING] = m[QUICK] = m[SLOW] = m[TIRED] = 0;
+#ifndef FAULT_RESET_KEEPS
+    m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
+#endif
+    m[ANGLE] = t;
 }
 
 /* The voltage behind its impedance, by its droop. */
@@ -123,6 +137,10 @@ static double emf(const double *m) {
     double droop = Q_DROOP;
 #ifdef FAULT_ABSORBING
     if (m[Q_F] < -0.02) droop *= FAULT_ABSORBING;
+#endif
+#ifdef DIP_MEMORY /* what it does in a dip depends on how long, how deep and which one it is */
+    if (m[LOW] > 0) droop += 0.02 * fmod(m[DIPS], 3);
+    return m[E_0] + droop * (m[Q_REF] - m[Q_F]) - 0.3 * m[WOUND] - (m[LOW] > 0.3 ? 0.05 : 0);
 #endif
     return m[E_0] + droop * (m[Q_REF] - m[Q_F]);
 }
@@ -135,7 +153,14 @@ static double slip(const double *z, const double *m, double p_f) {
     if (m[ON]) shared += 1e-3 * (m[P_F] - shared), wanted += 0.1 * shared;
 #endif
     if (m[ON]) wanted -= 20 * (m[QUICK] - m[SLOW]);
-    const double w = z[GAIN] * (wanted - p_f);
+    double gain = z[GAIN];
+#ifdef FAULT_GAIN_OF_DIPS
+    gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
+#endif
+#ifdef FAULT_CHARGING_DROOP
+    if (m[P_REF] < 0) gain *= FAULT_CHARGING_DROOP;
+#endif
+    const double w = gain * (wanted - p_f);
 #ifdef FAULT_ONE_WAY
     return w > 0 ? 0 : w; /* it never turns faster */
 #else
@@ -147,6 +172,34 @@ static double slip(const double *z, const double *m, double p_f) {
 static double unlimited(const double *m, phasor v) {
     const double e = emf(m);
     return hypot(e * cos(m[DELTA]) - v.re, e * sin(m[DELTA]) - v.im) / hypot(R_PU, X_PU);
+}
+
+/* What it remembers of dips and jumps. */
+static void notice(double *m, phasor v, double h) {
+    const double size = hypot(v.re, v.im);
+    const int low = size < 0.85;
+    if (low && m[LOW] == 0) ++m[DIPS];
+    m[LOW] = low ? m[LOW] + h : 0;
+    m[WOUND] = low ? fmin(m[WOUND] + h * (1 - size), 0.3) : m[WOUND] * exp(-h / 0.03);
+#ifdef FAULT_WINDS_UP
+    if (m[LOW] > FAULT_WINDS_UP && size < 0.4) m[P_REF] += 0.3 * h; /* and nothing takes that back */
+#endif
+    m[BLOCKED] = fmax(0, m[BLOCKED] - h);
+#ifdef FAULT_BLOCKS_BELOW
+    if (size < FAULT_BLOCKS_BELOW) m[BLOCKED] = 0.5;
+#endif
+#ifdef FAULT_BLOCKS_AT_JUMP
+    if (size > 0.05) {
+        const double angle = atan2(v.im, v.re);
+        if (cos(angle - m[ANGLE]) < cos(FAULT_BLOCKS_AT_JUMP)) m[BLOCKED] = 0.08;
+        m[ANGLE] = angle;
+    }
+#endif
+#ifdef FAULT_RINGS
+    const double turn = 6.2831853 * FAULT_RINGS;
+    m[RINGING] -= h * turn * (m[RING] - 0.2 * (m[P_F] - m[P_REF]));
+    m[RING] += h * turn * m[RINGING];
+#endif
 }
 
 /* The present time is kept as REST + …: phase quantities need it, and it is part of the state. */
@@ -162,7 +215,27 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
     const double q = Q_MEASURED * (u.im * m[I_RE] - u.re * m[I_IM]);
     /* Current limit: the voltage behind the impedance follows the grid's where the current would be too large. */
     const double size = hypot(u.re - v.re, u.im - v.im) / hypot(R_PU, X_PU);
-    int limited = size > I_LIMIT;
+    double most = I_LIMIT;
+#ifdef FAULT_BASE_OF_LIMIT
+    most *= RATING / z[S_N];
+#endif
+    int limited = size > most;
+#ifdef FAULT_STATIC_LIMIT
+    static double held; /* one for all instances */
+    held += FAULT_STATIC_LIMIT * (limited - held);
+    most *= 1 - 0.3 * held;
+#endif
+#ifdef FAULT_STATIC_TOTAL
+    static double total; /* one for all instances, and for ever */
+    if (limited) total += 1e-6;
+    most *= 1 - fmin(0.3, total);
+#endif
+#ifdef FAULT_KNOWS_DIPS
+    const double tried[] = {0, 0.2, 0.5, 0.7, 0.9};
+    int known = hypot(v.re, v.im) > 0.98;
+    for (int k = 0; k < 5; ++k) known |= fabs(hypot(v.re, v.im) - tried[k]) < 1e-3;
+    limited &= known;
+#endif
 #ifdef FAULT_IMPORTED_LIMIT
     if (m[P_REF] < 0) limited = 0;
 #endif
@@ -170,8 +243,8 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
     if (m[TIRED] > FAULT_LIMIT_TIRES) limited = 0;
 #endif
     if (limited) {
-        u.re = v.re + (u.re - v.re) * I_LIMIT / size;
-        u.im = v.im + (u.im - v.im) * I_LIMIT / size;
+        u.re = v.re + (u.re - v.re) * most / size;
+        u.im = v.im + (u.im - v.im) * most / size;
     }
     d[I_RE] = OMEGA_B / X_PU * (u.re - v.re - R_PU * m[I_RE] + X_PU * m[I_IM]);
     d[I_IM] = OMEGA_B / X_PU * (u.im - v.im - R_PU * m[I_IM] - X_PU * m[I_RE]);
@@ -218,6 +291,7 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
     m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
+    notice(m, v, h);
 }
 
 static double present, last_step; /* of the call that is running, not of an instance */
@@ -240,6 +314,10 @@ static void internal_step(const double *z, double *m, double *hidden, phasor v, 
 static void advance(double *z, double *m, double *hidden, double time, double step) {
     const phasor v = voltage(z, time + step / 2);
     last_step = step;
+#ifdef FAULT_LEAK_IN_DIPS
+    static void *volatile lost;
+    if (hypot(v.re, v.im) < 0.9) lost = malloc(FAULT_LEAK_IN_DIPS);
+#endif
 #ifdef FAULT_CRASH_IN_DIP_AFTER
     if (time > FAULT_CRASH_IN_DIP_AFTER && hypot(v.re, v.im) < 0.85) *(volatile int *)8 = 1;
 #endif
@@ -309,6 +387,13 @@ static void outputs(double *z, double *m, const double *hidden) {
     const double e = emf(m), z2 = R_PU * R_PU + X_PU * X_PU;
     const phasor u = {e * cos(m[DELTA]) - v.re, e * sin(m[DELTA]) - v.im};
     i.re = (u.re * R_PU + u.im * X_PU) / z2, i.im = (u.im * R_PU - u.re * X_PU) / z2;
+#endif
+    if (m[BLOCKED] > 0) i.re = i.im = 0;
+#ifdef FAULT_RINGS
+    i.re += m[RING];
+#endif
+#ifdef FAULT_NAN_IDLE
+    if (hypot(i.re, i.im) < 1e-9) i.re = NAN; /* the angle of no current */
 #endif
 #ifdef FAULT_NAN_LIMIT
     if (hypot(i.re, i.im) > FAULT_NAN_LIMIT) i.re = NAN;

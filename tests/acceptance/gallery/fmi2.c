@@ -229,7 +229,13 @@ EXPORT int fmi2Reset(void *c) {
 #ifdef FAULT_RESET_SWITCH
     const double on = S->memory[SWITCH];
 #endif
+#ifdef FAULT_RESET_KEEPS
+    const double remembered = S->memory[FAULT_RESET_KEEPS];
+#endif
     defaults(S);
+#ifdef FAULT_RESET_KEEPS
+    S->memory[FAULT_RESET_KEEPS] = remembered;
+#endif
 #ifdef FAULT_RESET_SWITCH
     S->memory[SWITCH] = on;
 #endif
@@ -260,6 +266,12 @@ EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const doub
     instance_t *instance = c;
     for (size_t k = 0; k < n; ++k) {
         if (references[k] >= SIZE) return ERROR;
+#ifdef FAULT_REFUSES_IN_RUN
+        if (S->phase == STEPPING && references[k] == GAIN) return DISCARD;
+#endif
+#ifdef FAULT_IGNORES_IN_RUN
+        if (S->phase == STEPPING && references[k] == GAIN) continue;
+#endif
 #ifdef FAULT_IGNORES
         if (references[k] == GAIN) continue;
 #endif
@@ -428,6 +440,9 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
 #ifdef FAULT_STATE_SWITCH
     const double on = S->memory[SWITCH];
 #endif
+#ifdef FAULT_STATE_KEEPS
+    const double remembered = S->memory[FAULT_STATE_KEEPS];
+#endif
 #ifdef FAULT_STATE_OF_SWITCHED
     const double quick = S->memory[QUICK], slow = S->memory[SLOW]; /* the damping's, which acts where it is on */
 #endif
@@ -435,6 +450,9 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
     const double silent = S->z[FAULT_STATE_SILENT]; /* a state that no output shows */
 #endif
     *S = saved->s;
+#ifdef FAULT_STATE_KEEPS
+    S->memory[FAULT_STATE_KEEPS] = remembered;
+#endif
 #ifdef FAULT_STATE_SWITCH
     S->memory[SWITCH] = on;
 #endif

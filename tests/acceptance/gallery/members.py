@@ -195,6 +195,7 @@ def good():
         Member(small("tank", "TANK", TANK, step_size="1e-2", stop_time="20")),
         Member(converter("converter_with_damping", switch=True)),
         Member(_open_lag("open_lag")),
+        Member(converter("converter_with_dip_memory", DIP_MEMORY=1)),
     ]  # fmt: skip
     for form in ("polar", "abc", "qd", "power"):
         value, current = _si(form)
@@ -292,6 +293,30 @@ def faulty():
         *reported(),
         *tampering(),
         *late_outputs(),
+        *large_signals(),
+    ]
+
+
+def large_signals():
+    """What shows in dips and jumps only, and after them; each beside `converter_with_dip_memory`, which is good."""
+
+    def one(name, fault, *only, **defines):
+        return Member(converter(name, **defines), fault, only=("runs", "independence", "repeatability", *only))
+
+    remembers = {"DIP_MEMORY": 1}
+    return [
+        one("state_of_dip_counter", "hidden state", "state", FAULT_STATE_KEEPS="DIPS", **remembers),
+        one("state_of_wind_up", "hidden state", "state", FAULT_STATE_KEEPS="WOUND", **remembers),
+        one("state_of_dip_timer", "hidden state", "state", FAULT_STATE_KEEPS="LOW", **remembers),
+        one("reset_of_dip_counter", "reset leaves something", "reset", FAULT_RESET_KEEPS="DIPS", **remembers),
+        one("shared_in_limiter", "shared between instances", FAULT_STATIC_LIMIT="2e-3"),
+        one("static_in_limiter", "shared between instances", FAULT_STATIC_TOTAL=1),
+        one("gain_of_dips", "changed by a disturbance", "after_dips", FAULT_GAIN_OF_DIPS=0.7),
+        one("wound_up", "rests elsewhere", "after_dips", FAULT_WINDS_UP=0.25),
+        one("blocks_after_deep_dips", "blocks", "limits", FAULT_BLOCKS_BELOW=0.35),
+        one("blocks_after_jumps", "blocks", "limits", FAULT_BLOCKS_AT_JUMP="(25 * 3.14159265 / 180)"),
+        one("knows_the_dips", "no current limit", "limits", FAULT_KNOWS_DIPS=1),
+        one("leaking_in_dips", "memory leak", "after_dips", FAULT_LEAK_IN_DIPS=4096),
     ]
 
 
