@@ -27,6 +27,14 @@ _SCREENS = "a winding that reacts can only lower the reactance; equal says that 
 _LEAKAGE = "the leakage reactance is what no rotor winding can screen"
 _SLOWER = "the transient is by definition the slower one; check the units and whether the two are swapped"
 
+_LIMITS = "the lower limit exceeds the upper one, or equals it; are the two swapped?"
+LIMITS = (
+    ("exciter.E_MAX", "exciter.E_MIN"),
+    *((f"exciter.V_{k}MAX", f"exciter.V_{k}MIN") for k in ("R", "A", "I", "M")),
+    *((f"governor.{q}_MAX", f"governor.{q}_MIN") for q in ("V", "P", "G")),
+)
+"""Limits of a machine's controls, the upper one first."""
+
 RULES = (
     Rule("machine.X_d", "machine.X_d1", _FIELD),
     Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
@@ -36,6 +44,7 @@ RULES = (
     Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
     Rule("machine.T_d10", "machine.T_d20", _SLOWER),
     Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+    *(Rule(upper, lower, _LIMITS) for upper, lower in LIMITS),
 )
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
 is started."""

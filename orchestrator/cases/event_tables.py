@@ -1,6 +1,6 @@
 """Events of a case file as the coupling's typed events, checked against the components they change."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -46,6 +46,9 @@ from orchestrator.coupling.events import (
 from orchestrator.coupling.system import ComponentPlan, Endpoint
 from orchestrator.errors import InputError, Problem
 
+_LONG_FAULT = 10.0
+"""Duration of a fault [s] above which one without a unit is questioned."""
+
 
 def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
     """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
@@ -63,6 +66,8 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             continue
         if table.time >= stop:
             _note_late(draft, table.time, stop, where)
+        else:
+            draft.questions += [Problem(where, text) for text in _endless(table, stop)]
         for event in _all_events_of(draft, table, clock, stop, where):
             checked = event if isinstance(event, Fault) else _checked(draft, event, fed, where)
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
@@ -90,6 +95,20 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
         draft.note(where, f"{text}; give it an earlier time, or the run a later solver.stop_time")
     else:
         draft.questions.append(Problem(where, f"{text} (--stop)"))
+
+
+def _endless(table: EventTable, stop: float) -> Iterator[str]:
+    """Questions about what ends only after the run, or lasts so long that its unit is in doubt."""
+    if isinstance(table, BusFaultTable) and table.duration is not None:
+        seen = f"duration = {table.duration:g} s"
+        slip = f"; if {table.duration:g} ms is meant, write '{table.duration:g} ms'" if table.has_bare_duration else ""
+        if table.time + table.duration > stop:
+            yield f"{seen}: the fault is not cleared before the run stops at {stop:g} s{slip}"
+        elif table.has_bare_duration and table.duration > _LONG_FAULT:
+            yield f"{seen}, without a unit: a fault is cleared within a second{slip}, else '{table.duration:g} s'"
+    reclose = table.reclose_after if isinstance(table, LineTripTable) else None
+    if reclose is not None and table.time + reclose > stop:
+        yield f"reclose_after = {reclose:g} s: the line recloses only after the run, which stops at {stop:g} s"
 
 
 def _all_events_of(draft: Draft, table: EventTable, clock: Clock, stop: float, where: str) -> list[Event]:

@@ -23,6 +23,7 @@ class _Source:
     changes: tuple[Problem, ...] = ()
     machines: tuple[Machine, ...] = ()
     idle: frozenset[tuple[int, str]] = frozenset()
+    solved: bool = True
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,10 @@ class NetworkData:
         What the source holds and was taken over in another form, each with its place.
     machines, idle_machines
         Machines in service, one by one, where the source is of PSS/E; bus and identifier of those out of service.
+    feeding, capacitors
+        By bus, as the source has them: loads below zero [MW] and capacitors [Mvar].
+    solved
+        Whether the source's voltages are no flat start.
     """
 
     buses: tuple[str, ...]
@@ -58,6 +63,9 @@ class NetworkData:
     changes: tuple[Problem, ...] = ()
     machines: tuple[Machine, ...] = ()
     idle_machines: frozenset[tuple[int, str]] = frozenset()
+    feeding: dict[str, float] = field(default_factory=dict)
+    capacitors: dict[str, float] = field(default_factory=dict)
+    solved: bool = True
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -103,6 +111,9 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         found.changes,
         found.machines,
         found.idle,
+        source.feeding,
+        source.capacitors,
+        found.solved,
     )
 
 
@@ -128,7 +139,12 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     if table.leave_out:
         raise InputError("leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'")
     if table.matpower is not None:
-        imported = import_network(read_matpower(seen_from_here(directory / table.matpower)))
+        path = seen_from_here(directory / table.matpower)
+        imported = import_network(read_matpower(path))
+        if table.frequency is None:
+            text = "MATPOWER's cases hold no frequency: every model keeps its own, usually 50 Hz"
+            text += '; write it in [network], such as frequency = "60 Hz"'
+            return _Source(imported, (Problem(str(path), text),))
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
     return _Source(imported)
@@ -137,13 +153,18 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
 def _from_raw(path: Path, table: NetworkTable) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
     raw = read_raw(seen_from_here(path), table.leave_out, keep_load_parts=table.keep_load_parts)
+    if raw.tables.frequency is None and table.frequency is None:
+        raise InputError(
+            f"{raw.tables.name}: BASFRQ, the sixth value of the first record, is missing or 0, so the frequency is not "
+            'known; write it in [network]: frequency = "50 Hz" or frequency = "60 Hz"'
+        )
     imported = import_network(raw.tables)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), raw.changes, raw.machines, raw.idle)
+    return _Source(replace(imported, generation=generation), raw.changes, raw.machines, raw.idle, raw.solved)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:

@@ -45,7 +45,7 @@ class _Member:
 @dataclass(frozen=True)
 class ImportedNetwork:
     """Elements of a network, the generation at each bus, and the parts of constant impedance and current of loads [MW,
-    Mvar], by the load's name.
+    Mvar], by the load's name. By bus, as the source has them: loads below zero [MW] and capacitors [Mvar].
     """
 
     buses: tuple[str, ...] = ()
@@ -57,6 +57,8 @@ class ImportedNetwork:
     frequency: float | None = None
     transformers: tuple[ThreeWinding, ...] = ()
     load_parts: dict[str, tuple[complex, complex]] = field(default_factory=dict)
+    feeding: dict[str, float] = field(default_factory=dict)
+    capacitors: dict[str, float] = field(default_factory=dict)
 
 
 def import_network(source: SourceTables) -> ImportedNetwork:
@@ -100,6 +102,8 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         source.frequency,
         tuple(transformers),
         {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
+        {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
+        {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
     )
 
 

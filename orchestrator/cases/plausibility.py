@@ -8,11 +8,13 @@ import fnmatch
 import math
 from collections.abc import Iterable, Iterator
 
+from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausible_networks import network_doubts
 from orchestrator.cases.plausible_ranges import RANGES, SMALLEST_SHARE
+from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem
@@ -20,6 +22,9 @@ from orchestrator.fmi.port import BoundDescription
 
 _FULL = 1.05
 """Apparent power [pu of the rating] above which a converter's operating point is questioned."""
+
+_SAME_RATING = 0.01
+"""Part by which a binding's rating may differ from the FMU's own."""
 
 _SHOWN = 3
 """Largest number of components that a question names; the others are counted."""
@@ -48,7 +53,8 @@ def _check_meant(draft: Draft) -> None:
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
             draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
-        elsewhere = any(fnmatch.fnmatchcase(known, variable) for known in RANGES)  # of a part that another scenario has
+        others = (*RANGES, *PARTS, SOLVED)  # of a part that another scenario has, or of no variable
+        elsewhere = any(fnmatch.fnmatchcase(known, variable) for known in others)
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
@@ -69,6 +75,27 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
                 yield UnusualValue(f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text)
     yield from _small_units(draft)
     yield from network_doubts(draft)
+    yield from source_doubts(draft)
+    yield from _ratings(draft)
+
+
+def _ratings(draft: Draft) -> Iterator[UnusualValue]:
+    """Ask about bindings whose rating is not the one that the FMU itself starts with."""
+    for name, plan in draft.system.components.items():
+        found = plan.description
+        if not isinstance(found, BoundDescription):
+            continue
+        for start in found.port.start.get("S_n", ()):
+            own = found.inner.variables[start.variable].start
+            if isinstance(own, bool | str) or own is None or not start.factor or start.variable in found.port.settings:
+                continue
+            rating = (own - start.offset) / start.factor
+            if abs(rating - found.port.rating) > _SAME_RATING * found.port.rating:
+                text = (
+                    f"the binding has S_n = {found.port.rating:g} MVA, and the FMU's {start.variable} is {rating:g} "
+                    "MVA by itself: is the binding's rating that of one unit as delivered?"
+                )
+                yield UnusualValue(f"{name}.S_n", draft.place("components", name, "binding"), text)
 
 
 def question_loading(draft: Draft) -> None:

@@ -36,6 +36,8 @@ _KUNDUR = "Kundur 1994, table 4.2, widened"
 _421 = "IEEE 421.5, typical data, widened"
 _PSS = "IEEE 421.5, stabilisers, widened"
 _GOVERNORS = "IEEE PES-TR1, turbine-governor models, widened"
+_DROOP = "governors' droops: 2 to 12 %, widened"
+_SATURATION = "usual saturation of machines: 0.02 to 0.3 at 1 pu, 0.1 to 1 at 1.2 pu, widened; is it in percent?"
 _FILTER = "usual LC filters and transformers of converters"
 _CONTROL = "usual time scales of converter control"
 
@@ -65,7 +67,34 @@ _MACHINE = {
     **{f"pss.T_{k}": Plausible(0.005, 10, "s", _PSS, or_zero=True) for k in (1, 2, 3, 4, 6, 8, 9)},
     "pss.K_s1": Plausible(0.01, 100, "pu", _PSS, or_zero=True),
     "pss.limit": Plausible(0.005, 0.5, "pu", _PSS, or_zero=True),
+    "exciter.K": Plausible(1, 2000, "pu", _421),
+    "exciter.K_C": Plausible(-1, 1, "pu", _421),
+    "exciter.K_D": Plausible(0, 2, "pu", _421),
+    "exciter.K_E": Plausible(-0.5, 2, "pu", _421),
+    "exciter.K_F": Plausible(0, 1, "pu", _421),
+    "exciter.K_G": Plausible(0, 2, "pu", _421),
+    "exciter.K_LR": Plausible(0, 100, "pu", _421),
+    "exciter.K_PM": Plausible(0.01, 300, "pu", _421, or_zero=True),
+    "exciter.K_IM": Plausible(0.01, 300, "1/s", _421, or_zero=True),
+    "pss.K_S": Plausible(0.01, 100, "pu", _PSS, or_zero=True),
+    "pss.K_s2": Plausible(0.005, 5, "pu", _PSS, or_zero=True),
+    "pss.K_s3": Plausible(0.1, 10, "pu", _PSS, or_zero=True),
     "governor.inverse_R": Plausible(5, 100, "pu", _GOVERNORS, or_zero=True),
+    "governor.R": Plausible(0.005, 0.3, "pu", _DROOP),
+    "governor.K": Plausible(3, 200, "pu", f"{_DROOP}; K is 1/droop", or_zero=True),
+    "governor.r": Plausible(0.05, 5, "pu", "usual temporary droops of hydro governors"),
+    "governor.K_T": Plausible(0.2, 10, "1", _GOVERNORS),
+    "governor.A_T": Plausible(0.3, 3, "pu", _GOVERNORS),
+    "governor.A_t": Plausible(0.5, 3, "1", _GOVERNORS),
+    "governor.D_t": Plausible(0, 5, "pu", _GOVERNORS),
+    "governor.D_turb": Plausible(0, 5, "pu", _GOVERNORS),
+    "governor.q_NL": Plausible(0, 0.5, "pu", _GOVERNORS),
+    "governor.T_r": Plausible(0.1, 60, "s", _GOVERNORS),
+    "governor.T_f": Plausible(0.005, 10, "s", _GOVERNORS),
+    "governor.T_g": Plausible(0.01, 60, "s", _GOVERNORS),
+    "governor.T_W": Plausible(0.1, 15, "s", _GOVERNORS),
+    "machine.s_10": Plausible(0, 1, "1", _SATURATION),
+    "machine.s_12": Plausible(0, 3, "1", _SATURATION),
     **{f"governor.T_{k}": Plausible(0.005, 60, "s", _GOVERNORS, or_zero=True) for k in range(1, 8)},
 }
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
 
 from orchestrator.cases.names import file_name
 from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
@@ -382,6 +382,19 @@ class BusFaultTable(GridEventBase):
     X: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     duration: Seconds | None = Field(default=None, gt=0)
     cleared_by: str | None = None
+    _bare: bool = PrivateAttr(default=False)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _noting_units(cls, given: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        found = handler(given)
+        found._bare = isinstance(given, dict) and not isinstance(given.get("duration"), str)
+        return found
+
+    @property
+    def has_bare_duration(self) -> bool:
+        """Whether the duration is a number without a unit."""
+        return self.duration is not None and self._bare
 
     @model_validator(mode="after")
     def _has_an_end_to_clear(self) -> Self:

@@ -29,6 +29,8 @@ class UnitRow:
         File and line of the row; empty where the unit comes from the network's source.
     parts
         Parts of the generator that the row itself chooses.
+    partial
+        Whether a record of it was left out, for which the case says what stands there.
     q_min_mvar, q_max_mvar
         Limits of reactive power [Mvar]; infinite without.
     converter
@@ -48,6 +50,7 @@ class UnitRow:
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     place: str = ""
     parts: Mapping[str, str] = field(default_factory=dict)
+    partial: bool = False
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
     converter: str | None = None

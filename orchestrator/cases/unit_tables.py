@@ -18,6 +18,7 @@ from orchestrator.cases.network_import import Generation
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.cases.psse.dyr_units import rows_of_machines, with_records
+from orchestrator.cases.psse.parts_without_records import completed, missing_records, with_choices
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.cases.source_changes import Changes
@@ -186,10 +187,16 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
     rows = with_records(rows, machines, path, table.dyr_leave_out, replaced, idle, approximate=table.dyr_approximate)
+    rows = with_choices(rows, replaced, _parts_of(table))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
-        draft, [UnusualValue(f"sg{row.label}.{v}", at, text) for row in machine_rows for v, at, text in row.doubts]
+        draft,
+        [
+            *(UnusualValue(f"sg{row.label}.{v}", at, text) for row in machine_rows for v, at, text in row.doubts),
+            *missing_records(machine_rows, str(path)),
+        ],
     )
+    rows = completed(rows, replaced)
     changes = Changes(str(path))
     for row in rows:
         for line, text in row.replaced:

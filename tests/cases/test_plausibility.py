@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, sketch_model
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.data_rules import RULES
 from orchestrator.cases.plausible_ranges import RANGES
@@ -101,8 +102,21 @@ def test_the_defaults_of_every_model_are_plausible_and_obey_the_rules(name):
         assert not {rule.larger, rule.smaller} <= start.keys() or rule.holds(start[rule.larger], start[rule.smaller])
 
 
+RECORDED_PARTS = [
+    {"machine": r.part} if r.kind == "machine" else {"exciter": "sexs"} | {r.kind: r.part} for r in DYR_RECORDS.values()
+]
+
+
+@pytest.mark.parametrize("parts", RECORDED_PARTS, ids=lambda parts: "-".join(parts.values()))
+def test_the_defaults_of_every_part_that_a_record_can_be_are_plausible(parts):
+    for v in sketch_model("synchronous_generator_phasor", **parts).parameters:
+        assert v.name not in RANGES or RANGES[v.name].unit != v.unit or RANGES[v.name].fits(v.start), v.name
+
+
 def test_every_range_and_rule_is_of_a_variable_that_some_model_has():
     known = {v.name for name in model_names() if not needs_arguments(name) for v in build_model(name).parameters}
+    recorded = [sketch_model("synchronous_generator_phasor", **parts) for parts in RECORDED_PARTS]
+    known |= {v.name for model in recorded for v in model.parameters}
     assert {*RANGES, *(r.larger for r in RULES), *(r.smaller for r in RULES)} <= known
 
 
@@ -304,6 +318,16 @@ def test_a_foreign_fmu_bound_with_another_frequency_is_refused(questions, tmp_pa
     line = 1 + CASE.replace(*changes[0]).splitlines().index('binding = "vendor.toml"')
     assert problem.startswith(f"line {line}, components.vsc.binding: vsc is rated at 60 Hz and grid at 50 Hz")
     assert "rating.f_n" in problem
+
+
+@pytest.mark.parametrize("rating", ["1500 MVA", "4 MVA"])
+def test_a_binding_with_another_rating_than_the_fmu_starts_with_is_questioned(questions, tmp_path, fmu_path, rating):
+    text = OURS.replace('S_n = "1500 MVA"', f'S_n = "{rating}"')
+    (tmp_path / "vendor.toml").write_text(text, encoding="utf-8")
+    changes = [('model = "gfor"', f"fmu = '{fmu_path('gfor')}'\nbinding = \"vendor.toml\"")]
+    asked = [q for q in questions(*changes, ('S_n = "500 MVA"', 'S_n = "1500 MVA"')) if "the binding has" in q]
+    assert len(asked) == (rating == "4 MVA")
+    assert all("S_n = 4 MVA, and the FMU's S_n is 1500 MVA by itself" in q for q in asked)
 
 
 def test_systems_that_are_not_coupled_may_have_two_frequencies(questions):

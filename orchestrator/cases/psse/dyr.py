@@ -14,9 +14,6 @@ from orchestrator.errors import InputError
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
 
 _MOST_SHOWN = 20
-_WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
-"""Parts of a generator for which a file has no record: what PSS/E assumes."""
-
 _SAME = 1e-3
 """Part by which two figures for one reactance may differ: files round them."""
 
@@ -25,8 +22,9 @@ _SAME = 1e-3
 class MachineModel:
     """What a generator is made of, and the parameters that its records set; or the model of a converter.
 
-    ``doubts`` are texts with the parameter and the place that they are about; ``replaced`` are lines of records that an
-    approximation stands for, with what it leaves out.
+    ``partial``: a record of it was left out, and the case says what stands for it. ``doubts`` are texts with the
+    parameter and the place that they are about; ``replaced`` are lines of records that an approximation stands for,
+    with what it leaves out.
     """
 
     parts: Mapping[str, str]
@@ -34,6 +32,7 @@ class MachineModel:
     converter: str | None = None
     doubts: tuple[tuple[str, str, str], ...] = ()
     replaced: tuple[tuple[int, str], ...] = ()
+    partial: bool = False
 
 
 def machine_models(
@@ -172,16 +171,15 @@ def _sets(name: str) -> set[str]:
 
 
 def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
-    """The model of a machine; ``partial``: a record of it was left out, and the case says what stands for it."""
+    """The model of a machine, of the parts that have records."""
     if "converter" in parts:
         coupling = {"RL": machine.source.real, "XL": machine.source.imag}
         return MachineModel({}, {**coupling, **values}, parts["converter"])
-    absent = {} if partial else {kind: part for kind, part in _WITHOUT.items() if kind not in parts}
     source = {"machine.R_s": machine.source.real}
     if parts["machine"] == "classical":
         source["machine.X_d1"] = machine.source.imag
     step_up = {"transformer.X_t": 0.0, "transformer.R_t": 0.0}  # the network has them
-    return MachineModel({**absent, **parts}, {**source, **values, **step_up})
+    return MachineModel(parts, {**source, **values, **step_up}, partial=partial)
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:

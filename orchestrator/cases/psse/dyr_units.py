@@ -84,7 +84,9 @@ def with_records(
         if model is None:
             found.append(row)
         elif model.converter is None:
-            found.append(replace(row, parameters={"sg": model.parameters}, parts=model.parts, doubts=model.doubts))
+            own = {"sg": model.parameters}
+            of_records = replace(row, parameters=own, parts=model.parts, partial=model.partial)
+            found.append(replace(of_records, doubts=model.doubts))
         else:
             own = {"gfor": model.parameters}
             found.append(replace(row, parameters=own, converter=model.converter, replaced=model.replaced))

@@ -56,13 +56,14 @@ class Machine:
 class RawNetwork:
     """A file's tables, its machines in service, and what was taken over in another form.
 
-    ``idle`` has bus and identifier of the machines that are out of service.
+    ``idle`` has bus and identifier of the machines that are out of service. ``solved``: the voltages are no flat start.
     """
 
     tables: SourceTables
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
+    solved: bool = True
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
@@ -128,7 +129,10 @@ class _Reading:
             self._raw.frequency,
             self._load_parts,
         )
-        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle))
+        flat = all(
+            record.number(7, "VM", 1.0) == 1 and record.number(8, "VA", 0.0) == 0 for record in self._raw.of("bus")
+        )
+        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle), not flat)
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))

@@ -108,7 +108,8 @@ def test_a_model_goes_at_the_users_word(tables):
     case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDEXC"]\nexciter = "sexs"')
     found = tables(DYR.replace("'SEXS'", "'OLDEXC'"), case)
     assert found["sg1"].exciter == "sexs"
-    assert found["sg2"].exciter == "manual"
+    assert found["sg2"].exciter == "sexs"  # it has no record, and [units] says what stands there
+    assert found["sg3"].exciter == "manual"  # a classical machine has no field winding
 
 
 @pytest.mark.slow

@@ -1,0 +1,116 @@
+"""What a network's source holds that is most unusual beside its own other data."""
+
+from collections.abc import Iterator, Mapping
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.plausible_values import UnusualValue, value_of
+from orchestrator.coupling.system import ComponentPlan
+
+SOLVED = "solved"
+"""Of the grid, in ``meant``: the source's voltages are a flat start on purpose."""
+
+_STEP_UP = (0.03, 0.35)
+"""Usual reactances of step-up transformers on the machine's rating [pu], widened."""
+
+_FAR = 20.0
+"""A capacitor that is smaller than the next one by this factor is questioned where 100 times as much is usual."""
+
+
+def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
+    """Ask about loads below zero, capacitors, step-up transformers, saturation and a flat start.
+
+    Parameters
+    ----------
+    draft
+        With the values that are set.
+    """
+    grid = draft.system.components.get(draft.grid or "")
+    if grid is None or draft.network is None or draft.data is None or draft.grid is None or draft.case.network is None:
+        return
+    where = _place(draft)
+    if not draft.data.solved:
+        text = (
+            "the file is not solved: every bus has VM = 1 and VA = 0. The power flow is computed here, and what PSS/E "
+            "takes from VM (parts of loads, some generators' voltages) is that of 1 pu; export the solved case"
+        )
+        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, text)
+    yield from _negative_loads(draft, draft.grid, where)
+    yield from _capacitors(draft.grid, draft.data.capacitors, where)
+    yield from _step_up(draft, draft.grid, grid, where)
+    yield from _saturation(draft)
+
+
+def _place(draft: Draft) -> str:
+    table = draft.case.network
+    source = next((k for k in ("raw", "matpower", "pandapower", "cgmes") if table and getattr(table, k)), None)
+    return draft.place("network", source) if source else draft.place("network")
+
+
+def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValue]:
+    table, found = draft.case.network, draft.data
+    if table is None or found is None or table.generation_model.active is not None:
+        return
+    for bus, p_mw in found.feeding.items():
+        text = f"the load at {bus} is {p_mw:g} MW, below zero: it feeds in, as static generation; is its sign right?"
+        yield UnusualValue(f"{grid}.load_{bus.removeprefix('bus_')}.P", where, text)
+
+
+def _capacitors(grid: str, found: Mapping[str, float], where: str) -> Iterator[UnusualValue]:
+    for bus, b in found.items():
+        others = [other for name, other in found.items() if name != bus]
+        if others and b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
+            text = (
+                f"the shunt at {bus} has {b:g} Mvar, where the others have {min(others):g} to {max(others):g} Mvar: is "
+                f"{100 * b:g} Mvar meant?"
+            )
+            yield UnusualValue(f"{grid}.shunt_{bus.removeprefix('bus_')}.B", where, text)
+
+
+def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:
+    """A bus with machines and one branch without charging in a file: the branch is their step-up transformer."""
+    written = draft.case.network.lines if draft.case.network else {}
+    if draft.network is None:
+        return
+    ratings: dict[str, float] = {}
+    for port in draft.network.ports:
+        plan = draft.system.components.get(port.name)
+        if plan is not None and (S_n := value_of(plan, "S_n")) is not None:
+            ratings[port.bus] = ratings.get(port.bus, 0.0) + S_n
+    low, high = _STEP_UP
+    for bus, rating in ratings.items():
+        branches = [line for line in draft.network.lines if bus in (line.from_bus, line.to_bus)]
+        if (
+            len(branches) != 1
+            or branches[0].B
+            or branches[0].name in written
+            or any(bus in x.buses for x in draft.network.transformers)
+        ):
+            continue
+        variable = branches[0].variable("X")
+        X = value_of(grid, variable)
+        if X is not None and low <= X <= high < X * rating / 100:
+            text = (
+                f"{variable} = {X:g} pu on 100 MVA is {X * rating / 100:.3g} pu on the {rating:g} MVA behind it, and "
+                f"step-up transformers have {low:g} to {high:g} pu there; if {X:g} pu is on the machine's base, it is "
+                f"{100 * X / rating:.4g} pu on 100 MVA"
+            )
+            place = draft.places.get(f"{name}.{variable}", f"{where}, {branches[0].name}")
+            yield UnusualValue(f"{name}.{variable}", place, text)
+
+
+def _saturation(draft: Draft) -> Iterator[UnusualValue]:
+    """Machines of records that do not saturate where most others do."""
+    known = {}
+    for name in draft.origins:
+        plan = draft.system.components.get(name)
+        if plan is not None and (s_10 := value_of(plan, "machine.s_10")) is not None:
+            known[name] = max(s_10, value_of(plan, "machine.s_12") or 0.0)
+    without = [name for name, saturation in known.items() if saturation == 0]
+    if len(known) - len(without) < 2 or 2 * len(without) > len(known):
+        return
+    text = (
+        f"the saturation is 0, where {len(known) - len(without)} of {len(known)} machines saturate; give S(1.0) and "
+        "S(1.2)"
+    )
+    where = draft.place("units")
+    yield from (UnusualValue(f"{name}.machine.s_10", where, text) for name in without)

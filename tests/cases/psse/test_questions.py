@@ -1,0 +1,207 @@
+"""Mistakes in RAW and DYR files that a power flow survives: each is one question, and an honest file has none."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.errors import CaseError
+
+FILES = Path(__file__).parents[3] / ".docs" / "tutorials" / "psse"
+RAW, DYR = ((FILES / name).read_text() for name in ("areas.raw", "areas.dyr"))
+CASE = """\
+name = "areas"
+[solver]
+step_size = "5 ms"
+record_interval = "20 ms"
+stop_time = "15 s"
+[power_flow]
+grid = "grid"
+[components.grid]
+model = "phasor_grid"
+[network]
+raw = "areas.raw"
+keep_load_parts = true
+load_model = { active = "power", reactive = "power" }
+[units]
+dyr = "areas.dyr"
+generator = "synchronous_generator_phasor"
+converter = "gfor_phasor"
+"""
+CHANGES = ("switched shunt: held", "tap changer or phase-shift control")
+"""What is told of the honest file: it is taken over in another form."""
+
+
+@pytest.fixture
+def questions(tmp_path):
+    """Questions about the two areas with changed files, as text."""
+
+    def ask(raw=RAW, dyr=DYR, case=CASE):
+        (tmp_path / "areas.raw").write_text(raw)
+        (tmp_path / "areas.dyr").write_text(dyr)
+        (tmp_path / "case.toml").write_text(case)
+        (prepared,) = load_case(tmp_path / "case.toml").prepare()
+        return [str(q) for q in prepared.questions if not any(text in str(q) for text in CHANGES)]
+
+    return ask
+
+
+def changed(text, *pairs):
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    return text
+
+
+def without(kind, *buses):
+    return "\n".join(x for x in DYR.splitlines() if not any(x.startswith(f"{b} '{kind}'") for b in buses))
+
+
+SEXS = "3 'SEXS'   1  0.1 10.0 100.0 0.05 -5.0 5.0 /"
+EXST1 = "3 'EXST1'  1  0.01  0.2 -0.2  1.0 1.0  200.0 0.0  5.0 -5.0  0.0  0.0 1.0 /"
+TGOV1 = "3 'TGOV1'  1  0.05 0.5  1.0 0.0  2.1 7.0  0.0 /"
+IEEEG1 = "3 'IEEEG1' 1 0 0 20 0 0 0.1 1 -10 1 0 0.3 0.3 0 7 0.3 0 0.6 0.4 0 0 0 0 /"
+HYGOV = "3 'HYGOV'  1  0.05 0.3 5.0 0.05 0.5 0.2 1.0 0.0 1.0 1.2 0.5 0.08 /"
+GAST = "3 'GAST'   1  0.05 0.4 0.1 3.0 1.2 2.0 1.0 -0.05 0.0 /"
+STAB1 = "2 'STAB1' 1  1.0 10.0  2.5 0.02  0.5555556 5.4  0.1 /"
+DYRS = {
+    "no exciter": (without("EXST1", 3), "sg3: no record of an exciter, where 3 of 4 machines have one"),
+    "no governor at two": (without("TGOV1", 3, 4), "sg3, sg4: no record of a governor, where 2 of 4"),
+    "droop in percent": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "5"))), "governor.R = 5 pu is outside"),
+    "droop of HYGOV in percent": (changed(DYR, (TGOV1, HYGOV.replace("0.05", "5", 1))), "governor.R = 5 pu"),
+    "droop of GAST in percent": (changed(DYR, (TGOV1, GAST.replace("0.05", "5", 1))), "governor.R = 5 pu"),
+    "droop for its inverse": (changed(DYR, (TGOV1, IEEEG1.replace(" 20 ", " 0.05 "))), "governor.K = 0.05 pu"),
+    "temporary droop in percent": (changed(DYR, (TGOV1, HYGOV.replace(" 0.3 ", " 30 "))), "governor.r = 30 pu"),
+    "gain of an exciter": (changed(DYR, (EXST1, SEXS.replace(" 100.0 ", " 0.01 "))), "exciter.K = 0.01 pu"),
+    "gain of a stabiliser": (changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))), "pss.K_S = 1000 pu"),
+    "no saturation": (changed(DYR, ("0.0392 0.2227", "0.0 0.0")), "sg1: the saturation is 0, where 3 of 4 machines"),
+    "saturation in percent": (changed(DYR, ("0.0392 0.2227", "3.92 22.27")), "machine.s_10 = 3.92 is outside"),
+}
+
+
+@pytest.mark.parametrize("name", DYRS)
+def test_a_mistake_in_the_dynamics_data_is_asked_about(questions, name):
+    dyr, words = DYRS[name]
+    asked = questions(dyr=dyr)
+    assert any(words in question for question in asked), asked
+    assert len(asked) <= 2  # S(1.0) and S(1.2) are two values
+
+
+@pytest.mark.parametrize("record", [IEEEG1, HYGOV, GAST, TGOV1])
+def test_honest_governors_are_not_asked_about(questions, record):
+    assert questions(dyr=changed(DYR, (TGOV1, record))) == []
+
+
+@pytest.mark.parametrize("kind", ["TGOV1", "EXST1", "STAB1"])
+def test_parts_that_no_machine_has_are_a_choice(questions, kind):
+    dyr = without(kind, 1, 2, 3, 4)
+    dyr = "\n".join(x for x in dyr.splitlines() if "STAB1" not in x)
+    assert questions(dyr=dyr) == []
+
+
+FLAT = "\n".join(
+    ",".join([*line.split(",")[:7], "1.0", "0.0"]) if 3 < number < 15 else line
+    for number, line in enumerate(RAW.splitlines(), start=1)
+)
+RAWS = {
+    "not solved": (FLAT, "the file is not solved"),
+    "transformer on the machine's base": (
+        changed(RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 1, 1")),
+        "X_line_5_1 = 0.15 pu on 100 MVA is 1.35 pu on the 900 MVA behind it",
+    ),
+    "load of the wrong sign": (changed(RAW, ("967.000, 100.000", "-96.7, 10.000")), "load at bus_7 is -96.7 MW"),
+    "small shunt": (changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")), "shunt at bus_7 has 3.5 Mvar"),
+}
+
+
+@pytest.mark.parametrize("name", RAWS)
+def test_a_mistake_in_the_power_flow_data_is_asked_about(questions, name):
+    raw, words = RAWS[name]
+    try:
+        asked = questions(raw=raw)
+    except CaseError as error:  # without a power flow, the question may be its reason
+        asked = [str(problem) for problem in error.problems]
+    assert any(words in question for question in asked), asked
+
+
+def test_an_honest_file_is_asked_about_nothing(questions):
+    assert questions() == []
+
+
+def test_an_answer_is_taken(questions):
+    meant = 'meant = ["sg3.exciter", "sg3.governor"]\n'
+    assert questions(dyr=without("EXST1", 3), case=meant + CASE) == []
+
+
+@pytest.mark.parametrize("head", ["0,   100.00, 33, 0, 1, 0.0", "0,   100.00, 33, 0, 1", "0,   100.00, 33"])
+def test_a_frequency_that_the_file_does_not_have_is_the_cases(questions, head):
+    raw = changed(RAW, ("0,   100.00, 33, 0, 1, 60.00", head))
+    with pytest.raises(CaseError, match=r'BASFRQ.* is missing or 0.*frequency = "60 Hz"'):
+        questions(raw=raw)
+    assert questions(raw=raw, case=CASE.replace("[network]", '[network]\nfrequency = "60 Hz"')) == []
+
+
+SWAPPED = {
+    "exciter.E_MIN = 5 pu must be less than exciter.E_MAX = -5 pu": (EXST1, SEXS.replace("-5.0 5.0", "5.0 -5.0")),
+    "exciter.V_RMIN = 5 pu must be less than exciter.V_RMAX = -5 pu": (EXST1, EXST1.replace("5.0 -5.0", "-5.0 5.0")),
+    "governor.V_MIN = 1 pu must be less than governor.V_MAX = 0 pu": (TGOV1, TGOV1.replace("1.0 0.0", "0.0 1.0")),
+}
+
+
+@pytest.mark.parametrize("words", SWAPPED)
+def test_swapped_limits_are_said_as_such(questions, words):
+    with pytest.raises(CaseError) as caught:
+        questions(dyr=changed(DYR, SWAPPED[words]))
+    (problem,) = (p for p in caught.value.problems if "questioned besides" not in str(p))
+    assert words in str(problem)
+    assert "are the two swapped?" in str(problem)
+
+
+def test_the_table_of_units_chooses_the_machines_variant(tmp_path, questions):
+    case = CASE.replace("[units]", '[units]\nmachine = "genrou_rated_speed"')
+    assert questions(case=case) == []
+    tables = load_case(tmp_path / "case.toml")._preparer("areas", None, ())._everything
+    assert {tables[f"sg{n}"].machine for n in (1, 2, 3, 4)} == {"genrou_rated_speed"}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("machine", "nonsense", "machine = 'nonsense' in .units. acts on no machine: the records .*genrou_rated_speed"),
+        ("machine", "gensal", "machine = 'gensal' in .units. acts on no machine"),
+        ("exciter", "dc1a", "exciter = 'dc1a' in .units. acts on no machine: the DYR file has a record of it"),
+        ("governor", "hygov", "governor = 'hygov' in .units. acts on no machine"),
+    ],
+)
+def test_a_choice_beside_records_acts_or_is_refused(questions, key, value, words):
+    with pytest.raises(CaseError, match=words):
+        questions(case=CASE.replace("[units]", f'[units]\n{key} = "{value}"'))
+
+
+def test_a_choice_fills_a_missing_record(questions, tmp_path):
+    case = CASE.replace("[units]", '[units]\nexciter = "sexs"\ngovernor = "hygov"')
+    dyr = "\n".join(x for x in DYR.splitlines() if not x.startswith(("3 'EXST1", "3 'TGOV1")))
+    assert questions(dyr=dyr, case=case) == []
+    tables = load_case(tmp_path / "case.toml")._preparer("areas", None, ())._everything
+    assert (tables["sg3"].exciter, tables["sg3"].governor, tables["sg1"].exciter) == ("sexs", "hygov", "st1a")
+    with pytest.raises(CaseError, match="there is no exciter 'nonsense'"):
+        questions(dyr=dyr, case=case.replace("sexs", "nonsense"))
+
+
+EVENT = '[[events]]\ntype = "bus_fault"\ntime = "1 s"\nbus = "bus_8"\ncleared_by = "line_7_8"\nduration = '
+
+
+@pytest.mark.parametrize(
+    ("duration", "words"),
+    [
+        ("100", "the fault is not cleared before the run stops at 15 s; if 100 ms is meant, write '100 ms'"),
+        ("12", "duration = 12 s, without a unit: a fault is cleared within a second; if 12 ms is meant"),
+        ('"20 s"', "duration = 20 s: the fault is not cleared before the run stops at 15 s"),
+        ('"12 s"', None),
+        ('"100 ms"', None),
+        ("0.1", None),
+    ],
+)
+def test_the_duration_of_a_fault_is_asked_about(questions, duration, words):
+    asked = questions(case=CASE + EVENT + duration)
+    assert (words in asked[0] and len(asked) == 1) if words else asked == []
