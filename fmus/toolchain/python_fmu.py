@@ -22,6 +22,15 @@ from fmus.toolchain.wrapper import wrapper_binaries
 
 _SLAVE, _WRAPPER = (Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py"))
 
+_EXECUTED = """import ctypes
+from {} import Slave
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+"""
+"""What the wrapper executes for each instance: a class that were made there would stay in memory.
+
+The wrapper also gives back the module's dictionary, which it never took.
+"""
+
 
 class PythonFmu:
     """All parts of a Python-backed FMU, with one hash over them."""
@@ -55,11 +64,12 @@ class PythonFmu:
         """The archive's members, with a kernel for each platform [FMI 2.0 names]."""
         model, tag = self.model, self.digest[:16]
         kernel_module = f"gfor_cosim_kernel_{tag}"
-        slave_module = f"gfor_cosim_slave_{tag}"
+        slave_module, class_module = f"gfor_cosim_slave_{tag}", f"gfor_cosim_class_{tag}"
         contents: dict[str, bytes] = {
             "modelDescription.xml": self.description(),
             "resources/slavemodule.txt": slave_module.encode(),
-            f"resources/{slave_module}.py": self._slave.encode(),
+            f"resources/{slave_module}.py": _EXECUTED.format(class_module).encode(),
+            f"resources/{class_module}.py": self._slave.encode(),
             f"resources/{kernel_module}.py": self._python.encode(),
             "resources/model.json": json.dumps(
                 _slave_data(model) | {"hash": self.digest, "kernel_module": kernel_module}, ensure_ascii=False

@@ -5,8 +5,9 @@ carries the FMU's own hash, because all Python-backed FMUs of a process share on
 needs a Python and nothing else.
 
 pythonfmu's wrapper crashes the process on the second exception of an instance, so no callback may
-raise: a problem is logged and remembered, and every later step is discarded with its text. The one
-exception is the constructor: there a failure must make fmi2Instantiate return NULL.
+raise: a problem is logged and remembered, and every later step is discarded with its text. Where the
+master takes no log, the first such step writes it to the standard error stream. The one exception is
+the constructor: there a failure must make fmi2Instantiate return NULL.
 """
 
 import ctypes
@@ -23,6 +24,7 @@ from pythonfmu.enums import Fmi2Status
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 MOST_PARTS = 1_000_000  # internal steps in one communication step
+LOGGING = ctypes.sizeof(ctypes.c_void_p)  # where the wrapper's logger, a C++ object, says whether it logs
 LONG = 64  # from here on it pays to see whether value references follow each other
 LIBRARIES = {
     ("linux", "x86_64"): "linux64/kernel.so",
@@ -39,6 +41,9 @@ class Slave(Fmi2Slave):
         super().__init__(**kwargs)
         try:
             self._load(Path(kwargs["resources"]))
+            self._logger = kwargs.get("logger")
+            if kwargs["resources"] in sys.path:
+                sys.path.remove(kwargs["resources"])  # the wrapper puts it there for each instance; all is imported
         except Exception as error:
             raise RuntimeError(f"{self.instance_name}: {error}") from error
 
@@ -103,6 +108,15 @@ class Slave(Fmi2Slave):
             self._failure = text
         self._report(text)
 
+    def _discard(self, text, reported=False):
+        """Report why a step is discarded, once to a master that takes no log, which would never learn it."""
+        if not reported:
+            self._report(text)
+        if self._logger and not ctypes.c_bool.from_address(self._logger + LOGGING).value and sys.stderr:
+            self._logger = None
+            print(f"{self.instance_name}: fmi2DoStep: {text}", file=sys.stderr, flush=True)
+        return False
+
     def _check_requirements(self):
         self._kernel.requirements(self._address, self._margins_address)
         broken = [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]
@@ -129,34 +143,31 @@ class Slave(Fmi2Slave):
     def do_step(self, current_time, step_size):
         try:
             if self._failure is not None:
-                self._report(self._failure)
-                return False
+                return self._discard(self._failure)
             if self._phase != STEPPING:
-                self._report("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
-                return False
+                return self._discard("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
             if step_size != self._step_size or not step_size > 0.0:
                 longest = MOST_PARTS * self._z[self._internal_step]
                 if not 0.0 < step_size <= longest:
-                    self._report(
+                    return self._discard(
                         f"communication step size {step_size!r} s; it must exceed 0 and be at most {longest:g} s"
                     )
-                    return False
                 self._step_size = step_size
                 self._parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
             if self._parameters_changed:
                 self._check_requirements()
                 self._parameters_changed = False
                 if self._failure is not None:
-                    return False
+                    return self._discard(self._failure, reported=True)
             status = self._advance(self._address, step_size / self._parts, self._parts, self._workspace_address)
             self._outputs_stale = False
             if status:
-                self._fail(self._describe_divergence(status - 1, current_time))
-                return False
+                self._failure = self._describe_divergence(status - 1, current_time)
+                return self._discard(self._failure)
             return True
         except Exception as error:
-            self._fail(f"step from {current_time} s failed: {error!r}")
-            return False
+            self._failure = f"step from {current_time} s failed: {error!r}"
+            return self._discard(self._failure)
 
     def terminate(self):
         self._phase = TERMINATED

@@ -143,7 +143,7 @@ def test_a_refused_initialisation_is_reported_in_the_fmus_words(component):
         initialise(component, P_0=2.0)
 
 
-def test_a_discarded_step_carries_status_time_and_cause(component):
+def test_a_refused_step_carries_status_time_and_cause(component):
     initialise(component)
     batch = RealBatch(component, ("v_re",))
     batch.values[:] = math.nan
@@ -151,7 +151,7 @@ def test_a_discarded_step_carries_status_time_and_cause(component):
     with pytest.raises(ComponentError) as caught:
         component.step(0.5, H)
     error = caught.value
-    assert (error.call, error.status, error.time) == ("fmi2DoStep", "fmi2Discard", 0.5)
+    assert (error.call, error.status, error.time) == ("fmi2DoStep", "fmi2Error", 0.5)
     assert "input v_re is not a finite number" in error.log
     assert "at t = 0.5 s" in str(error)
 
@@ -203,12 +203,11 @@ def test_a_python_backed_fmu_leaves_the_search_path_as_it_was(description, tmp_p
     """Its host adds the FMU's folder for each instance: a thousand of them made a variable too long for Linux."""
     before = list(sys.path)
     with LoadedComponent("a", description), LoadedComponent("b", description):
-        assert len(sys.path) == len(before) + 2
+        assert sys.path == before
     folder = fmpy.extract(str(description.path), unzipdir=str(tmp_path / "shared"))
     with LoadedComponent("c", description, Path(folder)) as outer:
         LoadedComponent("d", description, Path(folder)).close()
         outer.values(["p"])
-        assert len(sys.path) == len(before) + 1
     assert sys.path == before
 
 
