@@ -9,14 +9,17 @@ import asyncio
 import ipaddress
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
 from urllib.parse import urlsplit
 
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
+from orchestrator.points.dask_watch import INTERVAL, ClusterWatch
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
 _LOG = logging.getLogger("gfor")
@@ -25,7 +28,7 @@ TLS_FILES = ("ca.pem", "cert.pem", "key.pem")
 """In the folder with certificates: the authority's, the client's, and the client's private key."""
 
 _PATIENCE = 30
-"""Longest time to wait for a scheduler, and then for its first worker [s]."""
+"""Longest time to wait for a scheduler, for its first worker, and for another one when all are lost [s]."""
 
 
 class DaskCluster:
@@ -65,12 +68,17 @@ class DaskCluster:
             return
         distributed = _distributed()
         with _event_loop() as loop, self._client(distributed, loop) as client:
-            futures = [client.submit(function, task, pure=False) for task in tasks]
-            index_of = {future.key: index for index, future in enumerate(futures)}
+            watch = ClusterWatch(client, self.address, _PATIENCE)
+            where = watch.able if watch.unable else None
+            futures = [client.submit(function, task, pure=False, workers=where) for task in tasks]
+            ready: SimpleQueue[int] = SimpleQueue()
+            for index, future in enumerate(futures):
+                future.add_done_callback(partial(_note, ready, index))
             try:
-                for future in distributed.as_completed(futures, loop=client.loop):
-                    yield index_of[future.key], self._result(distributed, future)
-                    future.release()
+                for _ in futures:
+                    index = _next(ready, watch)
+                    yield index, self._result(distributed, futures[index])
+                    futures[index].release()
             finally:
                 client.cancel(futures)
 
@@ -134,6 +142,18 @@ class DaskCluster:
                 "in this version, where the workers run"
             ) from error
         return future.result()
+
+
+def _note(ready: SimpleQueue[int], index: int, future: Any) -> None:
+    ready.put(index)
+
+
+def _next(ready: SimpleQueue[int], watch: ClusterWatch) -> int:
+    """Index of the next task that is done; the workers are looked at meanwhile."""
+    while True:
+        watch.look()
+        with suppress(Empty):
+            return ready.get(timeout=INTERVAL)
 
 
 @contextmanager

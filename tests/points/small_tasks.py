@@ -12,6 +12,11 @@ def double(number):
     return 2 * number
 
 
+def sleepy_double(number):
+    time.sleep(0.5)
+    return 2 * number
+
+
 def fail(number):
     if number == 3:
         raise InputError("three cannot be used")

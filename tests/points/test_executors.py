@@ -1,17 +1,19 @@
 """The same answers from every executor, whatever happens to its workers."""
 
+import os
+import subprocess
 import sys
 
 import pytest
 
 from fmus.toolchain.extras import MissingLibraryError
 from orchestrator.api.executors import choose_executor
-from orchestrator.errors import InputError
+from orchestrator.errors import CosimError, ErrorKind, InputError
 from orchestrator.points.dask_cluster import TLS_FILES, DaskCluster
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
-from tests.points.small_tasks import always_die, die_once, double, fail, waits
+from tests.points.small_tasks import always_die, die_once, double, fail, sleepy_double, waits
 
 NUMBERS = range(8)
 
@@ -75,6 +77,44 @@ def test_a_dask_cluster(tmp_path):
         assert sorted(executor.run(die_once, tasks)) == [(n, 2 * n) for n in NUMBERS]
         with pytest.raises(InputError, match="three cannot be used"):
             list(executor.run(fail, NUMBERS))
+
+
+@pytest.mark.slow
+def test_a_cluster_whose_workers_are_all_gone_ends_the_run_with_what_is_there(monkeypatch, caplog):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 5)
+    monkeypatch.setattr("orchestrator.points.dask_cluster.INTERVAL", 0.5)
+    monkeypatch.setattr("orchestrator.points.dask_watch.INTERVAL", 0.5)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        results = DaskCluster(cluster.scheduler_address).run(sleepy_double, NUMBERS)
+        first = next(results)
+        cluster.scale(0)
+        with pytest.raises(CosimError, match=r"no usable worker is left since \d+ s.* are kept.*dask worker") as caught:
+            list(results)
+    assert first == (first[0], 2 * first[0])
+    assert caught.value.kind is ErrorKind.WORKER_LOST
+    assert "is lost" in caplog.text
+
+
+@pytest.mark.slow
+def test_a_cluster_whose_workers_lack_the_project_is_refused_at_once(tmp_path):
+    """A worker of another environment: one in which `orchestrator` cannot be found."""
+    distributed = pytest.importorskip("distributed")
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\nclass Hidden:\n    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.split('.')[0] == 'orchestrator':\n            raise ModuleNotFoundError(name)\n"
+        "sys.meta_path.insert(0, Hidden())\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, "--no-dashboard"]
+        worker = subprocess.Popen(command, env=environment, cwd=tmp_path, stderr=subprocess.DEVNULL)
+        try:
+            with pytest.raises(InputError, match="none of its 1 workers can import gfor-cosim; install it"):
+                list(DaskCluster(cluster.scheduler_address).run(double, NUMBERS))
+        finally:
+            worker.terminate()
+            worker.wait()
 
 
 @pytest.fixture(scope="module")
