@@ -1,6 +1,7 @@
 """How much memory a process has in use, and how many files."""
 
 import ctypes
+import gc
 import sys
 from pathlib import Path
 
@@ -12,7 +13,11 @@ class _MallocInfo(ctypes.Structure):
 
 
 def memory_in_use() -> int | None:
-    """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does."""
+    """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does.
+
+    Garbage of Python is freed before, so that it does not matter when Python would have done so.
+    """
+    gc.collect()
     try:
         info = ctypes.CDLL(None).mallinfo2
         info.restype = _MallocInfo
