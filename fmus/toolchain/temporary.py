@@ -1,9 +1,11 @@
 """Temporary folders that say by a lock whose they are: those whose owner is gone are removed at the next start.
 
-A process that is killed removes nothing. The lock of a folder ends with the last process that holds it open, also in
-another container and when a process number is used again.
+A process removes its own at its end, also those that an interrupt let nobody remove; one that is killed does not. The
+lock of a folder ends with the last process that holds it open, also in another container and when a process number is
+used again.
 """
 
+import atexit
 import contextlib
 import os
 import tempfile
@@ -28,6 +30,7 @@ _UNFINISHED = 3600.0
 
 _locks: dict[Path, int] = {}
 _swept = set[Path]()
+_process = os.getpid()
 
 
 def own_folder(kind: str) -> Path:
@@ -40,17 +43,41 @@ def own_folder(kind: str) -> Path:
         _give_back(other)
     if fcntl is None:
         return Path(tempfile.mkdtemp(prefix=f"{_LOCKED}{kind}_"))
-    new = Path(tempfile.mkdtemp(prefix=f"{_NEW}{kind}_"))
+    new = None
+    try:
+        new = Path(tempfile.mkdtemp(prefix=f"{_NEW}{kind}_"))
+        return _locked(new)
+    except BaseException:  # also an interrupt
+        for folder in [] if new is None else [new, _under_lock(new)]:
+            remove_tree(folder)
+        raise
+
+
+def _locked(new: Path) -> Path:
+    """A new folder under the name of those that have their lock."""
     lock = os.open(new, os.O_RDONLY | os.O_CLOEXEC)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:  # some network drives have no locks
         os.close(lock)
         return new
-    folder = new.with_name(_LOCKED + new.name.removeprefix(_NEW))
+    folder = _under_lock(new)
     new.rename(folder)
     _locks[folder] = lock
     return folder
+
+
+def _under_lock(new: Path) -> Path:
+    return new.with_name(_LOCKED + new.name.removeprefix(_NEW))
+
+
+@atexit.register
+def _remove_own() -> None:
+    """Remove what an interrupt left; a copy of this process, which has the same list, removes nothing."""
+    if os.getpid() == _process:
+        for folder in [*_locks]:
+            with contextlib.suppress(OSError):
+                remove(folder)
 
 
 def remove(folder: Path) -> None:

@@ -209,3 +209,37 @@ def test_threads_may_make_folders_while_others_disappear(tmp_path, monkeypatch):
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(one, range(8)))
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_leaves_no_folder_that_is_only_half_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(temporary.tempfile, "tempdir", str(tmp_path))
+    for planted, name in ((temporary.os, "open"), (temporary.Path, "rename"), (temporary.fcntl, "flock")):
+        with monkeypatch.context() as context:
+
+            def interrupts(*_, context=context):
+                context.undo()
+                raise KeyboardInterrupt
+
+            context.setattr(planted, name, interrupts)
+            with pytest.raises(KeyboardInterrupt):
+                own_folder("test")
+    assert [path.name for path in tmp_path.iterdir()] == []
+
+
+_ENDS = """
+import os, sys, tempfile
+from fmus.toolchain.temporary import own_folder
+tempfile.tempdir = sys.argv[1]
+own_folder("test")
+if not os.fork():
+    sys.exit()  # a copy of it removes nothing
+os.wait()
+print(os.listdir(sys.argv[1]))
+raise KeyboardInterrupt
+"""
+
+
+def test_a_process_removes_its_folders_at_its_end(tmp_path):
+    done = subprocess.run([sys.executable, "-c", _ENDS, str(tmp_path)], check=False, capture_output=True, text=True)
+    assert done.stdout.startswith("['gfor_locked_test_")
+    assert not list(tmp_path.iterdir())
