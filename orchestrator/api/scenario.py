@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from orchestrator.api.values import (
 from orchestrator.api.values import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -94,6 +96,17 @@ class Scenario:
         self.prepared = prepared
         self._file, self._values, self._step_size, self._parameters = file, values, step_size, parameters
         self._schedule, self._tolerance = schedule, tolerance
+
+    def with_loads_as_powers(self) -> Scenario | None:
+        """The same scenario with loads of constant power; None where the case says how its loads follow the voltage."""
+        network = self._file.table.network
+        if network is None or not is_open(network):
+            return None
+        table = self._file.table.model_copy(update={"network": as_powers(network)})
+        file = replace(self._file, table=table)
+        (one,) = file.prepare([self.name], self._values, self._step_size, None, self._parameters)
+        asked = _as_asked(one, self._schedule, self._tolerance)
+        return Scenario(asked, file, self._values, self._step_size, self._parameters, self._schedule, self._tolerance)
 
     @property
     def name(self) -> str:

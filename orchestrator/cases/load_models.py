@@ -2,14 +2,46 @@
 constant impedance and current that a source tells apart.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
 
 _LARGEST_SHARE = 100.0
 """Of a part by the whole: above, the parts cancel, and the whole is none to take shares of."""
+
+_OPEN = (
+    "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
+    "ANDES does by itself and stability studies in PSS/E after a conversion to them; it can decide about the damping, "
+    'so say which in [network]: load_model = { active = "impedance", reactive = "impedance" }, "power" or "current"'
+)
+
+
+def is_open(table: NetworkTable | None) -> bool:
+    """Whether a network has another program's loads, and the case does not say how they follow the voltage."""
+    if table is None or (table.raw or table.matpower or table.pandapower or table.cgmes) is None:
+        return False
+    return table.load_model.active is None and table.load_model.reactive is None
+
+
+def as_powers(table: NetworkTable) -> NetworkTable:
+    """The network with loads of constant power, where their model is open."""
+    return table.model_copy(update={"load_model": LoadModelTable(active="power", reactive="power")})
+
+
+def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:
+    """The question about the load model, where it is open and a load draws power.
+
+    Parameters
+    ----------
+    table, loads
+        Of the network.
+    place
+        Where the source is named.
+    """
+    return [Problem(place, _OPEN)] if is_open(table) and any(x.p_mw > 0 for x in loads) else []
 
 
 def with_laws(

@@ -17,6 +17,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.imperfection_tables import disturb_connections
 from orchestrator.cases.layers import value_layers
+from orchestrator.cases.load_models import open_question
 from orchestrator.cases.names import close_names
 from orchestrator.cases.operating_point import power_flow_of
 from orchestrator.cases.parameter_files import ParameterFile
@@ -178,6 +179,8 @@ class Preparer:
         self._build()
         every, about_rows = record_every(draft, clock, stop)
         record, left_out = recorded(draft)
+        loads = draft.network.loads if draft.network else ()
+        draft.questions += open_question(draft.case.network, loads, draft.place("network"))
         draft.questions += [*doubts(draft.case, draft.place), *self._area_questions()]
         return PreparedScenario(
             case=self._case,

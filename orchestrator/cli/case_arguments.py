@@ -80,7 +80,7 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
         file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
         schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
     )  # fmt: skip
-    print_questions([scenario.prepared for scenario in scenarios])
+    print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
 
 

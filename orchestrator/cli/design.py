@@ -132,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
             rmtree(folder, ignore_errors=True)  # the same would come out again
             raise
         design = controller.result
-        print_questions([design.prepared])
+        print_questions([design.prepared], as_json=options.json)
         warn(design.prepared.name, design.warnings)
         controller.save(path, _command_line(options))
         rmtree(folder, ignore_errors=True)

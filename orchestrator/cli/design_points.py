@@ -68,7 +68,7 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     case, console = load_case(options.case, trust_fmus=options.trust_fmus), make_console(stderr=options.json)
     path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
     planned = plan_points_design(case, request, options.points, options.outages)
-    print_questions([planned.prepared])
+    print_questions([planned.prepared], as_json=options.json)
     folder = made_folder(path.with_suffix(".points"), "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):

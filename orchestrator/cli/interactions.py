@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
         options.step,
         parameters(options),
     )
-    print_questions([planned.prepared])
+    print_questions([planned.prepared], as_json=options.json)
     folder = made_folder(options.out or Path("results") / f"{case.name}_interactions", "--out")
     progress, console = Progressing(folder), make_console(stderr=options.json)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):

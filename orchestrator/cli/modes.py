@@ -14,6 +14,7 @@ from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
     make_console,
+    make_errors,
     print_named_modes,
     print_sources,
     print_warnings,
@@ -25,6 +26,7 @@ from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.study import tables
 from orchestrator.study.all_modes import compute_all_modes
+from orchestrator.study.load_model_weight import load_model_weight
 from orchestrator.study.modes import modes_json
 
 
@@ -106,12 +108,15 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
         with staged(folder, new_run_id()) as staging:
             written += [path.name for path in save_modes(results, staging)]
+    weight = None if options.black_box else load_model_weight(scenarios[0], results[0])
     if options.json:
-        print(json.dumps(modes_json(results), indent=1, ensure_ascii=False))
+        print(json.dumps(modes_json(results, [weight] if weight else []), indent=1, ensure_ascii=False))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_verdicts(console, results)
     print_warnings(results)
+    if weight:
+        make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(weight)}")
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, results)

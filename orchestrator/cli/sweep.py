@@ -85,7 +85,7 @@ def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, 
         parameters=options.parameters,
         frequencies=options.range,
     )
-    print_questions(planned.scenarios)
+    print_questions(planned.scenarios, as_json=options.json)
     made_folder(folder, "--out")
     console = make_console(stderr=options.json)
     with held(folder):

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.cases.facts import facts_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import Problem
 from orchestrator.report.linearised import exceptions_in_words
@@ -48,8 +49,20 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
         console.print(f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False)
 
 
-def print_questions(scenarios: Iterable[PreparedScenario]) -> None:
-    """Ask on standard error, once and before anything is computed, about data that are most unusual."""
+def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
+    """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
+    that are most unusual.
+
+    Parameters
+    ----------
+    scenarios
+        Of one case; the facts are the first one's.
+    as_json
+        Whether standard output is JSON, which has no such line.
+    """
+    facts = None if as_json else facts_of(scenarios[0])
+    if facts is not None:
+        make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
     _ask(q for prepared in scenarios for q in prepared.questions)
 
 

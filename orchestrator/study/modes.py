@@ -31,6 +31,7 @@ from orchestrator.analysis.steady_state import OperatingPoint, find_operating_po
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
@@ -405,12 +406,24 @@ def modes_named(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -
     return name_modes(modes, measures, opposed)
 
 
-def modes_json(results: Sequence[ModesResult]) -> Mapping[str, Any]:
-    """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step."""
+def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) -> Mapping[str, Any]:
+    """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step.
+
+    Parameters
+    ----------
+    results
+        Of the scenarios.
+    questions
+        Those that only the modes raise.
+    """
     first = results[0].prepared
+    asked = [str(question) for result in results for question in result.prepared.questions]
+    facts = facts_of(first)
     return {
         "case": first.case.name,
         "step_size_s": first.step_size,
+        "facts": None if facts is None else facts.sentence(),
+        "questions": list(dict.fromkeys([*asked, *questions])),
         "scenarios": [
             {
                 "name": r.prepared.name,

@@ -1,5 +1,6 @@
 """Mistakes in RAW and DYR files that a power flow survives: each is one question, and an honest file has none."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -205,3 +206,47 @@ EVENT = '[[events]]\ntype = "bus_fault"\ntime = "1 s"\nbus = "bus_8"\ncleared_by
 def test_the_duration_of_a_fault_is_asked_about(questions, duration, words):
     asked = questions(case=CASE + EVENT + duration)
     assert (words in asked[0] and len(asked) == 1) if words else asked == []
+
+
+OPEN = CASE.replace('load_model = { active = "power", reactive = "power" }\n', "")
+
+
+def test_an_open_load_model_is_asked_about(questions):
+    (asked,) = questions(case=OPEN)
+    assert "the load model is open" in asked
+
+
+@pytest.mark.parametrize("law", ["impedance", "current", "power"])
+def test_a_load_model_that_the_case_says_is_not_asked_about(questions, law):
+    assert questions(case=CASE.replace('"power"', f'"{law}"')) == []
+
+
+def test_the_question_tells_what_the_load_model_moves_and_facts_come_first(questions, tmp_path, gfor):
+    questions(case=OPEN)
+    code, out, err = gfor("modes", tmp_path / "case.toml")
+    assert code == 0, err
+    assert out.startswith(
+        "areas.raw, areas.dyr: 60 Hz, 11 buses, 4 machines, 2723.5 MW of load (several models), slack sg1 at 687"
+    )
+    assert "voltages 0.953 to 1.03 pu" in out.splitlines()[0]
+    told = next(line for line in err.splitlines() if "moves the least damped mode" in line)
+    found = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])
+    assert told.removeprefix("question: ") in found["questions"]
+    assert found["facts"] == out.splitlines()[0]
+    questions(case=CASE.replace("keep_load_parts = true\n", ""))
+    power = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])
+    assert not any("load model" in question for question in power["questions"])
+    assert "(constant power)" in power["facts"]
+
+
+def test_the_weight_is_that_of_the_case_that_says_so(questions, tmp_path, gfor):
+    figures = {}
+    for law in ("impedance", "power"):
+        questions(case=CASE.replace('"power"', f'"{law}"'))
+        modes = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["scenarios"][0]["modes"]
+        figures[law] = min(m["damping_percent"] for m in modes if m["frequency_hz"] > 0)
+    questions(case=OPEN)
+    asked = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["questions"]
+    assert any(
+        f"impedance {figures['impedance']:.2f} % at" in q and f"power {figures['power']:.2f} % at" in q for q in asked
+    )

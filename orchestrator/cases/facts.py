@@ -1,0 +1,116 @@
+"""What a network's files come to in one line, so that a reader sees at once what was computed."""
+
+from dataclasses import dataclass
+
+from fmus.grid.element_data import LAWS, Load, Zip
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import NetworkTable
+from orchestrator.coupling.system import ComponentPlan
+
+SOURCES = ("raw", "matpower", "pandapower", "cgmes")
+"""Keys of ``[network]`` that name another program's data."""
+
+_NAMES = {zip_: name for name, zip_ in LAWS.items()}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """The network of a scenario, with its power flow.
+
+    Attributes
+    ----------
+    sources
+        Files, as the case names them.
+    frequency_hz
+        Rated; None where no component has one.
+    buses, machines, converters
+        How many.
+    load_mw
+        Active power of all loads, without what feeds in [MW].
+    load_model
+        How the loads follow the voltage.
+    slack
+        Units at the slack bus, with their power [MW] and their rating [MVA].
+    voltages_pu
+        Least and largest magnitude.
+    """
+
+    sources: tuple[str, ...]
+    frequency_hz: float | None
+    buses: int
+    machines: int
+    converters: int
+    load_mw: float
+    load_model: str
+    slack: tuple[tuple[str, float, float], ...]
+    voltages_pu: tuple[float, float]
+
+    def sentence(self) -> str:
+        """The line that answers begin with."""
+        units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
+        slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
+        parts = [
+            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
+            _counted(self.buses, "bus"),
+            *units,
+            f"{self.load_mw:.5g} MW of load ({self.load_model})",
+            *([f"slack {slack}"] if slack else []),
+            "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
+        ]
+        return f"{', '.join(self.sources)}: {', '.join(parts)}"
+
+
+def facts_of(prepared: PreparedScenario) -> Facts | None:
+    """The facts of a scenario whose network comes from another program's files; else None."""
+    table, flow, network = prepared.case.table, prepared.power_flow, prepared.network
+    if table.network is None or table.power_flow is None or flow is None or network is None:
+        return None
+    sources = files_of(table.network)
+    if not sources:
+        return None
+    plans = prepared.system.components
+    units = {p.name: p.bus for p in network.ports if p.name in plans}
+    grid = plans[table.power_flow.grid]
+    wanted = table.power_flow.slack or prepared.source_slack or ""
+    at_slack = [name for name, bus in units.items() if bus == units.get(wanted, wanted) and flow.powers.get(name)]
+    machines = [n for n in units if any(v.startswith("machine.") for v in plans[n].description.variables)]
+    magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
+    loads = [(load, _power(load, grid)) for load in network.loads]
+    dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
+    return Facts(
+        (*sources, *dyr),
+        next((plan.number("f_n") for plan in plans.values() if "f_n" in plan.description.variables), None),
+        len(network.buses),
+        len(machines),
+        len(units) - len(machines),
+        sum(p for _, p in loads if p > 0),
+        _model([load for load, p in loads if p > 0]),
+        tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),
+        (min(magnitudes), max(magnitudes)),
+    )
+
+
+def files_of(table: NetworkTable) -> tuple[str, ...]:
+    """Another program's data that a network comes from."""
+    return tuple(file for key in SOURCES if (file := getattr(table, key)) is not None)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}{'es' if what.endswith('s') else 's'}"
+
+
+def _power(load: Load, grid: ComponentPlan) -> float:
+    return grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.P")
+
+
+def _model(loads: list[Load]) -> str:
+    """How loads follow the voltage, where all do so alike."""
+    active, reactive = {x.active for x in loads}, {x.reactive for x in loads if x.q_mvar}
+    if len(active) > 1 or len(reactive) > 1:
+        return "several models"
+    (p,), q = active or {LAWS["impedance"]}, next(iter(reactive), None)
+    return f"constant {_named(p)}" if q in (None, p) else f"P constant {_named(p)}, Q constant {_named(q)}"
+
+
+def _named(law: Zip | None) -> str:
+    return "power" if law is None else _NAMES.get(law, f"{law.z:.3g} impedance, {law.i:.3g} current, {law.p:.3g} power")
