@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Stability
@@ -175,8 +177,15 @@ class Run:
 
     @property
     def dataset(self) -> xr.Dataset:
-        """What was recorded over the time [s], with units, long names and provenance."""
-        return self.result.dataset
+        """What was recorded over the time [s], with units, long names and provenance.
+
+        Its values cannot be written into, since modes and figures are made from them; ``dataset.copy(deep=True)`` can.
+        """
+        shown = self.result.dataset.copy(deep=False)
+        for variable in shown.variables.values():
+            if isinstance(variable.data, np.ndarray):
+                variable.data.flags.writeable = False
+        return shown
 
     @property
     def linear(self) -> xr.Dataset | None:

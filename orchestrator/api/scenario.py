@@ -246,6 +246,10 @@ class Scenario:
         prepared = self._until(in_seconds(stop, "stop"))
         _check_observers(observers)
         _check_threads(threads)
+        _check_kind(
+            recording, RecordingFolder, "recording", "give a RecordingFolder; `checkpoints` takes a folder's path"
+        )
+        _check_kind(federates, Federates, "federates", 'give Federates(("gfor",)) of orchestrator.federation.choice')
         if checkpoints is not None and federates is not None:
             raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
         with ExitStack() as stack:
@@ -448,6 +452,11 @@ def _check_observers(given: Sequence[Observer]) -> None:
 def _check_threads(given: int | None) -> None:
     if given is not None and (isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS):
         raise InputError(f"threads = {given!r}; give a whole number from 1 to {MOST_THREADS}, or leave it out")
+
+
+def _check_kind(given: object, kind: type, argument: str, rule: str) -> None:
+    if given is not None and not isinstance(given, kind):
+        raise InputError(f"{argument} = {given!r}; {rule}, or leave it out")
 
 
 def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:

@@ -211,12 +211,28 @@ def fmu(tmp_path_factory):
         (lambda case: case.scenario("gfor", {"grid": {"X_L": 0.1}, "grid.X_L": 0.2}), "'grid.X_L' is given twice"),
         (lambda case: case.scenario("gfor").run(observers=[3]), r"observers = \[3\]; give a list of observers"),
         (lambda case: case.scenario("gfor").run(observers=None), "observers = None; give a list of observers"),
+        (lambda case: case.scenario("gfor").run(recording="rec"), "recording = 'rec'; give a RecordingFolder"),
+        (lambda case: case.scenario("gfor").run(federates="gfor"), r"federates = 'gfor'; give Federates"),
         (lambda _: gfor.read_linear_model(None), "fmu = None; give the path of a file"),
     ],
 )
 def test_an_argument_of_another_kind_is_named(case, call, words):
     with pytest.raises(InputError, match=words):
         call(case)
+
+
+def test_what_was_recorded_cannot_be_written_over(run):
+    """Modes are identified in it."""
+    name = next(iter(run.dataset.data_vars))
+    before = run.dataset[name].values.copy()
+    with pytest.raises(ValueError, match="read-only"):
+        run.dataset[name].values[:] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        run.dataset[name] *= 0
+    run.dataset[name] = 2 * run.dataset[name]
+    assert (run.dataset[name].values == before).all()
+    own = run.dataset.copy(deep=True)
+    own[name][:] = 0
 
 
 @pytest.mark.parametrize("signal", [None, ["gfor.omega"], ""])
