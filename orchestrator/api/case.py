@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import pandas as pd
 
@@ -12,6 +12,7 @@ from orchestrator.api.coordinated_design import WORKERS_IMPORT as COORDINATED_IM
 from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
 from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
+from orchestrator.api.design_wishes import in_ratios
 from orchestrator.api.executors import choose_executor
 from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
 from orchestrator.api.interactions import Interactions, WantedInteractions
@@ -418,7 +419,7 @@ class Case:
         progress
             Show a line with the stage that the design has come to.
         wanted
-            Any of: ``damping`` or ``damping_increment`` (ratios: 0.2 is 20 %), ``component``, ``mode``,
+            Any of: ``damping`` or ``damping_increment`` [%], ``component``, ``mode``,
             ``gain_bounds`` and ``delta_gain`` [pu], ``stages``, ``compensated_gain``, ``least_damping``, ``refine``,
             ``margins`` (False saves most of the time).
 
@@ -438,9 +439,10 @@ class Case:
         """
         files = parameter_files(parameters)
         step_size = in_seconds(step, "step")
+        ratios = cast("Wanted", in_ratios(wanted))
         with shown_stages(shown=progress) as report:
             design = design_controller(
-                self.file, controller, scenario, case_values(values), step_size, files, wanted, report=report
+                self.file, controller, scenario, case_values(values), step_size, files, ratios, report=report
             )
         question([design.result.prepared])
         return design
@@ -477,7 +479,7 @@ class Case:
         workers, scheduler, tls, folder, progress
             As for `sweep`.
         wanted
-            Any of: ``damping`` (a ratio that is wanted everywhere; the best that there is by default), ``components``
+            Any of: ``damping`` [%] (wanted everywhere; the best that there is by default), ``components``
             (names or patterns, each with a setting of its own), ``modes`` (the case's; all from 0.1 to 2 Hz by
             default), ``gain_bounds`` [pu], ``stages``, ``least_damping`` (of other modes), ``ranked`` (for how many
             converters a controller alone is designed).
@@ -495,7 +497,7 @@ class Case:
         >>> from pathlib import Path
         >>> lines = "name,grid.X_L", "short,0.05", "long,0.3"
         >>> _ = Path("two.csv").write_text(chr(10).join(lines))
-        >>> design = gfor.load("two_area").design_over_points("two.csv", damping=0.15)
+        >>> design = gfor.load("two_area").design_over_points("two.csv", damping=15)
         >>> design.met
         True
         >>> bool(design.points()["damping_percent"].min() >= 15)

@@ -9,7 +9,7 @@ from typing import Any, TypedDict
 import pandas as pd
 
 from orchestrator.api.design import parameter_file_path
-from orchestrator.api.design_wishes import check_wishes
+from orchestrator.api.design_wishes import check_wishes, in_ratios
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, whole_number
 from orchestrator.api.values import names as names_given
@@ -68,7 +68,7 @@ def request_of(controllers: Sequence[str], wanted: WantedOverPoints, **rest: Any
     if not controllers:
         raise InputError(f"controllers is empty; name one or both of {', '.join(CONTROLLERS)}")
     known = tuple(WantedOverPoints.__annotations__)
-    own: dict[str, Any] = dict(wanted)
+    own = in_ratios(wanted)
     if unknown := [name for name in own if name not in known]:
         raise InputError(f"a design over points cannot be asked for {', '.join(map(repr, unknown))}; it can for "
                          f"{', '.join(known)}")  # fmt: skip

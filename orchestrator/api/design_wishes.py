@@ -4,10 +4,24 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from orchestrator.api.values import damping_ratio, flag, plain_value, text_or_none, whole_number
+from orchestrator.api.values import flag, plain_value, text_or_none, whole_number
 from orchestrator.errors import InputError
 
 _MAY_BE_NONE = ("component", "mode", "damping", "stages")
+
+
+_IN_PERCENT = ("damping", "damping_increment", "least_damping")
+
+
+def in_ratios(wanted: Mapping[str, Any]) -> dict[str, Any]:
+    """The wishes of a caller in Python, whose dampings are in percent, as on the command line.
+
+    Raises
+    ------
+    InputError
+        If a damping is no number, out of range, or below 1, which looks like a ratio.
+    """
+    return {name: _ratio(value, name) if name in _IN_PERCENT else value for name, value in wanted.items()}
 
 
 def check_wishes(wanted: Mapping[str, Any]) -> dict[str, Any]:
@@ -25,23 +39,27 @@ def check_wishes(wanted: Mapping[str, Any]) -> dict[str, Any]:
         match name:
             case "component" | "mode":
                 text_or_none(value, name, "give one name, or leave it out")
-            case "damping" | "damping_increment" | "least_damping":
-                _ratio(value, name)
             case "delta_gain":
                 _gain(value)
             case "gain_bounds":
                 own[name] = _bounds(value)
             case "stages":
                 whole_number(value, name, 0, 10)
-            case _:
+            case _ if name not in _IN_PERCENT:
                 flag(value, name)
     return own
 
 
-def _ratio(value: Any, name: str) -> None:
-    if value is None:
-        raise InputError(f"{name} = None; it is a damping ratio between 0 and 1, such as 0.2 for 20 %, or is left out")
-    damping_ratio(value, name)
+def _ratio(given: Any, name: str) -> float | None:
+    value: Any = plain_value(given)
+    rule = "it is in percent between 1 and 90, such as 20, or is left out"
+    if value is None and name in _MAY_BE_NONE:
+        return None
+    if not _is_number(value) or not 0 < value <= 90:
+        raise InputError(f"{name} = {given!r}; {rule}")
+    if value < 1:
+        raise InputError(f"{name} = {given!r}; {rule}: write {100 * value:g} for a damping ratio of {value:g}")
+    return float(value) / 100
 
 
 def _is_number(value: Any) -> bool:

@@ -17,10 +17,10 @@ from orchestrator.cli.case_arguments import add_case_arguments, parameters, valu
 from orchestrator.cli.design_points import add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.terminal import make_console, print_questions, warn
-from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.cli.verdict import NOT_MET, add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
-from orchestrator.pod_design.sheet import sheet
+from orchestrator.pod_design.sheet import first_screen, sheet
 from orchestrator.pod_design.target import CONTROLLERS
 from orchestrator.points.store import PointStore, any_kept
 
@@ -136,9 +136,12 @@ def run(options: argparse.Namespace) -> int:
         warn(design.prepared.name, design.warnings)
         controller.save(path, _command_line(options))
         rmtree(folder, ignore_errors=True)
+    ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
     if options.json:
         print(json.dumps(controller.as_json(path), indent=1, ensure_ascii=False))
-        return exit_code(options, [design.stability])
+        return ends
+    for part in first_screen(design):
+        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
     print_stability(
         console, {"without the controller": design.stability_before, "with the final setting": design.stability}
     )
@@ -147,7 +150,7 @@ def run(options: argparse.Namespace) -> int:
     warned = "" if design.met else " (the requirement is not met)"
     console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}"), soft_wrap=True, highlight=False)  # fmt: skip
-    return exit_code(options, [design.stability])
+    return ends
 
 
 def _given(out: Path) -> Path:

@@ -15,6 +15,7 @@ from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_questions
+from orchestrator.cli.verdict import NOT_MET
 from orchestrator.coordinated_design import words
 from orchestrator.coordinated_design.study import ALL, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
@@ -45,7 +46,8 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
 
     Returns
     -------
-    0; 1 where no point has modes, gfor-cosim itself failed somewhere, or ``--fail-unstable`` asks for it.
+    0; 1 where no point has modes, gfor-cosim itself failed somewhere, or ``--fail-unstable`` asks for it; 3 where a
+    damping that was asked for is not reached everywhere, or that is not known.
     """
     if len(options.scenario) > 1:
         raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
@@ -79,12 +81,12 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
         print(json.dumps(design.as_json(), indent=1, ensure_ascii=False))
     else:
         console.print(words.verdict_of(verdict).markup(), soft_wrap=True, highlight=False)
-        console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
-        for table in (words.settings_table(design.result), words.points_table(verdict)):
+        for table in (words.points_table(verdict), words.settings_table(design.result)):
             console.print("", table)
         if options.rank:
             console.print("", words.ranking_table(design.result))
         console.print("")
+        console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
     for text in words.remarks(verdict):
         make_errors().print(escape(text), soft_wrap=True)
     if not options.json:
@@ -97,7 +99,9 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
 def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:
     internal = any(point.before.status is Status.INTERNAL or point.after.status is Status.INTERNAL
                    for point in verdict.points)  # fmt: skip
-    return int(internal or not verdict.known or (fail_unstable and not verdict.stable))
+    if internal or not verdict.known or (fail_unstable and not verdict.stable):
+        return 1
+    return NOT_MET if verdict.wanted is not None and not verdict.met else 0
 
 
 def _command_line(options: argparse.Namespace) -> str:

@@ -10,6 +10,9 @@ from orchestrator.analysis.stability import Stability
 from orchestrator.report.verdict import COLOURS, VerdictSentence
 from orchestrator.study.modes import ModesResult
 
+NOT_MET = 3
+"""Exit code where a requirement is not met, or is not known to be."""
+
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
     """``--fail-unstable``."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestrator.coordinated_design.objective import RatedPoint
 from orchestrator.coordinated_design.open_loops import PodPlace
-from orchestrator.coordinated_design.search import SettingSearch, Tried
+from orchestrator.coordinated_design.search import SettingSearch
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.pod_design.closed_loop import PodSetting
 
@@ -23,21 +23,19 @@ class RankedConverter:
     shift
         How far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
         the residues' sizes over all points [rad/s per pu].
-    found
-        The best setting that a search finds for it alone, on the linear models; None where none was searched.
     setting
-        That setting.
+        The best setting that a search finds for it alone; None where none was searched.
+    worst
+        Least damping ratio with that setting, of all points and all modes to be damped; None where it is not known.
+    stages
+        N_S of its lead/lag.
     """
 
     place: PodPlace
     shift: float
-    found: Tried | None = None
     setting: PodSetting | None = None
-
-    @property
-    def worst(self) -> float | None:
-        """Least damping ratio of all points with that setting."""
-        return None if self.found is None else self.found.worth.worst
+    worst: float | None = None
+    stages: int = 0
 
 
 def ranked(
@@ -47,8 +45,9 @@ def ranked(
     largest: float,
     frequency: float,
     most: int,
+    known: tuple[PodPlace, PodSetting] | None = None,
 ) -> tuple[RankedConverter, ...]:
-    """The ranking; for the first by the size of their residues a controller alone is designed.
+    """The controllers by the size of their residues; for the first a controller alone is designed.
 
     Parameters
     ----------
@@ -64,6 +63,8 @@ def ranked(
         ω that the centres relate to [rad/s].
     most
         For how many a controller is designed.
+    known
+        A controller that was designed alone already, with its setting.
     """
     by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
     found = []
@@ -71,11 +72,19 @@ def ranked(
         if k >= most:
             found.append(RankedConverter(place, shift))
             continue
+        if known is not None and place == known[0]:
+            found.append(RankedConverter(place, shift, known[1], stages=stages[place]))
+            continue
         group = PodGroup(place.controller, (place.component,), (place.component,), stages[place])
         space = SettingSpace([group], (0.0, largest), frequency)
         best = SettingSearch(space, points).best(starts=1, polish=False)
-        found.append(RankedConverter(place, shift, best, space.group_settings(best.x)[0]))
-    return tuple(sorted(found, key=lambda one: (one.found is None, -(one.worst or 0.0), -one.shift)))
+        found.append(RankedConverter(place, shift, space.group_settings(best.x)[0], stages=stages[place]))
+    return tuple(found)
+
+
+def best_first(found: Sequence[RankedConverter]) -> tuple[RankedConverter, ...]:
+    """The converters in the order of their least damping, those without one by how far they move the modes."""
+    return tuple(sorted(found, key=lambda one: (one.worst is None, -(one.worst or 0.0), -one.shift)))
 
 
 def _shift(place: PodPlace, points: Sequence[RatedPoint]) -> float:

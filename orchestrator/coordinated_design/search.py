@@ -34,6 +34,10 @@ _DIFFERENCE = 1e-6
 _WORTH = 1e-6
 _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.05, 0.15, 0.4, 1.0)
 _STARTS, _STARTS_OF_SEVERAL = 4, 6
+_GRID, _LEAST_SHARE = (13, 6, 9), 0.025
+"""Turns, centres and gains of an exhaustive grid, and its smallest gain as a part of the largest."""
+_MOST_CUBED = 4e6
+"""Sum of the cubes of all points' numbers of states up to which a grid is computed."""
 _SPREAD, _MOST_SPREAD = 64, 256
 """Vectors that are spread over all ranges for each of several groups, and at most."""
 
@@ -94,6 +98,23 @@ class SettingSearch:
                     chosen.append(one)
         found = max([scanned[0], *map(self.improved, chosen)], key=lambda one: (one.worth.allowed, one.merit))
         return self.improved(self._polished(found)) if polish else found
+
+    def over_grid(self, found: Tried) -> tuple[Tried, int]:
+        """The better of a vector and what an exhaustive grid of settings leads to, and the number of its settings.
+
+        There is none for several groups, and where the eigenvalues of so many settings would take too long.
+        """
+        cost = sum(len(point.loops.A) ** 3 for point in self._points)
+        if len(self._space.groups) > 1 or cost > _MOST_CUBED:
+            return found, 0
+        low, high = self._space.lowest, self._space.highest
+        ends = [np.unique(np.linspace(low[k], high[k], number)) for k, number in enumerate(_GRID[:2])]
+        gains = np.unique(np.geomspace(max(low[2], _LEAST_SHARE * high[2]), high[2], _GRID[2]))
+        grid = [self.tried(np.array(x)) for x in product(*ends, gains)]
+        best = max(grid, key=lambda one: (one.worth.allowed, one.merit))
+        if (best.worth.allowed, best.merit) > (found.worth.allowed, found.merit):
+            found = self.improved(self._polished(best))
+        return found, len(grid)
 
     def _alone(self) -> list[Tried]:
         """The best setting of each group alone, with the others at their smallest gain."""

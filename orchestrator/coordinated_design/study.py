@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -18,10 +18,10 @@ from orchestrator.cases.schema import Value
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
-from orchestrator.coordinated_design.ranking import RankedConverter, ranked
+from orchestrator.coordinated_design.ranking import RankedConverter, best_first, ranked
 from orchestrator.coordinated_design.search import SettingSearch, Tried
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
-from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged
+from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged, least_of
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
 from orchestrator.pod_design.target import check_range, find_target, with_controller
@@ -241,6 +241,8 @@ class PointsDesign:
         Converters by what a controller there alone would give, the best first.
     evaluations
         How often all points were computed in the search.
+    compared
+        Number of settings of an exhaustive grid that were tried; 0 without one.
     """
 
     plan: PointsDesignPlan
@@ -250,11 +252,13 @@ class PointsDesign:
     points: tuple[JudgedPoint, ...]
     ranking: tuple[RankedConverter, ...]
     evaluations: int
+    compared: int = 0
 
     @property
     def verdict(self) -> PointsVerdict:
         """What it comes to over all points."""
-        return PointsVerdict(self.points, self.plan.request.damping)
+        request = self.plan.request
+        return PointsVerdict(self.points, request.damping, request.gain_bounds[1], self.compared)
 
 
 def design_over_points(
@@ -297,8 +301,12 @@ def design_over_points(
     space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
     search = SettingSearch(space, rated)
     found = search.best()
-    wanted = plan.request.damping
-    if wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE:
+    wanted, compared = plan.request.damping, 0
+    if wanted is not None and not (found.worth.allowed and found.worth.worst >= wanted + _SPARE):
+        stage("grid of settings, as the search did not reach what is wanted")
+        found, compared = search.over_grid(found)
+    reached = wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE
+    if wanted is not None and reached:
         found = search.with_least_gain(found, wanted + _SPARE)
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
@@ -306,11 +314,35 @@ def design_over_points(
     stage("ranking")
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
-    ranking = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked)
+    places = [place for group in plan.groups for place in group.places]
+    designed = (places[0], settings[0]) if len(places) == 1 and not reached else None  # the least gain is not the best
+    alone = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed)
+    ranking = best_first(
+        [
+            _confirmed(plan, one, after if designed and one.place == designed[0] else None, executor, store)
+            for one in alone
+        ]
+    )
     predicted = {point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
     where = [(plan.points[item.point], plan.outages[item.outage]) for item in plan.items]
     points = tuple(judged(where, before, after, plan.aim, predicted))
-    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations)
+    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations, compared)
+
+
+def _confirmed(
+    plan: PointsDesignPlan,
+    one: RankedConverter,
+    known: Sequence[PointModes] | None,
+    executor: Executor,
+    store: PointStore,
+) -> RankedConverter:
+    """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
+    if one.setting is None:
+        return one
+    group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
+    values = {**plan.off, **values_of([group], [one.setting])}
+    points = known or modes_at(plan, values, (), executor, store)
+    return replace(one, worst=least_of(points, plan.aim))
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:

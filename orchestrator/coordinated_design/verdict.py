@@ -161,6 +161,14 @@ def _judged(
     )  # fmt: skip
 
 
+def least_of(points: Sequence[PointModes], aim: Aim) -> float | None:
+    """Least damping ratio of all modes that a design damps at all points; None where a point has no modes or grows."""
+    if not all(point.computed and growth(point.values) == 0 for point in points):
+        return None
+    every = (_least(split(point.values, _targets(point, aim), floors_of((), 0.0)), point) for point in points)
+    return min((mode.damping_ratio for mode in every if mode is not None), default=None)
+
+
 def _targets(point: PointModes, aim: Aim) -> list[int] | None:
     """Places of the named modes; None where all count."""
     if not aim.names or any(name not in point.named for name in aim.names):
@@ -187,10 +195,16 @@ class PointsVerdict:
         Every point with what became of it.
     wanted
         Damping ratio that is wanted everywhere; None for the best that there is.
+    largest
+        The largest gain that the search was allowed [pu].
+    compared
+        Number of settings of an exhaustive grid none of which was better; 0 without one.
     """
 
-    def __init__(self, points: Sequence[JudgedPoint], wanted: float | None) -> None:
-        self.points, self.wanted = tuple(points), wanted
+    def __init__(
+        self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0
+    ) -> None:
+        self.points, self.wanted, self.largest, self.compared = tuple(points), wanted, largest, compared
         self.known = [point for point in points if point.computed]
         self.failed = [point for point in points if not point.computed]
         self.unstable = [point for point in self.known if point.grows]

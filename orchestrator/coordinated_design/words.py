@@ -38,7 +38,20 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
     if verdict.met is None:
         return VerdictSentence(None, "not known", f"{', '.join(reasons)}{tail}")
     word = "NOT REACHED" if wanted is not None else "NO BETTER"
-    return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{tail}")
+    short = wanted is not None and worst is not None and worst < wanted
+    beyond = f"; {_cannot_be_had(verdict, worst)}" if short and worst is not None and not verdict.astray else ""
+    return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
+
+
+def _cannot_be_had(verdict: PointsVerdict, worst: float) -> str:
+    """What is known of how much can be had; that it cannot be had is said where settings were tried one by one."""
+    best = f"best {100 * worst:.2f} %"
+    if not verdict.compared:
+        return f"{best} (found by a search; no grid of settings was compared)"
+    return (
+        f"it CANNOT be had with K ≤ {verdict.largest:g} pu: {best}, the better of a search and a grid of "
+        f"{verdict.compared} settings"
+    )
 
 
 def _reasons(verdict: PointsVerdict) -> list[str]:
@@ -111,7 +124,7 @@ def _stable(point: JudgedPoint) -> str:
 def ranking_table(design: PointsDesign) -> Table:
     """Converters by what a controller there alone would give."""
     table = make_table(
-        "Converters by what a controller there alone would give (linear models of all points)",
+        "Converters by what a controller there alone gives: the least damping of all points, computed anew",
         "Converter", "Controller", "least damping [%]", "K [pu]", "T_S1 [s]", "T_S2 [s]", "shift by 1 pu [rad/s]",
         left=2,
     )  # fmt: skip
@@ -122,10 +135,15 @@ def ranking_table(design: PointsDesign) -> Table:
 
 def ranked_cells(one: RankedConverter) -> list[str]:
     """Least damping, gain and time constants of a ranked converter; dashes where no controller was searched."""
-    if one.worst is None or one.setting is None:
+    if one.setting is None:
         return ["–"] * 4
     filters = one.setting.filters
-    return [f"{100 * one.worst:.2f}", f"{one.setting.gain:.4g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}"]
+    return [
+        "unstable or not known" if one.worst is None else f"{100 * one.worst:.2f}",
+        f"{one.setting.gain:.4g}",
+        f"{filters.T_S1:.4f}",
+        f"{filters.T_S2:.4f}",
+    ]
 
 
 def remarks(verdict: PointsVerdict) -> list[str]:

@@ -44,6 +44,26 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
     yield from _notes(d)
 
 
+def first_screen(d: PodDesign) -> Iterable[Table | str]:
+    """Whether the requirement is met, and a row for each setting: its two least damped modes, and its stability."""
+    yield f"[bold {'green' if d.met else 'red'}]{'met' if d.met else 'not met'}[/]: {escape(verdict(d))}"
+    table = _table("", "", f"Mode {d.mode_name}", "Least damped, 0.1 to 2 Hz", "Next", "Stable")
+    for title, around, target, stability in (
+        ("as it is, the controller off", d.before, d.initial, d.stability_before),
+        (f"{LABELS[d.request.controller]}, {_setting(d.final)}", d.after, d.final.eigenvalue, d.stability),
+    ):
+        values = sorted([target, *(mode.eigenvalue for mode in around.others)], key=damping_ratio)
+        least, following = (_short(value) for value in [*values, None][:2])
+        stable = {True: "yes", False: "NO", None: "not known"}[stability.stable]
+        table.add_row(title, _short(around.counting(target)), least, following, stable)
+    yield table
+    yield ""
+
+
+def _short(value: complex | None) -> str:
+    return "–" if value is None else f"{value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))}"
+
+
 def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     S, K, f = d.sensitivities, f"{d.request.delta_gain:g}", d.filters
     phase, N = angle_deg(S.value), d.target.stages
@@ -149,7 +169,6 @@ def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
 def _notes(d: PodDesign) -> Iterable[str]:
     for note in d.refinement.notes if d.refinement else ():
         yield f"[dim]{escape(note)}[/dim]"
-    yield f"[bold {'green' if d.met else 'yellow'}]{'met' if d.met else 'not met'}[/]: {escape(verdict(d))}"
 
 
 def verdict(d: PodDesign) -> str:

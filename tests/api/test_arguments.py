@@ -91,8 +91,15 @@ def test_frequencies_are_two_numbers_in_order(case, frequencies):
 def test_a_damping_ratio_is_a_number_between_0_and_1(case, ratio):
     with pytest.raises(InputError, match=r"critical = .*it is a damping ratio between 0 and 1"):
         case.scenario("pod_p").modes(critical=ratio)
-    with pytest.raises(InputError, match=r"damping = .*it is a damping ratio between 0 and 1"):
-        case.design("pod_p", damping=ratio)
+
+
+@pytest.mark.parametrize("given", ["5 %", "0.05", 0.05, 0.999, 95, 0, True, float("nan"), [5]])
+@pytest.mark.parametrize("name", ["damping", "least_damping"])
+def test_a_damping_of_a_design_is_in_percent(case, name, given, tmp_path):
+    with pytest.raises(InputError, match=f"{name} = .*it is in percent between 1 and 90"):
+        case.design("pod_p", **{name: given})
+    with pytest.raises(InputError, match=f"{name} = .*it is in percent between 1 and 90"):
+        case.design_over_points(tmp_path / "points.csv", **{name: given})
 
 
 @pytest.mark.parametrize(
@@ -109,8 +116,8 @@ def test_a_damping_ratio_is_a_number_between_0_and_1(case, ratio):
         ({"delta_gain": -1.0}, "delta_gain = -1.0; give a gain"),
         ({"stages": True}, "stages = True; give a whole number from 0 to 10"),
         ({"stages": "2"}, "stages = '2'; give a whole number"),
-        ({"least_damping": None}, "least_damping = None; it is a damping ratio"),
-        ({"damping_increment": None}, "damping_increment = None; it is a damping ratio"),
+        ({"least_damping": None}, "least_damping = None; it is in percent"),
+        ({"damping_increment": None}, "damping_increment = None; it is in percent"),
         ({"component": ["gfor"]}, r"component = \['gfor'\]; give one name"),
         ({"scenario": ["gfor"]}, r"scenario = \['gfor'\]; a design is made for one scenario"),
         ({"refine": "no"}, "refine = 'no'; give True or False"),

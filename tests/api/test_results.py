@@ -221,8 +221,11 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").sweep("grid.X"), "not of the form component.parameter"),
         (lambda: face.load("two_area").design("pod_x"), "there are: pod_p, pod_q"),
         (lambda: face.load("two_area").design("pod_p", dampning=0.2), "dampning"),
-        (lambda: face.load("two_area").design("pod_p", damping=0.2, damping_increment=0.1), "give one of them"),
-        (lambda: face.load("two_area").design("pod_p", damping=20), "damping = 20; it is a damping ratio"),
+        (lambda: face.load("two_area").design("pod_p", damping=20, damping_increment=10), "give one of them"),
+        (
+            lambda: face.load("two_area").design("pod_p", damping=0.2),
+            "write 20 for a damping ratio of 0.2",
+        ),
         (lambda: face.build("gforr"), "there is no model 'gforr'; there are: "),
         (lambda: face.build("gfor", fmi="3.0"), "native"),
         (lambda: face.compare("a", "b"), "there is no trajectory.nc"),

@@ -358,3 +358,42 @@ def test_the_command_writes_what_other_commands_take(gfor, tmp_path, monkeypatch
     code, out, _ = gfor(*common, "--outages", "L", "--gain-bounds", "0:100", "--rank", "0", "--fail-unstable")
     assert code == 1
     assert "have no modes (2 islanding)" in " ".join(out.split())
+
+
+@pytest.mark.slow
+def test_every_setting_that_is_named_gives_its_figure_when_it_is_typed_in(gfor, tmp_path, monkeypatch):
+    """Those of the ranking too: the least damping of all modes, not that of the mode that a controller moves well."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one.csv").write_text("name,grid.X_L\nusual,0.1\n")
+    code, out, _ = gfor("design", "two_area_rms", "--controller", "pod_p", "--controller", "pod_q", "--points",
+                        "one.csv", "--rank", "2", "--damping", "80", "--json", "--workers", "1")  # fmt: skip
+    found = json.loads(out)
+    assert code == 3
+    assert found["met"] is False
+    assert found["verdict"].startswith("NOT REACHED: 80 %")
+    assert "CANNOT be had" not in found["verdict"], "of two settings no grid was compared"
+    alone = [[(one["controller"], one)] for one in found["ranking"]]
+    figures = [one["worst_damping_ratio"] for one in found["ranking"]] + [found["worst_damping_ratio"]["after"]]
+    assert len(alone) == 2
+    for settings, figure in zip([*alone, [(s["controller"], s) for s in found["settings"]]], figures, strict=True):
+        options = []
+        for controller, one in settings:
+            values = {"enabled": "true", **{name: one[name] for name in ("K", "T_S1", "T_S2")}}
+            options += [word for key, v in values.items() for word in ("--set", f"gfor.{controller}.{key}={v}")]
+        _, printed, _ = gfor("modes", "two_area_rms", "--scenario", "gfor", "--set", "grid.X_L=0.1", *options, "--json")
+        modes = json.loads(printed)["scenarios"][0]["modes"]
+        expected = min(mode["damping_percent"] for mode in modes)  # of the step map
+        assert 100 * figure == pytest.approx(expected, rel=0.01)
+
+
+def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):
+    """Without one only the best that was found is said; and a search that was cut short is helped by the grid."""
+    monkeypatch.setattr(SettingSearch, "best", lambda search: search.tried(search._space.vector([90.0], [3.0], [5.0])))
+    plan = planned("pod_p", damping=0.8)
+    helped = design_over_points(plan, Serial(), store).verdict
+    assert "CANNOT be had with K ≤ 400 pu: best" in verdict_sentence(helped)
+    monkeypatch.setattr(SettingSearch, "over_grid", lambda search, found: (found, 0))
+    alone = design_over_points(plan, Serial(), store).verdict
+    assert "CANNOT" not in verdict_sentence(alone)
+    assert "no grid of settings was compared" in verdict_sentence(alone)
+    assert helped.worst > alone.worst + 0.05
