@@ -32,6 +32,11 @@ def checked(path, binding=None, only=()):
     [
         ("state_of_dip_timer", "state"),
         ("gain_of_dips", "after_dips"),
+        ("nan_without_power", "operating_points"),
+        ("clips_its_start", "operating_points"),
+        ("base_of_own_rating", "ratings"),
+        ("limit_of_own_rating", "ratings"),
+        ("resonance", "signs"),
         ("hidden_state", "state"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),

@@ -8,6 +8,7 @@ from orchestrator.acceptance.checks import (
     initialisation,
     instances,
     loading,
+    points,
     port,
     resources,
     ride_through,
@@ -20,7 +21,7 @@ from orchestrator.acceptance.checks import (
 
 MODULES = (
     *(file, loading, running, initialisation, instances, state, sampling, timing),
-    *(port, signs, ride_through, aftermath, extremes, resources),
+    *(port, points, signs, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -29,7 +30,7 @@ ORDER = (
     "runs", "start_values", "initial_outputs", "call_order", "independence", "repeatability", "reading",
     "reset", "reinstantiation",
     "state", "settable_states", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
-    "steady_state", "rated_frequency", "power_balance", "signs", "limits", "after_dips",
+    "steady_state", "rated_frequency", "power_balance", "operating_points", "ratings", "signs", "limits", "after_dips",
     "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 

@@ -19,6 +19,9 @@ VOLTAGE = 0.02
 FREQUENCY = 0.001
 """Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
 
+CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)
+"""While it takes active power."""
+
 _FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
 _FURTHER_ABSORBING = (
     OperatingAt(1.0, 0.0, 0.2, -0.25),
@@ -52,6 +55,9 @@ class Way:
         How far they go away at most [pu, S_n].
     omega, omega_moving
         Its frequency in the end, and how much that still moves [pu]; None for an FMU that does not say it.
+    ringing
+        How far P or Q swings about its course in the middle and in the end, from crest to trough [pu, S_n], and how
+        often that changes its sign in the end.
     """
 
     power: complex
@@ -59,6 +65,7 @@ class Way:
     far: float
     omega: float | None
     omega_moving: float
+    ringing: tuple[float, float, int]
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,10 @@ POINTS = (
 IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))
 """Points at which it takes power."""
 
-_BALANCE = 0.02
+BALANCE = 0.02
 """Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
 
-_DRIFT = 1e-3
+DRIFT = 1e-3
 """Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
 
 _PART = 0.75
@@ -46,8 +46,9 @@ WHY = {
 }
 
 
-def _rating(running: Running) -> float:
-    set_to = running.subject.use.values.get("S_n")
+def rating_of(running: Running) -> float:
+    """S_n [MVA] with which it runs."""
+    set_to = running.parameters.get("S_n", running.subject.use.values.get("S_n"))
     info = running.component.description.variables.get("S_n")
     if set_to is not None:
         return float(set_to)
@@ -87,13 +88,13 @@ def of_current(running: Running, values: Numbers) -> Complex:
     """The injected current [pu, S_n] in rows of outputs."""
     names = running.subject.outputs
     found: Complex = values[:, names.index("i_re")] + 1j * values[:, names.index("i_im")]
-    return found * SYSTEM_BASE_MVA / _rating(running)
+    return found * SYSTEM_BASE_MVA / rating_of(running)
 
 
-def _current(running: Running) -> complex:
+def present_current(running: Running) -> complex:
     """Injected current [pu, S_n]."""
     values = RealBatch(running.component, ("i_re", "i_im")).read()
-    return complex(*values) * SYSTEM_BASE_MVA / _rating(running)
+    return complex(*values) * SYSTEM_BASE_MVA / rating_of(running)
 
 
 def _points(subject: Subject) -> tuple[OperatingAt, ...]:
@@ -125,10 +126,10 @@ def steady_state(subject: Subject) -> CheckResult:
     for point in _points(subject)[:3]:
         try:
             with subject.running(point=point) as running:
-                begin = _current(running)
+                begin = present_current(running)
                 moved = np.abs(currents(running, 0j, steps) - begin)
                 worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
-                if rest is None and worst <= _DRIFT:
+                if rest is None and worst <= DRIFT:
                     rest = _rest(subject, running, begin, steps)
         except ComponentError as error:
             refused.append(str(error))
@@ -138,7 +139,7 @@ def steady_state(subject: Subject) -> CheckResult:
     subject.memory["drift"] = worst
     if isinf(worst):
         return failed("steady_state", "not a number", "its current is no number at constant voltage")
-    if worst > _DRIFT:
+    if worst > DRIFT:
         return failed("steady_state", "no steady state", seen, drift=worst)
     if rest is not None:
         worst = max(worst, rest.moved)
@@ -146,7 +147,7 @@ def steady_state(subject: Subject) -> CheckResult:
         seen += ", and goes on" if rest.goes_on and rest.moved > 1e-6 else ""
     if isinf(worst):
         return failed("steady_state", "not a number", f"{seen}: its current is no number")
-    if worst > _DRIFT:
+    if worst > DRIFT:
         return failed("steady_state", "leaves its steady state", seen, drift=worst)
     if worst > 1e-6 and rest is not None and rest.goes_on:
         return remarked("steady_state", seen, "it does not settle: ask what goes on in it at rest", drift=worst)
@@ -168,8 +169,8 @@ def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Re
     """Leave it at rest until enough was seen, it moves too much, or there is no more time."""
     until, clock = subject.description.stop_time or 10.0, perf_counter()
     budget = _PART * subject.memory.get("run_for", RUN_FOR)
-    ends, moved = [(0.0, begin), (running.time, _current(running))], 0.0
-    while running.time < LONGEST and moved <= _DRIFT:
+    ends, moved = [(0.0, begin), (running.time, present_current(running))], 0.0
+    while running.time < LONGEST and moved <= DRIFT:
         if perf_counter() - clock > (budget if running.time >= until else 4 * budget):
             break
         try:
@@ -189,7 +190,7 @@ def power_balance(subject: Subject) -> CheckResult:
     if not subject.starts:
         return not_applicable("power_balance", WHY["no start" if subject.port else "no port"])
     best: CheckResult | None = None
-    settle = 0 if subject.memory.get("drift", 0.0) <= _DRIFT else affordable(subject, 20000)
+    settle = 0 if subject.memory.get("drift", 0.0) <= DRIFT else affordable(subject, 20000)
     for steps in dict.fromkeys((0, settle)):
         asked, found, voltages, left_out = _powers(subject, steps)
         if len(asked) < 3:
@@ -218,7 +219,7 @@ def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex],
             with subject.running(point=point) as running:
                 if steps:
                     currents(running, 0j, steps)
-                power = point.voltage * _current(running).conjugate()
+                power = point.voltage * present_current(running).conjugate()
         except ComponentError as error:
             if point in IMPORTING:
                 left_out = left_out or f"it does not start with P_0 = {point.P:g}: {error}"
@@ -251,12 +252,12 @@ def _judged(
         "rest": rest,
         "worst": worst,
     }
-    if worst <= _BALANCE:
+    if worst <= BALANCE:
         return passed(
             "power_balance", f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points", **figures
         )
     imports = s_0.real < 0
-    if (np.abs(s - s_0)[~imports] <= _BALANCE).all():
+    if (np.abs(s - s_0)[~imports] <= BALANCE).all():
         says = "it is as asked where it gives power, and not where it takes power"
         return failed("power_balance", "power not as asked", f"{seen}: {says}", **figures)
     fault, says = _diagnosis(of, a, b, c, rest)
@@ -272,16 +273,16 @@ def _fit(asked: Complex, found: Complex) -> tuple[complex, complex, complex, flo
 def _diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple[str, str]:
     """Name of the fault, and what the fit says."""
     fit = f"{of} = ({a:.3g})·{of}_0 + ({b:.3g})·{of}_0* + ({c:.3g})"
-    if rest > _BALANCE or abs(c) > _BALANCE:
-        return "power not as asked", "it does not follow P_0 and Q_0" if abs(a) < _BALANCE else fit
-    if abs(a) <= _BALANCE and abs(b) <= _BALANCE:
+    if rest > BALANCE or abs(c) > BALANCE:
+        return "power not as asked", "it does not follow P_0 and Q_0" if abs(a) < BALANCE else fit
+    if abs(a) <= BALANCE and abs(b) <= BALANCE:
         return "power not as asked", "there is no power at all"
-    if min(abs(a), abs(b)) > _BALANCE:
+    if min(abs(a), abs(b)) > BALANCE:
         return "wrong axes", f"{fit}, so its axes are scaled or signed differently"
     if abs(b) > abs(a):
         return "wrong sign", f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}"
     turn = phase(a) * 180 / pi
-    if abs(abs(a) - 1) > _BALANCE:
+    if abs(abs(a) - 1) > BALANCE:
         return "wrong base", f"the power is {abs(a):.4g} times what is asked{_known(abs(a))}" + (
             ", with the opposite sign" if abs(turn) > 178 else f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
         )

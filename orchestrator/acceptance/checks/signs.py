@@ -8,6 +8,7 @@ import numpy as np
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.droop import (
     ABSORBING,
+    CHARGING,
     FREQUENCY,
     POINT,
     SETTLED,
@@ -17,7 +18,7 @@ from orchestrator.acceptance.checks.droop import (
     droop,
     further,
 )
-from orchestrator.acceptance.checks.port import WHY, of_current
+from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
@@ -48,6 +49,15 @@ _LOST = 0.02
 
 _EACH = 5e-3
 """Power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order."""
+
+_EVEN = 3.0
+"""How many times its answer to the frequency may be larger with power in one direction than in the other."""
+
+_RINGS, _DAMPED, _TOLD = 1e-3, 0.8, 0.5
+"""Swing [pu, S_n] in the end that counts; parts of the swing before from which it is not damped, and is told."""
+
+_CROSSINGS = 6
+"""Changes of sign in a third of the time, from which a swing is fast enough to be judged in it."""
 
 _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
@@ -105,13 +115,19 @@ def signs(subject: Subject) -> CheckResult:
         )
     places = [POINT]
     if subject.starts:
-        places += [p for p in (subject.use.point, ABSORBING) if p is not None]
+        places += [p for p in (subject.use.point, ABSORBING, CHARGING) if p is not None]
     first: CheckResult | None = None
     refused = []
     for point in places:
+        if point is CHARGING and cannot_import(subject, point):
+            continue  # which 'power_balance' tells
         try:
             result = _at(subject, steps, point)
+            if point is CHARGING and first is not None and not result.fault:
+                result = _evenly(first, result)
         except ComponentError as error:
+            if point is CHARGING:
+                continue
             refused.append(f"small changes of voltage or frequency at {_named(point)} end with an error: {error}")
             continue
         if result.fault:
@@ -123,6 +139,16 @@ def signs(subject: Subject) -> CheckResult:
     if refused:
         return remarked("signs", "; ".join([first.evidence, *refused]), "ask why", **first.figures)
     return first
+
+
+def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
+    """The result while it takes power; a failure where the frequency moves its power much less or more than before."""
+    before, now = (abs(result.figures["P_of_lower_frequency"]) for result in (giving, taking))
+    unclear = any(result.figures["moving"][1] > SETTLED for result in (giving, taking))
+    if unclear or max(before, now) < 5 * _SOME or 1 / _EVEN < now / max(before, 1e-9) < _EVEN:
+        return taking
+    says = f"{100 * FREQUENCY:g} % of frequency moves its active power by {now:.3g} pu while it takes power, and by "
+    return failed("signs", "uneven droop", f"{says}{before:.3g} pu while it gives some", **taking.figures)
 
 
 def _named(point: OperatingAt) -> str:
@@ -138,10 +164,13 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     }  # fmt: skip
     if not np.isfinite([voltage.far, frequency.far]).all():
         return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")
-    wrong = _wrong(point, voltage, frequency) or _wrong_droop(subject, steps, point, voltage, frequency)
+    wrong, unknown = _wrong(point, voltage, frequency), ""
+    if not wrong:
+        wrong, unknown = _wrong_droop(subject, steps, point, voltage, frequency)
     said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if subject.starts:
         said += f", at {_named(point)}"
+    said += f"; {unknown}" if unknown else ""
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
@@ -150,6 +179,11 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
             "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears",
             **figures,
         )  # fmt: skip
+    swings = [way.ringing for answer in (voltage, frequency) for way in answer.ways]
+    late = max((late for before, late, _ in swings if late > _TOLD * before), default=0.0)
+    if late > _RINGS:
+        says = f"its power still swings by {late:.2g} pu about its course ({said})"
+        return remarked("signs", says, "ask how it is damped, and at which network impedance", **figures)
     return passed("signs", said, **figures)
 
 
@@ -196,10 +230,22 @@ def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
     """What one change brought, in the windows at the end."""
     late, later = (complex(power[window].mean()) for window in windows[1:])
     far = float(np.nan_to_num(np.abs(power), nan=np.inf).max())
+    part = len(power) // 3
+    (before, _), (at_last, crossings) = _swing(power[part : 2 * part]), _swing(power[-part:])
+    ringing = before, at_last, crossings
     if omega is None:
-        return Way(later, _apart(late, later), far, None, 0.0)
+        return Way(later, _apart(late, later), far, None, 0.0, ringing)
     tail = omega[windows[1].start :]
-    return Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)))
+    return Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)), ringing)
+
+
+def _swing(power: Complex) -> tuple[float, int]:
+    """From crest to trough of P or Q [pu, S_n] about a curve of third order, and how often its sign changes."""
+    time, swings = np.linspace(-1, 1, len(power)), []
+    for part in (np.nan_to_num(power.real), np.nan_to_num(power.imag)):
+        rest = part - np.polyval(np.polyfit(time, part, 3), time)
+        swings.append((float(np.ptp(rest)), int(np.count_nonzero(np.diff(np.sign(rest))))))
+    return max(swings)
 
 
 def _apart(a: complex, b: complex) -> float:
@@ -215,6 +261,14 @@ def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> 
     """Name of a fault, and what shows it."""
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
+    for answer, kind in zip((voltage, frequency), ("voltage", "frequency"), strict=True):
+        for way in answer.ways:
+            before, late, crossings = way.ringing
+            if way.far < _AWAY and crossings >= _CROSSINGS and late > max(_RINGS, _DAMPED * before):
+                says = (
+                    f"after a small change of {kind} its power swings by {before:.2g} pu, and by {late:.2g} pu later on"
+                )
+                return "keeps moving", says
     if lost := _lost(voltage, frequency):
         return "loses synchronism", lost
     steady = [a.moving < max(_SOME, _SETTLED * abs(a.power)) for a in (voltage, frequency)]
@@ -265,10 +319,16 @@ def _wrong_omega(frequency: DroopAnswer) -> tuple[str, str] | None:
 
 def _wrong_droop(
     subject: Subject, steps: int, point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer
-) -> tuple[str, str] | None:
-    """Look closer where lower voltage brings more reactive power in the end than in the first cycle."""
-    if not subject.starts or voltage.power.imag < _MORE * voltage.early_power.imag or not voltage.early_power.imag > 0:
-        return None
+) -> tuple[tuple[str, str] | None, str]:
+    """Look closer where lower voltage brings more reactive power in the end than in the first cycle.
+
+    A fault and what shows it, and why the droop of the reactive power could not be judged.
+    """
+    not_judged = "the sign of its droop of reactive power was not judged: "
+    if voltage.power.imag < _MORE * voltage.early_power.imag:
+        return None, ""
+    if not subject.starts or not voltage.early_power.imag > 0:
+        return None, f"{not_judged}it takes no start values, or gives no reactive power at first"
     if max(voltage.moving, frequency.moving) > SETTLED:
         steps *= 3
     found = [] if max(voltage.moving, frequency.moving) > SETTLED else [(point, voltage, frequency)]
@@ -278,13 +338,15 @@ def _wrong_droop(
         except ComponentError:
             continue  # it may not be able to work there
         if max(answer.moving for answer in answers) > SETTLED:
-            return None  # no law is seen in what does not settle
+            return None, f"{not_judged}it does not settle in time"
         found.append((other, *answers))
     slope = droop(found) if found else None
-    if slope is None or slope > 0:
-        return None
+    if slope is None:
+        return None, f"{not_judged}it follows no linear law"
+    if slope > 0:
+        return None, ""
     says = f"the voltage behind its impedance rises by {-100 * slope:.2g} % a pu of reactive power, and should fall"
-    return "wrong sign", f"{says}: look for the sign of Q in its droop"
+    return ("wrong sign", f"{says}: look for the sign of Q in its droop"), ""
 
 
 def _said(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> str:

@@ -353,7 +353,7 @@ EXPORT int fmi2DoStep(void *c, double time, double step, int no_set_state) {
 #else
         ;
 #endif
-#if !defined FAULT_NAN_LIMIT && !defined FAULT_NAN_AT && !defined FAULT_NAN_ONCE && !defined FAULT_EULER
+#if !defined FAULT_NAN_LIMIT && !defined FAULT_NAN_IDLE && !defined FAULT_NAN_AT && !defined FAULT_NAN_ONCE && !defined FAULT_EULER
     for (int k = 0; k < SIZE; ++k)
         if (isnan(S->z[k])) {
             log_text(instance, ERROR, "a variable is not a number");

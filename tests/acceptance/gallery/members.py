@@ -316,7 +316,24 @@ def large_signals():
         one("blocks_after_deep_dips", "blocks", "limits", FAULT_BLOCKS_BELOW=0.35),
         one("blocks_after_jumps", "blocks", "limits", FAULT_BLOCKS_AT_JUMP="(25 * 3.14159265 / 180)"),
         one("knows_the_dips", "no current limit", "limits", FAULT_KNOWS_DIPS=1),
+        *points_and_ratings(),
         one("leaking_in_dips", "memory leak", "after_dips", FAULT_LEAK_IN_DIPS=4096),
+    ]
+
+
+def points_and_ratings():
+    """What shows without power, with full power, while it takes power, at another rating, and long after a change."""
+
+    def one(name, fault, *only, **defines):
+        return Member(converter(name, **defines), fault, only=("steady_state", "power_balance", *only))
+
+    return [
+        one("nan_without_power", "not a number", "operating_points", FAULT_NAN_IDLE=1),
+        one("clips_its_start", "power not as asked", "operating_points", FAULT_CLIPS_START=0.8),
+        one("base_of_own_rating", "base of another rating", "ratings", FAULT_BASE_OF_START=1),
+        one("limit_of_own_rating", "limit of another rating", "ratings", FAULT_BASE_OF_LIMIT=1),
+        one("droop_while_charging", "uneven droop", "signs", FAULT_CHARGING_DROOP=4),
+        one("resonance", "keeps moving", "signs", FAULT_RINGS=7),
     ]
 
 

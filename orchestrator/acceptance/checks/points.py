@@ -1,0 +1,152 @@
+"""Whether a converter works where a case may put it: without power, with full power either way, at another rating."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.port import (
+    BALANCE,
+    DRIFT,
+    WHY,
+    cannot_import,
+    current_limit,
+    currents,
+    present_current,
+    rating_of,
+)
+from orchestrator.acceptance.checks.ride_through import NO_LIMIT
+from orchestrator.acceptance.checks.running import affordable
+from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.errors import ComponentError
+from orchestrator.fmi.port import BoundDescription
+
+_IDLE = OperatingAt(1.0, 0.1, 0.0, 0.0)
+_FULL = (OperatingAt(1.02, 0.2, 1.0, 0.0), OperatingAt(1.02, -0.3, -1.0, 0.0))
+
+_APART = 0.0037
+"""Difference of the power of two points [pu, S_n], which no setting in steps of 1 % can show."""
+
+_RESTS = 2000
+"""Steps for which it is watched at each point."""
+
+_SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)
+"""Bounds of other ratings, in parts of its own."""
+
+_DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
+"""Voltage of the dip that shows the limit at another rating [pu], its duration and the time of the mean [s]."""
+
+_STAYS = 0.25
+"""Part by which a current in a dip may miss the limit of another rating, and be that limit."""
+
+
+def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
+    yield "without power", _IDLE
+    for point in _FULL:
+        yield f"at P_0 = {point.P:g}", point
+    draw = subject.random("operating points")
+    for sign in (1, -1):
+        v, theta, P, Q = draw.uniform((0.96, -3.1, 0.15, -0.2), (1.04, 3.1, 0.8, 0.2))
+        for more in (0.0, _APART):
+            point = OperatingAt(round(v, 3), round(theta, 3), round(sign * P + more, 5), round(Q, 3))
+            yield f"at P_0 = {point.P:.5g}, Q_0 = {point.Q:.3g}, v_0 = {point.v:.4g}", point
+
+
+@check(
+    "operating_points",
+    "Does it start and rest without power, with full power either way, and at points drawn at random?",
+    needs=(*SAME, "steady_state", "power_balance"),
+)
+def operating_points(subject: Subject) -> CheckResult:
+    if not subject.starts:
+        return not_applicable("operating_points", WHY["no start" if subject.port else "no port"])
+    tried, left_out, found = 0, [], []
+    for words, point in _points(subject):
+        if reason := cannot_import(subject, point):
+            left_out.append(reason)
+            continue
+        try:
+            with subject.running(point=point) as running:
+                begin = present_current(running)
+                moved = np.abs(currents(running, 0j, affordable(subject, _RESTS)) - begin).max()
+        except ComponentError as error:
+            left_out.append(f"{words} it refuses to work: {error.log or error.status}")
+            continue
+        tried += 1
+        power = point.voltage * begin.conjugate()
+        found.append((point, power))
+        says = f"{words} its power is {power:.4g} pu"
+        if not np.isfinite([abs(power), moved]).all():
+            return failed("operating_points", "not a number", f"{words} its current is no number")
+        if abs(power - complex(point.P, point.Q)) > BALANCE:
+            return failed("operating_points", "power not as asked", f"{says}, and is as asked at other points")
+        if moved > DRIFT and point not in _FULL:
+            return failed("operating_points", "no steady state", f"{words} its current moves by {moved:.3g} pu")
+        if moved > DRIFT:
+            left_out.append(f"{words} its current moves by {moved:.3g} pu")
+    seen = f"it starts and rests at {tried} points, among them {'none' if not tried else 'no power and full power'}"
+    if coarse := _coarse(found):
+        return remarked("operating_points", f"{coarse}; {seen}", "ask in which steps it takes its power")
+    if left_out:
+        remedy = "do not use it so, or ask how it works there"
+        return remarked("operating_points", f"it starts and rests at {tried} points; {'; '.join(left_out)}", remedy)
+    return passed("operating_points", seen)
+
+
+def _coarse(found: list[tuple[OperatingAt, complex]]) -> str:
+    """Where a small change of the power that is asked for is not followed; "" where all are."""
+    for (one, first), (other, second) in pairwise(found):
+        asked, got = other.P - one.P, (second - first).real
+        if abs(asked - _APART) < 1e-9 and abs(got - asked) > asked / 2:
+            return f"where P_0 is {asked:g} pu higher its power is {got:.3g} pu higher: it takes its power in steps"
+    return ""
+
+
+@check("ratings", "Is it the same in per unit at another rating?", needs=(*SAME, "steady_state", "power_balance"))
+def ratings(subject: Subject) -> CheckResult:
+    """Start it with other values of S_n, and look at its power and at its current in a deep dip."""
+    described = subject.description
+    takes = "S_n" in (described.port.start if isinstance(described, BoundDescription) else described.variables)
+    if not subject.starts or not takes:
+        return not_applicable("ratings", "because it takes no rating (the binding has no [start.S_n])")
+    draw, seen, refused = subject.random("ratings"), [], []
+    with subject.running() as running:
+        own = rating_of(running)
+    usual = _in_a_dip(subject, own)[1]
+    limit = current_limit(subject)
+    for bounds in (_SMALLER, _LARGER):
+        part = round(draw.uniform(*bounds), 3)
+        words = f"at S_n = {part * own:.4g} MVA, {part:g} of what it has"
+        try:
+            power, current = _in_a_dip(subject, part * own)
+        except ComponentError as error:
+            refused.append(f"{words}, it refuses to start: {error.log or error.status}")
+            continue
+        asked = complex(subject.point.P, subject.point.Q)
+        if not np.isfinite([abs(power), current]).all():
+            return failed("ratings", "not a number", f"{words}, its current is no number")
+        if abs(power - asked) > BALANCE * max(1.0, abs(asked)):
+            says = f"{words}, its power is {power:.4g} pu where {asked:.4g} is asked"
+            return failed("ratings", "base of another rating", says, power=[power.real, power.imag])
+        says = f"{words}, its current in a dip to {_DIP:g} pu is {current:.3g} pu, and {usual:.3g} pu at its own rating"
+        if abs(current * part / usual - 1) < _STAYS and usual < NO_LIMIT:
+            return failed("ratings", "limit of another rating", says, current=current)
+        if limit is not None and current > 1.05 * limit >= usual:
+            return failed("ratings", "above its current limit", f"{says}; {limit:g} pu is declared", current=current)
+        seen.append(says)
+    if refused:
+        return remarked(
+            "ratings", "; ".join([*seen, *refused]), "do not use it at other ratings, or ask which it takes"
+        )
+    return passed("ratings", "; ".join(seen))
+
+
+def _in_a_dip(subject: Subject, rating: float) -> tuple[complex, float]:
+    """The power from which it starts at a rating [MVA], and the current over the last cycle of a dip [pu, S_n]."""
+    h = subject.step_size
+    with subject.running(parameters={"S_n": rating}) as running:
+        power = subject.start_voltage * present_current(running).conjugate()
+        currents(running, 0j, max(1, round(_CYCLE / h)))
+        during = currents(running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h)))
+    return power, float(np.abs(during[-max(1, round(_CYCLE / h)) :]).mean())
