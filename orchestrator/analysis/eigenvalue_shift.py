@@ -1,6 +1,7 @@
 """What a change of a linear model does to one eigenvalue, to first order, from its left and right eigenvectors."""
 
 import numpy as np
+import scipy.linalg
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.arrays import Vector
@@ -24,6 +25,33 @@ def eigenvalue_shift(
     if model.step_size is not None:
         change /= complex(np.exp(eigenvalue * model.step_size)) * model.step_size
     return change
+
+
+def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> float:
+    """|Δ| of the sum of all eigenvalues near zero [rad/s], to first order.
+
+    A slow eigenvalue beside the free angle's zero is nearly double: each one alone moves by the root of an error, in
+    opposite directions, and their sum by the error itself.
+
+    Parameters
+    ----------
+    model, varied
+        With the same states, in the same order.
+    radius
+        Largest |λ| that counts [rad/s].
+    """
+    step, A, changed = model.step_size, model.A, varied.A
+
+    def is_near(real: float, imaginary: float = 0.0) -> bool:
+        value = complex(real, imaginary)
+        rate = value if step is None else np.log(value) / step if value else complex(np.inf)
+        return bool(abs(rate) <= radius)
+
+    _, right, count = scipy.linalg.schur(A, sort=is_near)
+    _, left, _ = scipy.linalg.schur(A.T, sort=is_near)
+    left, right = left[:, :count], right[:, :count]
+    moved = np.trace(np.linalg.solve(left.T @ right, left.T @ (changed - A) @ right))
+    return float(abs(moved) / (step or 1.0))
 
 
 def _apply(model: LinearModel, z: Vector) -> Vector:

@@ -24,7 +24,7 @@ class Facts:
     frequency_hz
         Rated; None where no component has one.
     buses, machines, converters
-        How many.
+        How many; units out of service do not count.
     load_mw
         Active power of all loads, without what feeds in [MW].
     load_model
@@ -72,8 +72,9 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     units = {p.name: p.bus for p in network.ports if p.name in plans}
     grid = plans[table.power_flow.grid]
     wanted = table.power_flow.slack or prepared.source_slack or ""
-    at_slack = [name for name, bus in units.items() if bus == units.get(wanted, wanted) and flow.powers.get(name)]
-    machines = [n for n in units if any(v.startswith("machine.") for v in plans[n].description.variables)]
+    feeding = [name for name in units if flow.powers.get(name)]
+    at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
+    machines = [n for n in feeding if any(v.startswith("machine.") for v in plans[n].description.variables)]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [(load, _power(load, grid)) for load in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
@@ -82,7 +83,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         next((plan.number("f_n") for plan in plans.values() if "f_n" in plan.description.variables), None),
         len(network.buses),
         len(machines),
-        len(units) - len(machines),
+        len(feeding) - len(machines),
         sum(p for _, p in loads if p > 0),
         _model([load for load, p in loads if p > 0]),
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),

@@ -6,6 +6,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
+from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem
 
@@ -44,7 +45,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     try:
         flow = start_from_power_flow(
             draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
-            keep_limits=table.reactive_limits is True,
+            keep_limits=table.reactive_limits is True, returning=_returning(draft),
         )  # fmt: skip
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
@@ -53,6 +54,12 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     question(draft, undecided)
     draft.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     return flow
+
+
+def _returning(draft: Draft) -> set[str]:
+    """Units that an event of the scenario connects."""
+    events = draft.case.events if draft.scenario.events is None else draft.scenario.events
+    return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
 
 
 def _first_few(texts: Sequence[str]) -> str:

@@ -1,7 +1,7 @@
 """Start values of every component, from a power flow with the values that are set."""
 
 import cmath
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
@@ -14,6 +14,12 @@ from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import ErrorKind, InputError
 
+_LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")
+"""Lower limits of the power of governors without losses."""
+
+_IDLE = -0.1
+"""Such a limit of a unit that is out of service [pu]: not at its edge while it turns idle."""
+
 
 def start_from_power_flow(
     system: System,
@@ -24,6 +30,7 @@ def start_from_power_flow(
     limits: Mapping[str, tuple[float, float]] | None = None,
     *,
     keep_limits: bool = False,
+    returning: Collection[str] = (),
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -47,6 +54,8 @@ def start_from_power_flow(
         disconnected, the limits shrink with the rating.
     keep_limits
         Whether a bus gives its voltage up at a limit.
+    returning
+        Units that an event connects; a limit of theirs must stay.
 
     Raises
     ------
@@ -69,6 +78,8 @@ def start_from_power_flow(
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
     for name, bus in units.items():
         _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
+    for name in (unit.name for unit in feeding if not unit.connected and unit.name not in returning):
+        _let_idle(system.components[name])
     return flow
 
 
@@ -162,6 +173,14 @@ def _is_connected(plan: ComponentPlan, switch: str) -> bool:
     """Whether a component's breaker is closed; an FMU without a breaker counts as connected."""
     state = plan.value(switch) if switch in plan.description.variables else None
     return state is None or bool(state)
+
+
+def _let_idle(plan: ComponentPlan) -> None:
+    """Let a unit that stays out of service turn idle, though its governor's lower limit is 0: it feeds nothing."""
+    for limit in _LEAST_POWER:
+        least = plan.value(limit) if limit in plan.description.variables else None
+        if least is not None and float(least) >= 0:
+            plan.parameters[limit] = _IDLE
 
 
 def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:
