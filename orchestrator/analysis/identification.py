@@ -85,7 +85,7 @@ def identify_modes(
         raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
     pencil = len(y) // 3
     hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
-    _, singular, right = np.linalg.svd(hankel, full_matrices=False)
+    _, singular, right = np.linalg.svd(np.linalg.qr(hankel, mode="r"))  # the left vectors are of no use
     order = min(int((singular > tolerance * singular[0]).sum()), max_order)
     basis = right[:order].T
     multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])

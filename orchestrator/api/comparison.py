@@ -9,12 +9,14 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
+from orchestrator.analysis.threads import side_by_side
 from orchestrator.api.identification import doubt_text, identified_mode_json, opened
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, Time, moment, names
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
+from orchestrator.results.recorded import in_memory
 from orchestrator.study.common_times import common_times
 from orchestrator.study.comparison import Comparison, most_different
 from orchestrator.study.comparison import compare as compare_signal
@@ -121,7 +123,9 @@ def compare(
     if not chosen:
         raise InputError(f"{labels[0]} and {labels[1]} have no signal in common")
     times = common_times(first["time"].values, second["time"].values, labels)
-    signals_compared = [compare_signal(first, second, one, begin, labels) for one in chosen]
+    with side_by_side() as pool:
+        each = pool.map if in_memory(first) and in_memory(second) else map  # a file is read by one thread at a time
+        signals_compared = list(each(lambda one: compare_signal(first, second, one, begin, labels), chosen))
     remarks += [
         f"? {label}: {c.expression} at {doubt_text(mode)}."
         for c in signals_compared
