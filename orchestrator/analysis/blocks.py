@@ -86,7 +86,7 @@ class Blocks:
         known = known or {}
         schedule = schedule or master.schedule
         self._step_aware = [name for name in master.components if knows_step(master, name)]
-        self._without_step, self._directional = without_step, directional
+        self._without_step, self.directional = without_step, directional
         self._untold = without_step or schedule.is_second_order
         self._derivatives = without_step or (derivatives and (self._untold or not self._step_aware))
         self.step_size = step_size or master.clock.step_size
@@ -164,7 +164,7 @@ class Blocks:
     def _linearize(self, master: Master, name: str, idle: Collection[str] = ()) -> ComponentLinearization:
         return linearize_within(
             master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
-            derivatives=self._derivatives, without_step=self._untold, directional=self._directional, idle=idle,
+            derivatives=self._derivatives, without_step=self._untold, directional=self.directional, idle=idle,
         )  # fmt: skip
 
     def check_made_for(self, schedule: Schedule | None) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE, nearest_pairs
-from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.modes import eigenvectors, in_range
+from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
+from orchestrator.analysis.modes import Mode, eigenvectors, in_range
 from orchestrator.analysis.similarity import similarity
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
@@ -24,6 +24,17 @@ _NEIGHBOURS = 8
 
 _DEFECTIVE = 1e-12
 """Below this lᴴ·r is rounding: equal stages side by side share one eigenvector, and such a mode is like no other."""
+
+
+class ModesMeetError(AnalysisError):
+    """A mode merges with another one on its way, and cannot be told from it; ``beyond`` is where on the path."""
+
+    def __init__(self, eigenvalue: complex, beyond: float, end: float) -> None:
+        self.eigenvalue, self.beyond = eigenvalue, beyond
+        super().__init__(
+            f"the mode {eigenvalue:.4g} rad/s cannot be followed beyond {beyond:.4g} on the way to {end:.4g}: "
+            "there it merges with another mode; take a smaller gain or other lead/lag time constants"
+        )
 
 
 @dataclass(frozen=True)
@@ -59,7 +70,36 @@ def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
     return min(pairs_near(model, eigenvalue), key=lambda pair: abs(pair.eigenvalue - eigenvalue))
 
 
-def follow_along(start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float) -> Eigenpair:
+@dataclass(frozen=True)
+class Strides:
+    """How a path is walked.
+
+    Attributes
+    ----------
+    same
+        Least similarity with which a mode is taken for the same.
+    rival
+        Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
+    shortest
+        Length of the shortest stride, as a part of the path.
+    """
+
+    same: float = _SAME
+    rival: float = np.inf
+    shortest: float = _SHORTEST
+
+
+USUAL, CAREFUL = Strides(), Strides(0.8, 0.4, 1 / 512)
+"""Along a gain that a design turns up; and between two systems that may differ in anything."""
+
+
+def follow_along(
+    start: Eigenpair,
+    model_at: Callable[[float], LinearModel],
+    begin: float,
+    end: float,
+    strides: Strides = USUAL,
+) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
     Parameters
@@ -70,32 +110,60 @@ def follow_along(start: Eigenpair, model_at: Callable[[float], LinearModel], beg
         The linear model at any point of the path.
     begin, end
         Ends of the path; the end may be the smaller one.
+    strides
+        How it is walked.
 
     Raises
     ------
     AnalysisError
         If the mode cannot be recognised even after the shortest stride.
     """
-    shortest = abs(end - begin) * _SHORTEST
+    shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin
     while here != end:
         there = end if abs(end - here) <= abs(stride) * (1 + 1e-12) else here + stride
-        found = _recognise(pair, pairs_near(model_at(there), pair.eigenvalue))
+        found = _recognise(pair, pairs_near(model_at(there), pair.eigenvalue), strides)
         if found is not None:
             here, pair, stride = there, found, 2 * stride
         elif abs(stride) > shortest:
             stride = (there - here) / 2
         else:
-            raise AnalysisError(
-                f"the mode {pair.eigenvalue:.4g} rad/s cannot be followed beyond {here:.4g} on the way to {end:.4g}: "
-                "there it merges with another mode; take a smaller gain or other lead/lag time constants"
-            )
+            raise ModesMeetError(pair.eigenvalue, here, end)
     return pair
 
 
-def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair]) -> Eigenpair | None:
-    best = max(candidates, key=pair.similarity, default=None)
-    return best if best is not None and pair.similarity(best) >= _SAME else None
+def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearModel] | None:
+    """The linear models on the straight way from one (0) to another (1), both of the same operating point.
+
+    A gain that stands in one element of a component's matrices runs from one value to the other on this way. There is
+    none between models of other states or over another step, nor with states that were fitted.
+    """
+    alike = one.names == other.names and one.G.shape == other.G.shape
+    if not alike or (one.step_size, one.period) != (other.step_size, other.period):
+        return None
+    if IDENTIFIED in {*one.sources.values(), *other.sources.values()}:
+        return None
+
+    def model_at(part: float) -> LinearModel:
+        sides = zip((one.F, one.G, one.H, one.K), (other.F, other.G, other.H, other.K), strict=True)
+        F, G, H, K = ((1 - part) * a + part * b for a, b in sides)
+        return LinearModel(F, G, H, K, other.names, other.step_size, 0.0, period=other.period)
+
+    return model_at
+
+
+def pair_of(mode: Mode, names: Sequence[str]) -> Eigenpair:
+    """The pair of a mode in a model with these states."""
+    return _pair(mode.eigenvalue, *(np.array([v[name] for name in names]) for v in (mode.left, mode.shape)))
+
+
+def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Strides) -> Eigenpair | None:
+    alike = [pair.similarity(candidate) for candidate in candidates]
+    order = np.argsort(alike)[::-1]
+    if not len(order) or not alike[order[0]] >= strides.same:
+        return None
+    beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])  # above 1 it is half of a double eigenvalue
+    return candidates[order[0]] if beside <= strides.rival else None
 
 
 def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:

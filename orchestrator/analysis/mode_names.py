@@ -1,7 +1,7 @@
 """Names for modes that are known by their shape: each name to one mode, no mode with two names, and none in doubt."""
 
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -21,6 +21,9 @@ LEAST_COMMON = 0.5
 CLEAR = 0.8
 """A name is in doubt if another mode reaches this part of the measure of the mode that it would go to."""
 
+CONTESTED = 0.5
+"""From this part on it is worth asking which of both the mode was, before something was changed."""
+
 LEFT_OVER = 0.5
 """A name takes a mode that is not its best one, because that has another name, only from this part of the best one's
 measure on."""
@@ -34,10 +37,32 @@ Measure = Callable[[Mode], float]
 
 @dataclass(frozen=True)
 class Naming:
-    """The modes that have names, and a sentence on each name that no mode has for reasons of doubt."""
+    """What each name went to.
+
+    Attributes
+    ----------
+    named
+        The modes that have names.
+    reasons
+        Why a name that fits some mode is borne by none, by name.
+    contested
+        Names for which another mode fits at least `CONTESTED` as well as the one that fits best.
+    fits
+        The best mode of each name with the sum of all measures in view, doubts or not; and what its name measures.
+    remarks
+        What else is to be known of a name.
+    """
 
     named: Mapping[str, Mode]
-    doubts: tuple[str, ...]
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    contested: tuple[str, ...] = ()
+    fits: Mapping[str, tuple[Mode, Measure]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """A sentence on each name that no mode has for reasons of doubt, and the remarks."""
+        return (*self.reasons.values(), *self.remarks)
 
 
 def opposition(mode: Mode, side: Sequence[str], other: Sequence[str]) -> float:
@@ -75,7 +100,7 @@ def _common_motion(mode: Mode, factors: Mapping[str, float], group: Sequence[str
     return common if abs(common) >= LEAST_COMMON * sum(factor for factor, _ in moving) else 0j
 
 
-def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure], questioned: Container[str]) -> Naming:
+def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming:
     """Give every name to the mode that fits it, no mode getting two, so that the sum of all measures is largest.
 
     A name stays free where no mode fits, where two fit about equally, or where the only mode that fits well has another
@@ -87,32 +112,33 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure], questione
         The candidates.
     measures
         By name.
-    questioned
-        The names that stay free where two modes fit about equally; others go to the better one, however little better.
     """
     names = list(measures)
     fit = np.array([[measures[name](mode) for mode in modes] for name in names]).reshape(len(names), len(modes))
     column = _assigned(fit)
-    named, doubts = {}, []
+    named, reasons, contested, fits = {}, {}, [], {}
     for row, name in enumerate(names):
         best = int(fit[row].argmax()) if len(modes) else -1
         if best < 0 or fit[row, best] <= 0:
             continue
         k = column.get(row)
         if k is None or fit[row, k] < LEFT_OVER * fit[row, best]:
-            doubts.append(_taken(name, modes[best], names[_owner(column, best)]))
+            reasons[name] = _taken(name, modes[best], names[_owner(column, best)])
             continue
+        fits[name] = (modes[k], measures[name])
         free = [j for j in range(len(modes)) if j != k and j not in column.values()]
         rival = max(free, key=lambda j: fit[row, j], default=None)
-        if name in questioned and rival is not None and fit[row, rival] >= CLEAR * fit[row, k]:
-            doubts.append(
-                f"no mode is named {name!r}: those at {_shown(modes[k])} and {_shown(modes[rival])} fit it about "
+        if np.delete(fit[row], k).max(initial=0.0) >= CONTESTED * fit[row, k]:
+            contested.append(name)
+        if rival is not None and fit[row, rival] >= CLEAR * fit[row, k]:
+            reasons[name] = (
+                f"no mode is named {name!r}: those at {shown(modes[k])} and {shown(modes[rival])} fit it about "
                 f"equally (measures {fit[row, k]:.3g} and {fit[row, rival]:.3g}); look at their shapes, or describe it "
                 "by other states"
             )
             continue
         named[name] = modes[k]
-    return Naming(named, tuple(doubts))
+    return Naming(named, reasons, tuple(contested), fits)
 
 
 def _assigned(fit: np.ndarray) -> dict[int, int]:
@@ -141,10 +167,11 @@ def _owner(column: Mapping[int, int], mode: int) -> int:
 
 def _taken(name: str, mode: Mode, owner: str) -> str:
     return (
-        f"no mode is named {name!r}: the one that fits it best, at {_shown(mode)}, is {owner!r}; describe one of both "
+        f"no mode is named {name!r}: the one that fits it best, at {shown(mode)}, is {owner!r}; describe one of both "
         "by other states"
     )
 
 
-def _shown(mode: Mode) -> str:
+def shown(mode: Mode) -> str:
+    """Its frequency, as sentences tell which mode is meant."""
     return f"{mode.frequency_hz:.4g} Hz"

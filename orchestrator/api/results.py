@@ -57,9 +57,9 @@ class Modes:
         return self.result.stability
 
     @property
-    def named(self) -> dict[str, Mode]:
-        """The modes that the case gives a name."""
-        return dict(self.result.named)
+    def named(self) -> NamedModes:
+        """The modes that the case gives a name; one that no mode bears is an error that says why."""
+        return NamedModes(self.result)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -152,6 +152,34 @@ class Modes:
         outside = [] if r.hidden is None else [r.hidden.sentence()]
         lines = [self.stability.sentence(), *outside, *(f"warning: {text}" for text in self.warnings)]
         return page(f"Modes of {r.prepared.case.name}: {r.prepared.title}", lines, self.table())
+
+
+class NoSuchModeError(InputError, KeyError):
+    """No mode of a scenario bears a name."""
+
+    __str__ = Exception.__str__  # KeyError shows the text in quotes
+
+
+class NamedModes(dict[str, Mode]):
+    """The modes of a scenario by the names that its case gives.
+
+    Parameters
+    ----------
+    result
+        The scenario's modes.
+    """
+
+    def __init__(self, result: ModesResult) -> None:
+        super().__init__(result.named)
+        self._result = result
+
+    def __missing__(self, name: str) -> Mode:
+        r = self._result
+        where = f"scenario {r.prepared.name!r} of {r.prepared.case.name}"
+        if name in r.unnamed:
+            raise NoSuchModeError(f"{where}: {r.unnamed[name]}")
+        names = ", ".join(map(repr, self)) or "none"
+        raise NoSuchModeError(f"{where} has no mode named {name!r} in the range; its named modes: {names}")
 
 
 class Run:

@@ -3,7 +3,8 @@
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from dataclasses import replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +88,20 @@ class Case(CaseDefinition):
         if problems:  # unusual data may be the reason of the failure
             asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
-        return [p for p in prepared if p is not None]
+        beside = partial(self._beside, overrides, step_size, parameters)
+        return [replace(p, beside=beside) for p in prepared if p is not None]
+
+    def _beside(
+        self,
+        overrides: Mapping[str, Value] | None,
+        step_size: float | None,
+        parameters: Sequence[ParameterFile],
+        name: str,
+        plain: bool,
+    ) -> PreparedScenario | None:
+        if not plain:
+            return self.prepare([name], overrides, step_size, None, parameters)[0]
+        return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
     @cached_property
     def _mentions(self) -> list[Problem]:

@@ -1,6 +1,6 @@
 """From a case's tables and one scenario to a system that can run, with every mistake collected on the way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from fmus.grid.network import Network
@@ -75,6 +75,9 @@ class PreparedScenario:
         Behind the grid component of the power flow; None if there is none.
     source_slack
         Reference bus of the network's source.
+    beside
+        Prepares another scenario of the case with the same values, or with those of its file alone where that is asked
+        for; None where nothing but the file gave values.
     """
 
     case: CaseDefinition
@@ -98,6 +101,7 @@ class PreparedScenario:
     told: frozenset[str] = frozenset()
     network: Network | None = None
     source_slack: str | None = None
+    beside: "Callable[[str, bool], PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""

@@ -30,7 +30,7 @@ from orchestrator.screening.bench import ScreeningBench
 from orchestrator.screening.point import without_references
 from orchestrator.screening.preparation import ACCEPT, ItemPreparation, failure
 from orchestrator.screening.record import Item, Status
-from orchestrator.study.modes import named_modes
+from orchestrator.study.naming import named_modes
 
 _MOST_STATES = 2500
 """All eigenvalues of larger systems take too long for a design."""

@@ -33,7 +33,7 @@ from orchestrator.screening.outages import Outage
 from orchestrator.screening.points_file import OperatingCase
 from orchestrator.screening.record import Item
 from orchestrator.screening.study import plan_screening
-from orchestrator.study.modes import modes_named
+from orchestrator.study.naming import modes_named
 
 ALL = "all"
 """Stands for all electromechanical modes."""

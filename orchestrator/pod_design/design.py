@@ -5,7 +5,7 @@ The sensitivities are finite differences between two real linearisations, and th
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from orchestrator.analysis.continuation import pair_at
 from orchestrator.analysis.examination import Examination
@@ -35,7 +35,8 @@ from orchestrator.pod_design.margins import Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine
 from orchestrator.pod_design.target import Target, check_range, find_target, mode_name
 from orchestrator.points.store import PointStore
-from orchestrator.study.modes import named_modes, running
+from orchestrator.study.modes import identified, running
+from orchestrator.study.naming import named_modes
 
 StageReport = Callable[[str], None]
 
@@ -228,21 +229,27 @@ def design_pod(
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.parameters)
 
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
-        return named_modes(case, model, modes).named.get(name)
+        fitting = named_modes(case, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
+        return None if fitting is None else fitting[0]
 
     for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
         check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)
     with running(prepared) as master:
         report("operating point")
-        find_operating_point(master)
+        point = find_operating_point(master)
         loop = PodLoop(master, target.components, request.controller, figures_of(prepared, store))
         report("modes without the controller")
         examined = loop.examine(_OFF)
         with _with_stability(examined.stability):
             model = loop.model(_OFF)
             before = surroundings(model, None, naming)
+            modes = [mode for mode in before.others if mode.is_oscillation]
+            names = identified(prepared, point, model, modes).naming
+            before = replace(before, named=names.named.get(name))
             if before.named is None:
                 low, high = ELECTROMECHANICAL_HZ
+                if name in names.reasons:
+                    raise InputError(f"scenario {target.scenario!r}: {names.reasons[name]}")
                 raise InputError(
                     f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
                     f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"

@@ -11,6 +11,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.fmi.instance import is_ours
+from orchestrator.study.mode_identity import NamedSystem
 from orchestrator.study.modes import Linearised, ModesResult, compute_modes, linearised, running
 
 
@@ -41,6 +42,7 @@ def compute_all_modes(
         return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
     results: list[ModesResult] = []
     before: Linearised | None = None
+    done: dict[str, NamedSystem] = {}
     with side_by_side() as pool, ExitStack() as its_fmus:
         for prepared in scenarios:
             with ExitStack() as fmus:
@@ -53,12 +55,14 @@ def compute_all_modes(
                     raise
                 begun.begin(pool)
                 if before is not None:
-                    results.append(before.finished())
+                    results.append(before.finished(done))
+                    if before.named is not None:
+                        done[results[-1].prepared.name] = before.named
                 its_fmus.close()
                 its_fmus.push(fmus.pop_all())
             before = begun
         if before is not None:
-            results.append(before.finished())
+            results.append(before.finished(done))
     return results
 
 

@@ -6,7 +6,7 @@ from cmath import phase
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from orchestrator.analysis.examination import examine
 from orchestrator.analysis.external_exciters import settled_warnings, start_warnings
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
-from orchestrator.analysis.mode_names import Measure, Naming, name_modes, opposition
+from orchestrator.analysis.mode_names import Naming
 from orchestrator.analysis.modes import (
     ALL_VECTORS,
     ELECTROMECHANICAL_HZ,
@@ -30,7 +30,6 @@ from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spe
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.areas import areas_of
-from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.prepare import PreparedScenario
@@ -40,6 +39,8 @@ from orchestrator.coupling.master import Master
 from orchestrator.errors import ComponentError
 from orchestrator.federation.federation import Federation
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.study.mode_identity import NamedSystem, settled
+from orchestrator.study.naming import named_modes
 from orchestrator.study.start_errors import start_error
 
 _LEADING = 3
@@ -68,6 +69,8 @@ class ModesResult:
         The continuous model, without a communication step; None where a component gives no derivatives.
     fit_errors
         Of the components that were identified: largest relative difference of model and measured response.
+    unnamed
+        Why no mode bears a name that the case gives, by name.
     """
 
     prepared: PreparedScenario
@@ -83,6 +86,7 @@ class ModesResult:
     hidden: Hidden | None
     system: LinearModel | None
     fit_errors: dict[str, float] = field(default_factory=dict)
+    unnamed: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -268,6 +272,7 @@ class Linearised:
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
         self._range, self._critical, self._said = frequency_range, critical, said
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
+        self.named: NamedSystem | None = None
 
     def begin(self, pool: Executor) -> None:
         """Submit the eigenvalues.
@@ -294,30 +299,32 @@ class Linearised:
         """The step map's spectrum, and the critical modes where only they are asked for."""
         if self._critical is not None:
             return whole_spectrum(self._model), find_critical_modes(self._model, *self._range, self._critical)
-        first, last = self._named_range
+        first, last = _named_range(self._range)
         return find_spectrum(self._model, first, max(last, HIGHEST_SWING_HZ)), []
 
-    @property
-    def _named_range(self) -> tuple[float, float]:
-        """Names are given before the range is applied, so that a mode outside it leaves its name to no other [Hz]."""
-        low, high = self._range
-        return min(low, ELECTROMECHANICAL_HZ[0]), max(high, ELECTROMECHANICAL_HZ[1])
+    def finished(self, known: Mapping[str, NamedSystem] = MappingProxyType({})) -> ModesResult:
+        """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on.
 
-    def finished(self) -> ModesResult:
-        """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
+        Parameters
+        ----------
+        known
+            Scenarios that are finished, by name: modes are followed from there.
+        """
         prepared, model = self._prepared, self._model
         low, high = self._range
         spectrum, critical_modes = self._found.result()
         if self._critical is None and spectrum is not None:
-            first, last = self._named_range
+            first, last = _named_range(self._range)
             oscillating = [mode for mode in spectrum.modes if mode.is_oscillation]
             swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
             shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
-            naming = named_modes(prepared.case, model, swinging)
+            directional = self._blocks.directional
+            self.named = identified(prepared, self._point, model, swinging, self._range, known, directional=directional)
+            naming = self.named.naming
             named = {name: mode for name, mode in naming.named.items() if low <= mode.frequency_hz <= high}
         else:
             swinging = shown = critical_modes
-            naming, named, oscillating = Naming({}, ()), {}, []
+            naming, named, oscillating = Naming({}), {}, []
         examined = examine(
             self._master, self._blocks, model, self._system, spectrum=spectrum, of_system=self._of_system.result(),
             modes=swinging, shown=shown, frequency_range=self._range,
@@ -354,7 +361,52 @@ class Linearised:
             ),
             system=self._system,
             fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
+            unnamed=naming.reasons,
         )
+
+
+def identified(
+    prepared: PreparedScenario,
+    point: OperatingPoint,
+    model: LinearModel,
+    modes: Sequence[Mode],
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    known: Mapping[str, NamedSystem] = MappingProxyType({}),
+    *,
+    directional: bool = False,
+) -> NamedSystem:
+    """A linearised scenario with the names of its modes, by shape and where two fit by following.
+
+    Parameters
+    ----------
+    prepared, point, model
+        The scenario, its operating point, and its linear model there.
+    modes
+        That can bear a name.
+    frequency_range
+        That is shown [Hz].
+    known
+        Other scenarios of the same case and values that have their names.
+    directional
+        As `modes_of`, for scenarios that have to be computed.
+    """
+    first, last = _named_range(frequency_range)
+
+    def computed(other: PreparedScenario) -> NamedSystem:
+        with running(other) as master:
+            at = find_operating_point(master)
+            linear = model_of(master, Blocks(master, directional=directional))
+        found = [mode for mode in find_spectrum(linear, first, last).modes if mode.is_oscillation]
+        return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
+
+    return settled(
+        NamedSystem(prepared, point, model, modes, named_modes(prepared.case, model, modes)), computed, known
+    )
+
+
+def _named_range(shown: tuple[float, float]) -> tuple[float, float]:
+    """Names are given before the range is applied, so that a mode outside it leaves its name to no other [Hz]."""
+    return min(shown[0], ELECTROMECHANICAL_HZ[0]), max(shown[1], ELECTROMECHANICAL_HZ[1])
 
 
 def _is_swing(mode: Mode, speeds: Sequence[str]) -> bool:
@@ -382,28 +434,6 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
         hidden=None,
         system=None,
     )
-
-
-def named_modes(case: CaseDefinition, model: LinearModel, modes: list[Mode]) -> Naming:
-    """The modes whose shape the case describes, and what it describes without a clear answer."""
-    return modes_named(case, model.names, modes)
-
-
-def modes_named(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Naming:
-    """The same, from the names of the states alone."""
-
-    def states(patterns: Sequence[str]) -> list[str]:
-        return [name for name in names if any(fnmatch.fnmatch(name, p) for p in patterns)]
-
-    measures: dict[str, Measure] = {}
-    for table in case.table.analysis.modes:
-        if table.against is not None:
-            side, other = (states(patterns) for patterns in table.against)
-            measures[table.name] = partial(opposition, side=side, other=other)
-        else:
-            measures[table.name] = partial(Mode.participation_of, states=states(table.states))
-    opposed = {table.name for table in case.table.analysis.modes if table.against is not None}
-    return name_modes(modes, measures, opposed)
 
 
 def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) -> Mapping[str, Any]:
@@ -436,6 +466,12 @@ def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) ->
                 "linearised": r.linearised,
                 "fit_errors": r.fit_errors,
                 "warnings": list(r.warnings),
+                "named": {
+                    table.name: None
+                    if (mode := r.named.get(table.name)) is None
+                    else eigenvalue_json(mode.eigenvalue, mode.damping_percent)
+                    for table in r.prepared.case.table.analysis.modes
+                },
                 "modes": [
                     {
                         **eigenvalue_json(m.eigenvalue, m.damping_percent),

@@ -33,7 +33,7 @@ MEASURES = {
 
 
 def names(modes, measures=MEASURES):
-    return name_modes(modes, measures, set(measures))
+    return name_modes(modes, measures)
 
 
 def test_an_inter_area_mode_less_than_90_degrees_apart_keeps_its_name():
@@ -61,7 +61,7 @@ def test_a_mode_has_one_name_and_the_other_is_told():
     assert dict(found.named) == {"one": INTER}
     (text,) = found.doubts
     assert text.startswith("no mode is named 'other': the one that fits it best, at 0.63 Hz, is 'one'")
-    few = name_modes([INTER], measures, set(measures))
+    few = name_modes([INTER], measures)
     assert dict(few.named) == {"one": INTER}
     assert "'other'" in few.doubts[0]
 
@@ -80,7 +80,8 @@ def test_two_modes_that_fit_alike_are_told_and_neither_is_named():
     found = names([one, two], measure)
     assert found.named == {}
     assert found.doubts[0].startswith("no mode is named 'x': those at 1 Hz and 1.2 Hz fit it about equally")
-    assert dict(name_modes([one, two], measure, ()).named) == {"x": one}
+    assert found.fits["x"][0] is one
+    assert found.contested == ("x",)
     clear = mode(1.2, a=(0.22, 0), b=(0.22, 180))
     assert dict(names([one, clear], measure).named) == {"x": one}
 
@@ -99,7 +100,7 @@ def test_names_go_to_modes_so_that_no_other_way_fits_better(rows, columns):
         values = [dict(zip(map(id, candidates), row.tolist(), strict=True)) for row in fit]
         measures = {str(row): partial(_value_of, values[row]) for row in range(rows)}
         best = fit[linear_sum_assignment(fit, maximize=True)]
-        named = name_modes(candidates, measures, ()).named
+        named = {name: one for name, (one, _) in name_modes(candidates, measures).fits.items()}
         got = [values[int(name)][id(one)] for name, one in named.items()]
         assert len({id(one) for one in named.values()}) == len(named)
         # Some names stay free because the only mode left fits much worse than their best one.

@@ -31,7 +31,7 @@ from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.study.modes import named_modes
+from orchestrator.study.naming import named_modes
 
 PODS = {"pod_p": "POD-P", "pod_q": "POD-Q", "pod_pq": "both"}
 DELAYS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2)

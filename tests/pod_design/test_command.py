@@ -141,9 +141,16 @@ def test_input_that_cannot_be_used(gfor, tmp_path, arguments, words):
 
 
 def test_too_few_stages(gfor):
-    code, _, err = gfor("design", "two_area", "--controller", "pod_q", "--set", "grid.X_L=0.6", "--stages", "1")
+    code, _, err = gfor("design", "two_area", "--controller", "pod_q", "--set", "gfor.pod_q.T_W=0.02", "--stages", "1")
     assert code == 1
     assert "ask for 2 stages with --stages" in err
+
+
+def test_a_tie_of_two_modes_is_no_target(gfor):
+    """At this reactance two modes fit the name, and no gain leads here from where one does."""
+    code, _, err = gfor("design", "two_area", "--controller", "pod_q", "--set", "grid.X_L=0.6")
+    assert code == 2
+    assert "no mode is named 'electromechanical': those at 0.1932 Hz and 0.2017 Hz fit it about equally" in err
 
 
 def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):

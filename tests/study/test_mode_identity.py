@@ -1,0 +1,165 @@
+"""A name stays with its mode where a gain makes other shapes of the modes."""
+
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.mode_names import name_modes
+from orchestrator.analysis.modes import Mode, find_modes, make_mode
+from orchestrator.api.results import Modes
+from orchestrator.cases.case import load_case
+from orchestrator.cases.schema import ScenarioTable
+from orchestrator.errors import CosimError
+from orchestrator.study.all_modes import compute_all_modes
+from orchestrator.study.mode_identity import NamedSystem, settled
+from orchestrator.study.modes import compute_modes, modes_json
+
+STATES = ("a.x", "a.v", "b.x", "b.v")
+OF_A = {"mine": partial(Mode.participation_of, states=("a.x", "a.v"))}
+
+
+def two_masses(hertz_a, hertz_b, spring):
+    """Two masses, each on its own spring [Hz], with one between them [Hz²]."""
+    A = np.zeros((4, 4))
+    A[[0, 2], [1, 3]] = 1.0
+    stiff = (2 * np.pi) ** 2 * np.array([[hertz_a**2 + spring, -spring], [-spring, hertz_b**2 + spring]])
+    A[np.ix_([1, 3], [0, 2])] = -stiff
+    A[[1, 3], [1, 3]] = -0.1, -0.3
+    return A
+
+
+def scenario(name, A, *, modes=None, names=STATES, flow=None, states=None, others=None, measures=OF_A):
+    """A scenario of a case with an earlier one, ``off``, as far as names need it."""
+    model = LinearModel.from_matrix(A, names, None)
+    found = find_modes(model, 0.1, 5.0) if modes is None else modes
+    table = SimpleNamespace(scenarios={"off": ScenarioTable(), "on": ScenarioTable()})
+    schedule = SimpleNamespace(name="gauss-seidel")
+    prepared = SimpleNamespace(name=name, case=table, power_flow=flow, schedule=schedule, beside=others)
+    point = SimpleNamespace(states=states or dict.fromkeys(names, 0.0))
+    return NamedSystem(prepared, point, model, found, name_modes(found, measures))
+
+
+def never(_):
+    raise AssertionError("no other scenario is needed")
+
+
+OFF, FAR = two_masses(1.0, 1.2, 0.0), two_masses(1.0, 1.2, 3.0)
+
+
+def hertz_of(system):
+    return {name: mode.frequency_hz for name, mode in system.naming.named.items()}
+
+
+@pytest.mark.parametrize(("a", "b", "place"), [(1.0, 1.2, 0), (1.2, 1.0, 1)])
+def test_a_tie_goes_to_the_mode_that_it_was(a, b, place):
+    """With the spring both masses take part alike in both modes; the shapes alone tell nothing."""
+    on = scenario("on", two_masses(a, b, 3.0))
+    assert on.naming.named == {}
+    assert on.naming.doubts[0].startswith("no mode is named 'mine': those at ")
+    found = settled(on, never, {"off": scenario("off", two_masses(a, b, 0.0))})
+    low, high = sorted(mode.frequency_hz for mode in on.modes)
+    assert hertz_of(found) == {"mine": (low, high)[place]}
+    assert found.naming.reasons == {}
+
+
+def test_order_rotation_and_scaling_change_no_name():
+    """Eigenvectors of any length and angle, in any order, of states in any order."""
+    random = np.random.default_rng(7)
+    wanted = hertz_of(settled(scenario("on", FAR), never, {"off": scenario("off", OFF)}))
+    assert wanted
+    for _ in range(20):
+        order = random.permutation(4)
+        systems = []
+        for name, A in (("off", OFF), ("on", FAR)):
+            names, turned = tuple(STATES[k] for k in order), A[np.ix_(order, order)]
+            values, left, right = scipy.linalg.eig(turned, left=True, right=True)
+            above = random.permutation(np.flatnonzero(values.imag > 0))
+            factors = [complex(*random.normal(size=2)) * 10 ** random.uniform(-6, 6) for _ in range(2 * len(above))]
+            modes = [
+                make_mode(values[k], left[:, k] * factors[i], right[:, k] * factors[-1 - i], names)
+                for i, k in enumerate(above)
+            ]
+            systems.append(scenario(name, turned, modes=modes, names=names))
+        assert hertz_of(settled(systems[1], never, {"off": systems[0]})) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_clear_shape_is_followed_from_nowhere():
+    clear = scenario("on", two_masses(1.0, 1.2, 0.02))
+    assert clear.naming.contested == ()
+    assert settled(clear, never, {}) is clear
+
+
+@pytest.mark.parametrize("change", ["states", "another operating point"])
+def test_where_no_way_leads_a_tie_stays_free(change):
+    on = scenario("on", FAR)
+    off = scenario("off", OFF, names=("a.x", "a.v", "b.x", "b.w")) if change == "states" else scenario(
+        "off", OFF, states=dict.fromkeys(STATES, 0.01)
+    )  # fmt: skip
+    found = settled(on, never, {"off": off})
+    assert found.naming.named == {}
+    assert "fit it about equally" in found.naming.doubts[0]
+
+
+def test_modes_that_merge_on_the_way_are_told_with_the_place():
+    """From an oscillation to two real eigenvalues: behind the double one nothing tells which was which."""
+
+    def damped(ratio):
+        def one(w, ratio):
+            return [[0, 1], [-(w**2), -2 * ratio * w]]
+
+        return scipy.linalg.block_diag(one(6.0, ratio), one(12.0, 0.02), one(12.5, 0.02))
+
+    names = ("a.x", "a.v", "b.x", "b.v", "c.x", "c.v")
+    measures = {"mine": lambda mode: 1.0 if mode.frequency_hz < 1.5 else 0.3}
+    off, on = (scenario(n, damped(r), names=names, measures=measures) for n, r in (("off", 0.02), ("on", 2.02)))
+    assert hertz_of(off) == {"mine": pytest.approx(6.0 / (2 * np.pi), rel=1e-3)}
+    found = settled(on, never, {"off": off})
+    assert found.naming.named == {}
+    assert "meets another one 49% of the way from there" in found.naming.reasons["mine"]
+
+
+def test_two_names_never_go_to_one_mode():
+    """'other' is the upper mode by its shape; following may not take it away."""
+    measures = OF_A | {"other": lambda mode: float(mode.frequency_hz > 1.5)}
+    on = scenario("on", FAR, measures=measures)
+    found = settled(on, never, {"off": scenario("off", two_masses(1.2, 1.0, 0.0), measures=OF_A)})
+    assert list(found.naming.named) == ["other"]
+    assert found.naming.reasons["mine"].endswith("which has another name")
+
+
+@pytest.mark.parametrize(("gain", "hertz", "percent"), [(150, 0.668, 34.59), (200, 0.726, 30.79), (250, 0.768, 27.60)])
+def test_a_name_does_not_pass_to_another_mode_because_a_gain_grew(gain, hertz, percent):
+    values = {"grid.X_L": 0.3, "gfor.pod_p.K": gain}
+    (prepared,) = load_case("two_area").prepare(["pod_p"], values)
+    found = compute_modes(prepared)
+    mode = found.named["electromechanical"]
+    assert (round(mode.frequency_hz, 3), round(mode.damping_percent, 2)) == (hertz, percent)
+    both = "the mode of 0.350 Hz, 25.92 % in 'gfor' is followed to "
+    assert all(text.startswith(f"'electromechanical': {both}") for text in found.warnings)
+    assert bool(found.warnings) is (gain < 250)  # there the other one fits as well, or is damped less
+
+
+def test_alone_and_with_all_scenarios_the_names_are_the_same():
+    case = load_case("two_area")
+    together = compute_all_modes(case.prepare((), {"grid.X_L": 0.3}))
+    for result in together:
+        (prepared,) = case.prepare([result.prepared.name], {"grid.X_L": 0.3})
+        alone = compute_modes(prepared)
+        assert {n: m.eigenvalue for n, m in alone.named.items()} == {n: m.eigenvalue for n, m in result.named.items()}
+        assert alone.warnings == result.warnings
+    last = together[-1]
+    assert last.named == {}
+    as_json = modes_json([together[0], last])["scenarios"]
+    assert as_json[0]["named"]["electromechanical"]["imag"] == together[0].named["electromechanical"].eigenvalue.imag
+    assert as_json[1]["named"] == {"electromechanical": None}
+    with pytest.raises(KeyError, match="exchanges its nature") as seen:
+        Modes(last).named["electromechanical"]
+    assert isinstance(seen.value, CosimError)
+    with pytest.raises(CosimError, match=r"has no mode named 'inter-area' in the range; its named modes: none"):
+        Modes(last).named["inter-area"]
+    assert Modes(last).named.get("inter-area") is None
+    assert "exchanges its nature with the one of 0.796 Hz, 29.90 %" in last.warnings[0]
