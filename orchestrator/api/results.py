@@ -116,6 +116,9 @@ class Modes:
     def plot(self, ax: Axes = None) -> Axes:
         """Eigenvalue map with rays of equal damping; large crosses are modes with a name.
 
+        A mode lies at its real part [1/s] and its frequency [Hz]: annotate it at
+        ``(mode.eigenvalue.real, mode.frequency_hz)``, not at the imaginary part, which is in rad/s.
+
         Parameters
         ----------
         ax

@@ -66,6 +66,37 @@ class ParameterSweep:
         """Everything over scenario, varied parameters and trajectory, as in ``sweep.nc``."""
         return sweep_dataset(self.samples)
 
+    def __getitem__(self, name: str) -> xr.Dataset:
+        """One mode as it was followed, over scenario and varied parameters; NaN where it is not.
+
+        Parameters
+        ----------
+        name
+            Of the followed mode, as `table` has it under ``mode``.
+
+        Raises
+        ------
+        InputError
+            If no mode was followed under this name, with the names that there are.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> sweep = gfor.load("two_area").sweep({"grid.X_L": [0.1, 0.2]}, ["gfor"])
+        >>> sweep["electromechanical"].damping.dims
+        ('scenario', 'grid.X_L')
+        """
+        data = self.dataset
+        names = data["trajectory_name"].values
+        known = sorted({str(one) for one in names.ravel() if one})
+        if name not in known:
+            raise InputError(f"no mode was followed as {name!r}; the followed modes: {', '.join(known) or 'none'}")
+        found = [
+            data.isel(scenario=[s], trajectory=int(t)).drop_vars(["trajectory", "trajectory_name"])
+            for s, t in zip(*(names == name).nonzero(), strict=True)
+        ]
+        return xr.concat(found, "scenario")
+
     def table(self) -> pd.DataFrame:
         """One row for every mode at every point: eigenvalue [1/s, rad/s], frequency, damping ratio, the mode's name.
 
