@@ -17,6 +17,7 @@ class ErrorKind(StrEnum):
     INPUT = "input"
     VALUES = "values"
     UNITS = "units"
+    ISLANDING = "islanding"
     POWER_FLOW = "power flow"
     START = "start"
     STEADY_STATE = "steady state"
@@ -34,8 +35,10 @@ class ErrorKind(StrEnum):
         return self in _LASTING
 
 
-_LASTING = {ErrorKind.VALUES, ErrorKind.UNITS, ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE,
-            ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS}  # fmt: skip
+_LASTING = {
+    ErrorKind.VALUES, ErrorKind.UNITS, ErrorKind.ISLANDING, ErrorKind.POWER_FLOW, ErrorKind.START,
+    ErrorKind.STEADY_STATE, ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS,
+}  # fmt: skip
 
 
 class CosimError(Exception):

@@ -1,6 +1,6 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Unpack, cast
@@ -30,6 +30,7 @@ from orchestrator.api.values import (
     Paths,
     Time,
     case_values,
+    damping_percent,
     flag,
     frequency_range,
     in_seconds,
@@ -41,13 +42,14 @@ from orchestrator.api.values import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
-from orchestrator.screening.modes import CriticalRegion
+from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening
 
 
@@ -283,16 +285,17 @@ class Case:
 
     def screen(
         self,
-        points: str | Path,
-        outages: str | None = None,
+        points: str | Path | None = None,
+        outages: str | Sequence[str] | None = None,
         scenario: str | None = None,
         values: Mapping[str, Any] | None = None,
         *,
         step: Time | None = None,
         parameters: Paths = (),
         frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        damping: float = 0.2,
+        damping: float = 20,
         whole: bool = False,
+        sharing: str | None = None,
         workers: int | None = 1,
         scheduler: str | None = None,
         tls: str | Path | None = None,
@@ -304,9 +307,10 @@ class Case:
         Parameters
         ----------
         points
-            CSV file, a row each: a column ``time`` or ``name``, and what differs from the case.
+            CSV file, a row each: a column ``time`` or ``name``, and what differs from the case. The case as it is by
+            default.
         outages
-            ``"n-1"``, ``"lines"``, ``"units"``, or names with commas between them; none by default.
+            ``"n-1"``, ``"lines"``, ``"units"``, or names, also as one text with commas; none by default.
         scenario
             Its name; the first one where None.
         values, step, parameters
@@ -314,9 +318,12 @@ class Case:
         frequencies
             Modes from the first to the second are critical [Hz] …
         damping
-            … where their damping ratio is below this.
+            … where they are damped less than this [%].
         whole
             Whether growing modes of all frequencies are counted at every point, rather than at one in 24.
+        sharing
+            Who feeds what an outage takes: ``"droop"`` (units by droop and rating), ``"rating"`` or ``"slack"``; as
+            ``[power_flow]`` of the case says by default.
         workers, scheduler, tls, folder, progress
             As for `sweep`.
 
@@ -342,10 +349,15 @@ class Case:
             raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
         kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
-        wanted = CriticalRegion(*frequency_range(frequencies), damping)
+        ratio = damping_percent(damping, "damping", most=100 * MOST_DAMPING)
+        wanted = CriticalRegion(*frequency_range(frequencies), ratio or 0.0)
+        if sharing is not None and sharing not in list(SharingRule):
+            raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
         planned = plan_screening(
-            self.file, path_of(points, "points", "file"), outages, scenario, case_values(values),
+            self.file, None if points is None else path_of(points, "points", "file"),
+            outages if outages is None else ",".join(names_given(outages, "outages")), scenario, case_values(values),
             in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
+            sharing=None if sharing is None else SharingRule(sharing),
         )  # fmt: skip
         question([planned.prepared])
         with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
@@ -419,9 +431,9 @@ class Case:
         progress
             Show a line with the stage that the design has come to.
         wanted
-            Any of: ``damping`` or ``damping_increment`` [%], ``component``, ``mode``,
-            ``gain_bounds`` and ``delta_gain`` [pu], ``stages``, ``compensated_gain``, ``least_damping``, ``refine``,
-            ``margins`` (False saves most of the time).
+            Any of: ``damping`` or ``damping_increment`` [%, points], ``component``, ``mode``, ``gain_bounds`` and
+            ``delta_gain`` [pu], ``stages``, ``compensated_gain``, ``least_damping`` [%], ``refine``, ``margins`` (False
+            saves most of the time).
 
         Raises
         ------
@@ -481,7 +493,7 @@ class Case:
         wanted
             Any of: ``damping`` [%] (wanted everywhere; the best that there is by default), ``components``
             (names or patterns, each with a setting of its own), ``modes`` (the case's; all from 0.1 to 2 Hz by
-            default), ``gain_bounds`` [pu], ``stages``, ``least_damping`` (of other modes), ``ranked`` (for how many
+            default), ``gain_bounds`` [pu], ``stages``, ``least_damping`` [%] (of other modes), ``ranked`` (for how many
             converters a controller alone is designed).
 
         Raises

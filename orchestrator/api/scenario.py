@@ -20,7 +20,7 @@ from orchestrator.api.values import (
     Paths,
     Time,
     case_values,
-    damping_ratio,
+    damping_percent,
     frequency_range,
     in_seconds,
     parameter_files,
@@ -144,7 +144,7 @@ class Scenario:
         frequencies
             Modes from the first to the second are shown [Hz].
         critical
-            Damping ratio (0.2 is 20 %) below which modes are looked for, by sparse search; by default the whole
+            Damping [%] below which modes are looked for, by sparse search; by default the whole
             spectrum is computed.
         directional
             Linearise with the FMUs' own directional derivatives instead of by perturbation.
@@ -170,7 +170,7 @@ class Scenario:
         """
         from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
 
-        frequencies, critical = frequency_range(frequencies), damping_ratio(critical, "critical")
+        frequencies, critical = frequency_range(frequencies), damping_percent(critical, "critical")
         if critical is not None and not frequencies[0] > 0:
             raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
         if not black_box:

@@ -223,21 +223,26 @@ def frequency_range(given: Any) -> tuple[float, float]:
     return low, high
 
 
-def damping_ratio(given: Any, argument: str) -> float | None:
-    """A damping ratio between 0 and 1; None for None.
+def damping_percent(given: Any, argument: str, most: float = 90.0) -> float | None:
+    """A damping [%] as a ratio; None for None. A number below 1 looks like a ratio and is refused.
 
     Raises
     ------
     InputError
-        If it is no number, or lies outside.
+        If it is no number, below 1 or above ``most``.
     """
     if given is None:
         return None
-    rule = "it is a damping ratio between 0 and 1, such as 0.2 for 20 %"
     own = plain_value(given)
-    if isinstance(own, bool | str) or not isinstance(own, int | float) or not 0 < own < 1:
-        raise InputError(f"{argument} = {given!r}; {rule}")
-    return float(own)
+    if isinstance(own, bool | str) or not isinstance(own, int | float) or not 0 < own <= most:
+        raise InputError(
+            f"{argument} = {given!r}; it is a damping in percent, above 0 and at most {most:g}, such as 20"
+        )
+    if own < 1:
+        raise InputError(
+            f"{argument} = {given!r} is read in percent, at least 1; write {100 * own:g} for a damping ratio of {own:g}"
+        )
+    return own / 100
 
 
 def text_or_none(given: Any, argument: str, rule: str) -> str | None:

@@ -19,6 +19,7 @@ from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
+from orchestrator.cases.sharing import Dispatch
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
@@ -44,6 +45,7 @@ class Case(CaseDefinition):
         step_size: float | None = None,
         stop_time: float | None = None,
         parameters: Sequence[ParameterFile] = (),
+        dispatch: Dispatch | None = None,
     ) -> list[PreparedScenario]:
         """Check everything and make the chosen scenarios ready to run.
 
@@ -58,6 +60,8 @@ class Case(CaseDefinition):
         parameters
             Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority over
             theirs.
+        dispatch
+            What the units fed before an outage that they share; None where each feeds its own ``P_0``.
 
         Raises
         ------
@@ -79,6 +83,7 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [], Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
+            preparer.draft.dispatch = dispatch
             prepared.append(preparer.prepare(step_size, stop_time))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
@@ -86,7 +91,8 @@ class Case(CaseDefinition):
         if not problems and self.numbered and unmatched(self.table, named, self.place):
             problems += self._mentions
         if problems:  # unusual data may be the reason of the failure
-            asked = [Problem(q.place, f"questioned besides: {q.text}") for q in questions]
+            kind = problems[0].kind  # a question besides is of no kind of its own
+            asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         beside = partial(self._beside, overrides, step_size, parameters)
         return [replace(p, beside=beside) for p in prepared if p is not None]

@@ -9,6 +9,7 @@ from orchestrator.cases.build_choices import Layer
 from orchestrator.cases.network_data import NetworkData
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
+from orchestrator.cases.sharing import Dispatch
 from orchestrator.coupling.system import System
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
 
@@ -76,6 +77,8 @@ class Draft:
         Components whose device is another than the file's own, which no layer's value reaches.
     whole
         Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
+    dispatch
+        What the units fed before an outage that they share; None without one.
     """
 
     source: str
@@ -101,6 +104,7 @@ class Draft:
     misfits: dict[str, str] = field(default_factory=dict)
     exchanged: frozenset[str] = frozenset()
     whole: bool = True
+    dispatch: Dispatch | None = None
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:

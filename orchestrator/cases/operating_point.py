@@ -1,13 +1,13 @@
 """Operating point of a scenario: its power flow, and what is unusual about the solution."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import UnitReconnectionTable
-from orchestrator.cases.start_values import start_from_power_flow
+from orchestrator.cases.start_values import is_connected, start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem
 
 _USUAL_VOLTAGES = (0.8, 1.2)
@@ -41,11 +41,13 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     note_contradictions(draft, units)
     if draft.problems:
         return None
+    if draft.dispatch is not None:
+        slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
     try:
         flow = start_from_power_flow(
             draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
-            keep_limits=table.reactive_limits is True, returning=_returning(draft),
+            keep_limits=table.reactive_limits is True, returning=_returning(draft), dispatch=draft.dispatch,
         )  # fmt: skip
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
@@ -60,6 +62,19 @@ def _returning(draft: Draft) -> set[str]:
     """Units that an event of the scenario connects."""
     events = draft.case.events if draft.scenario.events is None else draft.scenario.events
     return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
+
+
+def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:
+    """The slack bus, or, where an outage takes all its units, the bus of the largest unit that holds a voltage."""
+    plans = draft.system.components
+    left = [
+        name for name in units
+        if is_connected(plans[grid], f"{name}.connected") and is_connected(plans[name], "connected")
+        and "Q_0" not in plans[name].parameters
+    ]  # fmt: skip
+    if not left or slack in (units[name] for name in left):
+        return slack
+    return units[max(left, key=lambda name: plans[name].number("S_n"))]
 
 
 def _first_few(texts: Sequence[str]) -> str:

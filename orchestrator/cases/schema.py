@@ -79,13 +79,14 @@ class ComponentTable(Table):
 
 
 class PowerFlowTable(Table):
-    """Which component is the grid, which unit or bus balances it, and whether limits of reactive power are kept; None
-    names those that are exceeded.
+    """Which component is the grid, which unit or bus balances it, whether limits of reactive power are kept (None names
+    those that are exceeded), and how units share what an outage takes away.
     """
 
     grid: str
     slack: str | None = None
     reactive_limits: Annotated[bool | None, Field(strict=True)] = None
+    sharing: Literal["droop", "rating", "slack"] = "droop"
 
 
 class LineTable(Table):

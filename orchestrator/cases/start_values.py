@@ -11,6 +11,7 @@ from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.sharing import Dispatch, shared_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import ErrorKind, InputError
 
@@ -31,6 +32,7 @@ def start_from_power_flow(
     *,
     keep_limits: bool = False,
     returning: Collection[str] = (),
+    dispatch: Dispatch | None = None,
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -56,6 +58,8 @@ def start_from_power_flow(
         Whether a bus gives its voltage up at a limit.
     returning
         Units that an event connects; a limit of theirs must stay.
+    dispatch
+        What the units fed before an outage that they share; None where each feeds its own ``P_0``.
 
     Raises
     ------
@@ -64,16 +68,20 @@ def start_from_power_flow(
         solution.
     """
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
-    flow = solve_power_flow(
-        (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
-        [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
-        _loads(network, system.components[grid]),
-        feeding,
-        slack,
-        _shunts(network, system.components[grid]),
-        _limits(limits or {}, feeding),
-        keep_limits=keep_limits,
-    )
+
+    def solve(fed: Sequence[FlowUnit]) -> PowerFlow:
+        return solve_power_flow(
+            (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
+            [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
+            _loads(network, system.components[grid]),
+            fed,
+            slack,
+            _shunts(network, system.components[grid]),
+            _limits(limits or {}, fed),
+            keep_limits=keep_limits,
+        )
+
+    flow = solve(feeding) if dispatch is None else shared_flow(solve, feeding, system.components, slack, dispatch)
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
     for name, bus in units.items():
@@ -94,7 +102,7 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             B=grid.number(line.variable("B")) if line.B else 0.0,
             tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
             shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
-            closed=_is_connected(grid, line.variable("connected")),
+            closed=is_connected(grid, line.variable("connected")),
         )
         for line in network.lines
     ]
@@ -105,7 +113,7 @@ def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:
     return [
         leg
         for transformer in network.transformers
-        for leg in legs_of(_as_set(transformer, grid), closed=_is_connected(grid, f"{transformer.name}.connected"))
+        for leg in legs_of(_as_set(transformer, grid), closed=is_connected(grid, f"{transformer.name}.connected"))
     ]
 
 
@@ -140,7 +148,7 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
             b=_susceptance(shunt, grid, closed) if shunt.b_mvar else 0.0,
         )
         for shunt in network.shunts
-        for closed in (not shunt.switched or _is_connected(grid, f"{shunt.name}.connected"),)
+        for closed in (not shunt.switched or is_connected(grid, f"{shunt.name}.connected"),)
     ]
     stray = [bus for bus in network.buses if network.needs_stray(bus)]
     return shunts + [FlowShunt(bus, g=0.0, b=grid.number("stray_B"), stray=True) for bus in stray]
@@ -153,7 +161,7 @@ def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
 
 
 def _unit(name: str, bus: str, plan: ComponentPlan, grid: ComponentPlan) -> FlowUnit:
-    connected = _is_connected(plan, "connected") and _is_connected(grid, f"{name}.connected")
+    connected = is_connected(plan, "connected") and is_connected(grid, f"{name}.connected")
     return flow_unit(name, bus, plan, connected=connected)
 
 
@@ -169,7 +177,7 @@ def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]
     return found
 
 
-def _is_connected(plan: ComponentPlan, switch: str) -> bool:
+def is_connected(plan: ComponentPlan, switch: str) -> bool:
     """Whether a component's breaker is closed; an FMU without a breaker counts as connected."""
     state = plan.value(switch) if switch in plan.description.variables else None
     return state is None or bool(state)

@@ -12,7 +12,8 @@ from rich.markup import escape
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.screening import WORKERS_IMPORT, Screening, compute
 from orchestrator.cases.case import load_case
-from orchestrator.cli.arguments import frequency_range
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.cli.arguments import frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -24,7 +25,7 @@ from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.screening import tables
-from orchestrator.screening.modes import CriticalRegion
+from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.record import Status
 from orchestrator.screening.study import Shard, plan_screening
 
@@ -33,17 +34,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor screen``."""
     add_case_arguments(parser)
     parser.add_argument(
-        "--points", type=Path, required=True, metavar="FILE", help="operating points: a CSV file, a row each"
-    )
+        "--points", type=Path, metavar="FILE",
+        help="operating points: a CSV file, a row each (default: the case as it is)",
+    )  # fmt: skip
     parser.add_argument(
         "--outages", metavar="WHICH", help="n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3"
     )
     parser.add_argument(
+        "--sharing", choices=[str(rule) for rule in SharingRule],
+        help="who feeds what an outage takes: units by droop and rating (default), by rating, or the slack alone",
+    )  # fmt: skip
+    parser.add_argument(
         "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
     )
     parser.add_argument(
-        "--damping", type=_damping, default=0.2, metavar="RATIO",
-        help="damping ratio below which a mode is critical (default: 0.2)",
+        "--damping", type=_damping, default=0.2, metavar="PERCENT",
+        help="damping below which a mode is critical, at most 60 (default: 20)",
     )  # fmt: skip
     parser.add_argument(
         "--whole", action="store_true", help="count growing modes of all frequencies at every point; takes longer"
@@ -84,6 +90,7 @@ def run(options: argparse.Namespace) -> int:
         wanted,
         parameters(options),
         whole=options.whole,
+        sharing=None if options.sharing is None else SharingRule(options.sharing),
     )
     print_questions([planned.prepared], as_json=options.json)
     folder = made_folder(options.out or Path("results") / f"{case.name}_screen", "--out")
@@ -110,6 +117,8 @@ def _present(found: Screening, folder: Path, console: Console, options: argparse
         print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
     else:
         console.print(tables.verdict(found.summary), soft_wrap=True, highlight=False)
+        if len(found.result.plan.outages) + len(found.result.plan.points) > 2:
+            console.print("", tables.overview(found.summary))
         console.print("", tables.modes(found.summary), "")
     for text in tables.remarks(found.summary):
         make_errors().print(escape(text), soft_wrap=True)
@@ -145,13 +154,10 @@ def _merge(folders: Sequence[Path], store: Path) -> None:
 
 
 def _damping(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value <= 0.6:
-        raise argparse.ArgumentTypeError(f"{text!r}; it must be a ratio above 0, and at most 0.6: 0.2 is 20 %")
-    return value
+    ratio = percent(text)
+    if ratio > MOST_DAMPING:
+        raise argparse.ArgumentTypeError(f"{text!r}; modes of at most {100 * MOST_DAMPING:g} % are looked for")
+    return ratio
 
 
 def _shard(text: str) -> Shard:

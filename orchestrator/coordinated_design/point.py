@@ -193,14 +193,11 @@ def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: S
     for item in task.items:
         warnings: tuple[str, ...] = ()
         try:
-            if text := preparation.cut_off(item):
-                yield PointModes(Status.ISLANDING, text)
-                continue
-            prepared = preparation.prepared(item)
+            prepared = preparation.prepared(item).scenario
             warnings = preparation.warnings(prepared)
             found = _at(case, bench, bench.master(prepared), task.places, warnings)
         except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
-            kind, text, lasting = failure(error)
+            kind, text, lasting = failure(error, item)
             found = PointModes(kind, text, warnings, lasting=lasting)
         yield found
 

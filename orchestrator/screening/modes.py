@@ -29,6 +29,9 @@ _BESIDE_ZERO, _NEAREST = 1e-2, 6
 """Beside 0 [rad/s], where so many nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
 
 _MOST = 0.9
+MOST_DAMPING = 0.6
+"""Damping ratio up to which modes are looked for."""
+
 UNSTABLE = 1e-6
 """A real part above this [1/s] is growth and not rounding."""
 

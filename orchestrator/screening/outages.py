@@ -1,4 +1,4 @@
-"""Outages: which elements leave the network, and what an outage cuts off."""
+"""Outages: which elements leave the network, and what remains of it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +17,10 @@ INTACT = "intact"
 
 _KINDS = ("n-1", "lines", "units")
 _SHOWN = 4
+_AUXILIARY = 0.05
+"""Load of a plant's own, in parts of its rating: cut off with so little, its units are lost; with more, an island is
+left.
+"""
 
 
 @dataclass(frozen=True)
@@ -64,8 +68,35 @@ def _of_kind(kind: str, elements: Elements) -> list[str]:
     return lines + (list(elements.units) if kind in ("n-1", "units") else [])
 
 
-def cut_off(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> str:
-    """What has no way to the slack bus any more, in words; "" where all has.
+@dataclass(frozen=True)
+class Remains:
+    """What outages leave of a network.
+
+    Attributes
+    ----------
+    none
+        Why no system remains; "" where one does.
+    units, loads, shunts
+        What is out of service or dead: without a way to the part that remains.
+    charging
+        The grid's variables of the charging of dead lines.
+    ties
+        Lost branches that stay closed, because a dead part hangs on each: nothing flows there.
+    dead
+        Buses that are dead.
+    """
+
+    none: str = ""
+    units: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
+    shunts: tuple[str, ...] = ()
+    charging: tuple[str, ...] = ()
+    ties: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
+
+
+def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
+    """What outages leave: of all parts with a unit in service, the one with the most load remains.
 
     Parameters
     ----------
@@ -78,22 +109,67 @@ def cut_off(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) 
     """
     network, grid = prepared.network, prepared.system.components[elements.grid]
     assert network is not None
-    row = {bus: k for k, bus in enumerate(network.buses)}
-    ends = [(x.from_bus, x.to_bus) for x in network.lines if _closed(x.name, out, grid.parameters)]
-    for winding in (x for x in network.transformers if _closed(x.name, out, grid.parameters)):
-        ends += [(winding.buses[0], bus) for bus in winding.buses[1:]]
+    values = grid.parameters
+    branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
+    branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    part = _parts(network.buses, [ends for name, *ends in branches if _closed(name, out, values)])
+    power = {x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads}
+    units = [name for name in elements.units if _closed(name, out, values)]
+    rating = {name: prepared.system.components[name].number("S_n") for name in units}
+    fed = {part[elements.units[name]] for name in units}
+    out_units = tuple(name for name in elements.units if name in out)
+    if not fed:
+        return Remains("no unit is left, so no system remains")
+    weight = {
+        k: (
+            sum(power[x.name] for x in network.loads if part[x.bus] == k and x.name not in out),
+            sum(rating[name] for name in units if part[elements.units[name]] == k),
+        )
+        for k in fed
+    }
+    main = max(weight, key=lambda k: weight[k])
+    dead = [bus for bus in network.buses if part[bus] != main]
+    for k in fed - {main}:
+        load, power_there = weight[k]
+        if load > _AUXILIARY * power_there:
+            names = ", ".join(name for name in units if part[elements.units[name]] == k)
+            buses = _first([bus for bus in dead if part[bus] == k])
+            return Remains(f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone")
+    ties, joined = [], {k: k for k in set(part.values())}
+    for name, one, other in branches:
+        a, b = joined[part[one]], joined[part[other]]
+        if name in out and a != b and bool(values.get(f"{name}.connected", True)):
+            ties.append(name)
+            joined = {k: a if at == b else at for k, at in joined.items()}
+    if any(joined[part[bus]] != joined[main] for bus in dead):
+        return Remains(f"{_first(dead)} cut off by branches that the case or the point has open")
+    opened = set(out) - set(ties)
+    return Remains(
+        units=tuple(dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))),
+        loads=tuple(x.name for x in network.loads if x.name in out or (part[x.bus] != main and power[x.name])),
+        shunts=tuple(x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main),
+        charging=tuple(
+            x.variable("B")
+            for x in network.lines
+            if x.B and x.name not in opened and {x.from_bus, x.to_bus} & set(dead)
+        ),
+        ties=tuple(dict.fromkeys(ties)),
+        dead=tuple(dead),
+    )
+
+
+def _parts(buses: Sequence[str], ends: Sequence[Sequence[str]]) -> dict[str, int]:
+    """By bus, the number of its connected part."""
+    row = {bus: k for k, bus in enumerate(buses)}
     starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
     links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
     _, part_of = connected_components(links, directed=False)
-    slack = elements.slack or next(iter(elements.units.values()))
-    lost = [bus for bus in network.buses if part_of[row[bus]] != part_of[row[slack]]]
-    if not lost:
-        return ""
-    megawatts = sum(grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads if x.bus in lost)
-    units = [unit for unit, bus in elements.units.items() if bus in lost and unit not in out]
-    what = [f"{megawatts:.4g} MW of load"] * bool(megawatts) + [f"the units {', '.join(units)}"] * bool(units)
-    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
-    return f"{', '.join(lost[:_SHOWN])}{more} cut off, with {' and '.join(what) or 'neither load nor unit'}"
+    return {bus: int(part_of[k]) for bus, k in row.items()}
+
+
+def _first(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return f"{', '.join(names[:_SHOWN])}{more}"
 
 
 def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:

@@ -19,6 +19,7 @@ from orchestrator.analysis.threads import alone as on_one_thread
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.points.key import same_case
 from orchestrator.screening.bench import DRIVEN, OBSERVED, ScreeningBench
 from orchestrator.screening.modes import CriticalRegion, FoundModes, find_modes_here, residue
@@ -45,6 +46,8 @@ class StretchTask:
         Name of the stretch's file.
     whole
         Whether growing eigenvalues are counted at all items, rather than at the ends.
+    sharing
+        How units share an outage; as the case says where None.
     """
 
     case: str
@@ -58,6 +61,7 @@ class StretchTask:
     key: str
     trust_fmus: bool = False
     whole: bool = False
+    sharing: SharingRule | None = None
 
 
 @dataclass
@@ -83,7 +87,7 @@ def compute_stretch(task: StretchTask) -> StretchRecord:
 class _Worker:
     def __init__(self, task: StretchTask, case: Case, bench: ScreeningBench) -> None:
         self._task, self._bench = task, bench
-        self._preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size)
+        self._preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size, task.sharing)
         self._alone: dict[Any, Any] = {}
 
     def stretch(self) -> StretchRecord:
@@ -148,13 +152,13 @@ class _Worker:
         """One operating point with an outage, or the reason why it has no modes."""
         warnings: tuple[str, ...] = ()
         try:
-            if text := self._preparation.cut_off(item):
-                return _Result(ItemRecord(Status.ISLANDING, text))
             prepared = self._preparation.prepared(item)
-            warnings = self._preparation.warnings(prepared)
-            return self._modes(prepared, neighbour, warnings, count=count)
+            warnings = self._preparation.warnings(prepared.scenario)
+            found = self._modes(prepared.scenario, neighbour, warnings, count=count)
+            found.record = replace(found.record, text=prepared.text)
+            return found
         except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
-            kind, text, lasting = failure(error)
+            kind, text, lasting = failure(error, item)
             return _Result(ItemRecord(kind, text, warnings=warnings, lasting=lasting))
 
     def _modes(

@@ -1,8 +1,8 @@
 """Preparing one operating point with its outage, and what it means where that fails."""
 
 import traceback
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +11,12 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import Dispatch, SharingRule
 from orchestrator.coupling.system import System
-from orchestrator.errors import CosimError, ErrorKind
+from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
 from orchestrator.points.failure import Failure
 from orchestrator.screening.columns import Elements
-from orchestrator.screening.outages import cut_off
+from orchestrator.screening.outages import Remains, what_remains
 from orchestrator.screening.record import Item, Status
 from orchestrator.screening.service import switched_off, without_units
 
@@ -24,7 +25,11 @@ ACCEPT = 1e-9
 
 _PACKAGE = Path(__file__).parent.parent
 
+_LEAST_SHARE = 0.01
+"""Shares below this [MW] are not told."""
+
 _STATUS = {
+    ErrorKind.ISLANDING: Status.ISLANDING,
     ErrorKind.INPUT: Status.VALUES,
     ErrorKind.VALUES: Status.VALUES,
     ErrorKind.UNITS: Status.VALUES,
@@ -35,6 +40,26 @@ _STATUS = {
     ErrorKind.ANALYSIS: Status.MODES,
 }
 """What an error of each kind makes of an item; of any other kind, an FMU failed."""
+
+
+_OPERATING = {"P_0", "Q_0", "v_0", "theta_0", "S_n", "connected"}
+"""What a component that refuses others of its values was not given by the power flow."""
+
+_SHOWN = 4
+
+
+class IslandingError(InputError):
+    """An outage leaves no system."""
+
+    kind = ErrorKind.ISLANDING
+
+
+@dataclass(frozen=True)
+class PreparedItem:
+    """The scenario at an item, and in words what was lost and who feeds it; "" where nothing is shared."""
+
+    scenario: PreparedScenario
+    text: str = ""
 
 
 class ItemPreparation:
@@ -50,21 +75,27 @@ class ItemPreparation:
         Parameter files whose values hold at every point.
     step_size
         Communication step [s]; the case's where None.
+    sharing
+        How units share an outage; as the case says where None.
     """
 
     def __init__(
-        self, case: Case, scenario: str, layers: Sequence[ParameterFile], step_size: float | None = None
+        self,
+        case: Case,
+        scenario: str,
+        layers: Sequence[ParameterFile],
+        step_size: float | None = None,
+        sharing: SharingRule | None = None,
     ) -> None:
         self._case, self._scenario, self._layers, self._step_size = case, scenario, tuple(layers), step_size
         self.base = self._prepare({})
         self.elements = Elements.of(self.base)
         self._asked = {str(question) for question in self.base.questions}
+        table = case.table.power_flow
+        self._sharing = sharing or SharingRule(table.sharing if table else "droop")
+        self._before: tuple[int, PreparedScenario] | None = None
 
-    def cut_off(self, item: Item) -> str:
-        """What an item cuts off from the slack bus, in words; "" where it cuts nothing off."""
-        return cut_off(self._valued(item), self.elements, item.out)
-
-    def prepared(self, item: Item) -> PreparedScenario:
+    def prepared(self, item: Item) -> PreparedItem:
         """The scenario at an item, without the units that are out of service.
 
         Raises
@@ -72,15 +103,40 @@ class ItemPreparation:
         CosimError
             If it cannot be prepared; `failure` says what that means.
         """
-        found = self._prepare({**item.values, **switched_off(item.out, self.elements)})
-        return without_units(found, item.out, self.elements)
+        valued = self._valued(item)
+        remains = what_remains(valued, self.elements, item.out)
+        if remains.none:
+            raise IslandingError(remains.none)
+        own = tuple(name for name in item.out if name not in item.lost)
+        without = what_remains(valued, self.elements, own)
+        units, loads = ({*getattr(remains, k)} - {*getattr(without, k)} for k in ("units", "loads"))
+        dispatch, text = None, ""
+        if units or loads:
+            before = self._before_outage(item, own, without)
+            assert before.power_flow is not None
+            fed, drawn = _power_of(units, before), _load_of(loads, valued, self.elements.grid)
+            dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
+        elif new := [bus for bus in remains.dead if bus not in without.dead]:
+            text = f"{', '.join(new[:_SHOWN])} cut off, with neither load nor unit"
+        values = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
+        found = self._prepare(values, dispatch)
+        if dispatch is not None:
+            text = lost_and_shared(units, loads, valued, self.elements.grid, dispatch, found)
+        return PreparedItem(without_units(found, remains.units, self.elements), text)
+
+    def _before_outage(self, item: Item, own: tuple[str, ...], without: Remains) -> PreparedScenario:
+        """The item's operating point before its outage; that of the last item serves all of one point."""
+        if self._before is None or self._before[0] != item.point:
+            off = switched_off(own, without, self._valued(item), self.elements.grid)
+            self._before = item.point, self._prepare({**item.values, **off})
+        return self._before[1]
 
     def warnings(self, prepared: PreparedScenario) -> tuple[str, ...]:
         """Questions that the scenario without the item's values does not raise."""
         return tuple(str(question) for question in prepared.questions if str(question) not in self._asked)
 
-    def _prepare(self, values: Mapping[str, Value]) -> PreparedScenario:
-        (prepared,) = self._case.prepare([self._scenario], dict(values), self._step_size, None, self._layers)
+    def _prepare(self, values: Mapping[str, Value], dispatch: Dispatch | None = None) -> PreparedScenario:
+        (prepared,) = self._case.prepare([self._scenario], dict(values), self._step_size, None, self._layers, dispatch)
         return prepared
 
     def _valued(self, item: Item) -> PreparedScenario:
@@ -96,12 +152,60 @@ class ItemPreparation:
         return replace(self.base, system=system)
 
 
-def failure(error: Exception) -> tuple[Status, str, bool]:
+def _power_of(units: Collection[str], before: PreparedScenario) -> float:
+    """Active power of units [MW]."""
+    flow, plans = before.power_flow, before.system.components
+    return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
+
+
+def _load_of(loads: Collection[str], at: PreparedScenario, grid: str) -> float:
+    """Active power of loads [MW]."""
+    plan = at.system.components[grid]
+    return sum(plan.number(f"{name}.scale") * plan.number(f"{name}.P") for name in loads)
+
+
+def lost_and_shared(
+    units: Collection[str],
+    loads: Collection[str],
+    before: PreparedScenario,
+    grid: str,
+    dispatch: Dispatch,
+    after: PreparedScenario,
+) -> str:
+    """What an outage takes away, and who feeds most of it, in words.
+
+    Parameters
+    ----------
+    units, loads
+        That the outage takes.
+    before, after
+        The scenario with the values of the operating point, and at the item.
+    grid
+        Name of the grid component.
+    dispatch
+        What the units fed before.
+    """
+    plans, flow = before.system.components, after.power_flow
+    assert flow is not None
+    rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
+    parts = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(units)]
+    parts += [f"{_load_of(loads, before, grid):.4g} MW of load lost"] if loads else []
+    more = {n: (flow.powers[n] - dispatch.powers[n]).real * rating[n] for n in rating if n not in units}
+    most = sorted(more, key=lambda name: -abs(more[name]))[:_SHOWN]
+    shared = ", ".join(f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE)
+    return "; ".join(parts) + (f"; shared: {shared}" if shared else "")
+
+
+def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
     """What an error at an item means: its status, the text, and whether the same would come out again."""
     found = Failure.of(error)
     if not isinstance(error, (CosimError, np.linalg.LinAlgError)):
         return Status.INTERNAL, unexpected(error), found.lasting
-    return _STATUS.get(found.kind, Status.FMU), found.text, found.lasting
+    status = _STATUS.get(found.kind, Status.FMU)
+    if isinstance(error, StartError) and status is Status.STEADY_STATE:
+        given = {key.partition(".")[2] for key in item.values if key.partition(".")[0] == error.component}
+        status = Status.VALUES if given - _OPERATING else status
+    return status, found.text, found.lasting
 
 
 def unexpected(error: Exception) -> str:

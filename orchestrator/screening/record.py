@@ -39,12 +39,15 @@ class Item:
         Of the operating point, by ``component.variable``.
     out
         Elements out of service: the point's own and the outage's.
+    lost
+        Those of them that only the outage takes.
     """
 
     point: int
     outage: int
     values: dict[str, Value]
     out: tuple[str, ...]
+    lost: tuple[str, ...] = ()
 
     @property
     def intact(self) -> bool:
@@ -59,7 +62,7 @@ class ItemRecord:
     Attributes
     ----------
     status, text
-        What became of it, and why.
+        What became of it, and why; of a computed one what was lost and who feeds it instead.
     stable
         Whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a
         limit is so close that the linear model is doubtful.

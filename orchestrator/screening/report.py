@@ -10,6 +10,7 @@ from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.safe_files import write_text
 from orchestrator.screening.record import Status
+from orchestrator.screening.stress import by_outage
 from orchestrator.screening.summary import ScreenedMode, Summary, duration
 from orchestrator.screening.words import verdict_sentence, what_was_counted
 
@@ -30,12 +31,11 @@ def write_page(summary: Summary, path: Path) -> None:
     plan, figures = summary.result.plan, Figures()
     shade = {True: "good", False: "bad", None: "soft"}[summary.stable]
     findings = f'<p class="{shade}">{escape(verdict_sentence(summary))}</p><p>{escape(what_was_counted(summary))}</p>'
-    content = [("Modes", _modes(summary)), ("Damping and how long", _durations(summary, figures))]
+    content = [("Outages", _outages(summary))] if len(plan.outages) > 1 else []
+    content += [("Modes", _modes(summary)), ("Damping and how long", _durations(summary, figures))]
     if len(plan.points) > 1:
         content.append(("Damping over the points", _over_points(summary, figures)))
     content.append(("All critical modes", _plane(summary, figures)))
-    if len(plan.outages) > 1:
-        content.append(("Outages", _outages(summary)))
     content.append(("Where a damping controller helps", _ranking(summary)))
     if any(True for _ in summary.failures()):
         content.append(("Not computed", _failures(summary)))
@@ -125,16 +125,18 @@ def _plane(summary: Summary, figures: Figures) -> str:
 
 def _outages(summary: Summary) -> str:
     """The outages by the least damping that they leave."""
-    worst: dict[str, tuple[float, list[str]]] = {}
-    for one in summary.least_damped():
-        known = worst.get(one.item.outage.name)
-        if known is None:
-            mode = ", ".join(name for name, _ in one.participation(2))
-            row = [escape(one.item.outage.name), escape(one.item.point.name), f"{one.frequency:.3f}", escape(mode)]
-            worst[one.item.outage.name] = one.damping, row
-    rows = [[*row[:2], damping(percent), row[2], row[3]] for percent, row in list(worst.values())[:_ROWS]]
-    columns = ["Outage", "Worst point", "Damping [%]", "f [Hz]", "Who"]
-    return table("Outages by the least damping that they leave", columns, rows, left=2) + _more(len(worst))
+    found, rows = by_outage(summary), []
+    for row in found[:_ROWS]:
+        least = row.least
+        figures = ["", "", ""] if least is None else [
+            damping(least.damping), f"{least.frequency:.3f}", escape(", ".join(n for n, _ in least.participation(2)))
+        ]  # fmt: skip
+        point = (row.worst or row.unjudged[0]).point.name
+        lost = f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
+        grows = "UNSTABLE" if row.unstable else ""
+        rows.append([escape(row.name), escape(point), *figures, grows, lost])
+    columns = ["Outage", "Worst point", "Damping [%]", "f [Hz]", "Who", "", "Not judged"]
+    return table("Outages, worst first", columns, rows, left=2) + _more(len(found))
 
 
 def _ranking(summary: Summary) -> str:

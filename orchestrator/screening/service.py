@@ -8,17 +8,33 @@ from orchestrator.cases.schema import Value
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import System
 from orchestrator.screening.columns import Elements
+from orchestrator.screening.outages import Remains
+
+_DEAD_CHARGING = 1e-3
+"""Part of its charging that a dead line keeps: a bus without any has no voltage."""
 
 
-def switched_off(out: Sequence[str], elements: Elements) -> dict[str, Value]:
-    """Values that take elements out of service in the power flow and in the grid."""
-    values: dict[str, Value] = {}
-    for name in out:
-        if name in elements.loads:
-            values[f"{elements.grid}.{name}.scale"] = 0.0
-        else:
-            values[f"{elements.grid}.{name}.connected"] = False
-    return values
+def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str) -> dict[str, Value]:
+    """Values that take elements out of service in the power flow and in the grid, with all that is dead then.
+
+    Parameters
+    ----------
+    out
+        Elements out of service.
+    remains
+        What they leave.
+    prepared
+        With the values of the operating point.
+    grid
+        Name of the grid component.
+    """
+    opened = [name for name in (*out, *remains.units, *remains.shunts)
+              if name not in remains.loads and name not in remains.ties]  # fmt: skip
+    values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}
+    plan = prepared.system.components[grid]
+    for scale in (f"{name}.scale" for name in remains.loads):  # some loads alone determine a voltage, and keep a trace
+        values[f"{grid}.{scale}"] = max(0.0, plan.description.variables[scale].minimum or 0.0)
+    return values | {f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging}
 
 
 def without_units(prepared: PreparedScenario, out: Sequence[str], elements: Elements) -> PreparedScenario:

@@ -13,6 +13,7 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
@@ -92,7 +93,7 @@ class ScreeningPlan:
 
 def plan_screening(
     case: Case,
-    points: Path,
+    points: Path | None,
     outages: str | None = None,
     scenario: str | None = None,
     overrides: Mapping[str, Value] | None = None,
@@ -101,6 +102,7 @@ def plan_screening(
     parameters: Sequence[ParameterFile] = (),
     *,
     whole: bool = False,
+    sharing: SharingRule | None = None,
 ) -> ScreeningPlan:
     """Check a screening, and build the FMUs that it needs.
 
@@ -109,7 +111,7 @@ def plan_screening(
     case
         The case.
     points
-        CSV file with the operating points.
+        CSV file with the operating points; None for the case's own.
     outages
         As `read_outages` takes them.
     scenario
@@ -124,6 +126,8 @@ def plan_screening(
         Parameter files whose values hold at every point.
     whole
         Whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of stretches.
+    sharing
+        How units share an outage; as the case says where None.
 
     Raises
     ------
@@ -134,7 +138,8 @@ def plan_screening(
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
     elements = Elements.of(prepared)
-    rows = read_points(points, prepared, elements)
+    own = OperatingCase("case", 1.0, {}, (), str(case.path))
+    rows = [own] if points is None else read_points(points, prepared, elements)
     lost = read_outages(outages, elements)
     if len(rows) * len(lost) > _MOST:
         raise InputError(
@@ -142,7 +147,7 @@ def plan_screening(
             f"{_MOST} are computed: split the file"
         )
     asked = wanted or CriticalRegion(0.1, 2.0, 0.2)
-    tasks = _tasks(case, prepared, layers, rows, lost, step_size, asked, whole=whole)
+    tasks = _tasks(case, prepared, layers, rows, lost, step_size, asked, whole=whole, sharing=sharing)
     return ScreeningPlan(case, prepared, layers, tuple(rows), tuple(lost), asked, tuple(tasks))
 
 
@@ -156,14 +161,16 @@ def _tasks(
     wanted: CriticalRegion,
     *,
     whole: bool,
+    sharing: SharingRule | None,
 ) -> list[StretchTask]:
     """Stretches of the flat list, point by point and there outage by outage."""
     items = [
-        Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))))
+        Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))),
+             tuple(name for name in outage.elements if name not in point.out))
         for p, point in enumerate(points)
         for o, outage in enumerate(outages)
         if o == 0 or set(outage.elements) - set(point.out)
-    ]
+    ]  # fmt: skip
     content = {
         "case": case.text,
         **scenario_content(prepared),
@@ -171,6 +178,7 @@ def _tasks(
         "step": step_size,
         "wanted": [wanted.lowest_hz, wanted.highest_hz, wanted.damping],
         "whole": whole,
+        "sharing": sharing,
     }
     common = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     reference, mark = reference_to(case), fingerprint(case)
@@ -179,11 +187,11 @@ def _tasks(
         part = tuple(items[first : first + STRETCH])
         point = points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
-        said = [[sorted(item.values.items()), list(item.out), item.intact] for item in (anchor, *part)]
+        said = [[sorted(item.values.items()), list(item.out), list(item.lost), item.intact] for item in (anchor, *part)]
         points_of = [item.point - part[0].point for item in part]
         key = key_of({"screening": common, "items": said, "points": points_of})
         tasks.append(StretchTask(reference, mark, prepared.name, layers, step_size, wanted, anchor, part, key,
-                                 case.trust_fmus, whole))  # fmt: skip
+                                 case.trust_fmus, whole, sharing))  # fmt: skip
     return tasks
 
 

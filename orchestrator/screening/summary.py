@@ -1,7 +1,7 @@
 """What a screening comes to: its modes with their worst points, durations of damping, counts, and a verdict."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,9 @@ from orchestrator.screening.record import Status
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 
 _LEADING = 2
+_ALIKE, _FREQUENCY = 0.8, 0.15
+"""Trajectories are one mode above this likeness of their shares, and within this part of the frequency."""
+
 _SHOWN = 5
 
 
@@ -38,7 +41,7 @@ class ModeAt:
         """Frequency [Hz]."""
         return self.value.imag / (2 * np.pi)
 
-    def participation(self, most: int = _SHOWN) -> list[tuple[str, float]]:
+    def participation(self, most: int | None = _SHOWN) -> list[tuple[str, float]]:
         """Components that take part most, and their factors."""
         shares = [(name, float(values[self.place])) for name, values in self.item.record.shares.items()]
         return sorted(shares, key=lambda entry: -entry[1])[:most]
@@ -141,11 +144,45 @@ class Summary:
             for place in item.record.critical:
                 followed.setdefault(item.trajectories[place], []).append(ModeAt(item, place))
         modes = []
-        for at in followed.values():
+        for at in _joined(list(followed.values()), self.result.items):
             worst = min(at, key=lambda mode: mode.damping)
             who = ", ".join(name for name, _ in worst.participation(_LEADING))
             modes.append(ScreenedMode(f"{worst.frequency:.2f} Hz ({who})", worst, tuple(at)))
         return sorted(modes, key=lambda mode: mode.worst.damping)
+
+
+def _joined(groups: list[list[ModeAt]], items: Sequence[ScreenedItem]) -> list[list[ModeAt]]:
+    """Trajectories as modes: one that ends where another begins is the same mode, where frequency and shares agree.
+
+    After an outage those who take part in a mode may change so much that it was not followed. Two trajectories with one
+    item in common are two modes, however alike.
+    """
+    found: list[tuple[list[ModeAt], set[int]]] = []
+    for group in sorted(groups, key=len, reverse=True):
+        own = {id(one.item) for one in group}
+        likeness = [(_likeness(known, group), k) for k, (known, at) in enumerate(found) if not at & own]
+        best, place = max(likeness, default=(0.0, -1))
+        if best > _ALIKE:
+            found[place][0].extend(group)
+            found[place][1].update(own)
+        else:
+            found.append((list(group), own))
+    order = {id(item): k for k, item in enumerate(items)}
+    return [sorted(group, key=lambda one: order[id(one.item)]) for group, _ in found]
+
+
+def _likeness(known: Sequence[ModeAt], other: Sequence[ModeAt]) -> float:
+    """How alike the shares are at the points that two trajectories have in common; 0 at frequencies too far apart."""
+    one = other[0]
+    here = [mode for mode in known if mode.item.point is one.item.point] or known
+    near = min(here, key=lambda mode: abs(mode.frequency - one.frequency))
+    if abs(near.frequency - one.frequency) > _FREQUENCY * one.frequency:
+        return 0.0
+    shares = [dict(mode.participation(None)) for mode in (near, one)]
+    names = sorted(set(shares[0]) & set(shares[1]))  # who is out of service takes part in neither
+    a, b = (np.array([share[name] for name in names]) for share in shares)
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size else 0.0
 
 
 def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

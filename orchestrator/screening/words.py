@@ -10,6 +10,7 @@ from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.report.verdict import VerdictSentence
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.screening.stress import not_judged
 from orchestrator.screening.study import ScreenedItem
 from orchestrator.screening.summary import ModeAt, Summary
 
@@ -28,7 +29,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
             if one.item.record.stable is False:
                 worst = one.item
                 break
-        text = f"{_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}"
+        lost = f"; {text}" if (text := not_judged(summary)) else ""
+        text = f"{_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
@@ -42,7 +44,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)
     left = summary.result.plan.number_of_items - total
-    missing = [f"{number} {status}" for status, number in summary.counts.items() if status is not Status.COMPUTED]
+    missing = [text] if (text := not_judged(summary)) else []
     missing += [f"{left} not computed yet"] if left else []
     if uncounted := computed - summary.counted:
         wanted = summary.result.plan.wanted

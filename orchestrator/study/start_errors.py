@@ -1,6 +1,7 @@
 """What a component says that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.sharing import power_limits
 from orchestrator.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.fmi.instance import is_ours
 
@@ -20,7 +21,9 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         or "the FMU says no more than that its initialisation failed"
     )
     given = {v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables}
-    text = f"scenario {prepared.name!r}: {name} cannot start: {said}"
+    most = power_limits(plan, given["Q_0"])[1] if {"P_0", "Q_0"} <= set(given) else float("inf")
+    need = f"would need {100 * given['P_0'] / most:.0f} % and " if 0 < most < given.get("P_0", 0.0) else ""
+    text = f"scenario {prepared.name!r}: {name} {need}cannot start: {said}"
     if {"P_0", "Q_0", "S_n"} <= set(given):
         computed = prepared.power_flow is not None and name in prepared.power_flow.powers
         by = "the power flow asks it for" if computed else "it is to start at"

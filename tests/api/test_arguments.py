@@ -87,10 +87,12 @@ def test_frequencies_are_two_numbers_in_order(case, frequencies):
         case.scenario("pod_p").modes(frequencies)
 
 
-@pytest.mark.parametrize("ratio", ["5 %", "0.05", 5, 0, True, float("nan"), [0.05]])
-def test_a_damping_ratio_is_a_number_between_0_and_1(case, ratio):
-    with pytest.raises(InputError, match=r"critical = .*it is a damping ratio between 0 and 1"):
-        case.scenario("pod_p").modes(critical=ratio)
+@pytest.mark.parametrize("given", ["5 %", "0.05", 0.05, 0, True, float("nan"), [5], 120])
+def test_a_damping_is_in_percent(case, given):
+    """A ratio is no old wish with another answer: it is refused."""
+    for argument, study in (("critical", case.scenario("pod_p").modes), ("damping", case.screen)):
+        with pytest.raises(InputError, match=rf"{argument} = .*in percent"):
+            study(**{argument: given})
 
 
 @pytest.mark.parametrize("given", ["5 %", "0.05", 0.05, 0.999, 95, 0, True, float("nan"), [5]])
@@ -249,7 +251,7 @@ def test_modes_are_identified_in_one_signal(run, signal):
 
 
 def test_one_number_in_an_array_is_a_number(case):
-    assert len(case.scenario("pod_p").modes(critical=np.array([0.3]))) > 0
+    assert len(case.scenario("pod_p").modes(critical=np.array([30]))) > 0
 
 
 def test_a_matrix_is_named_by_a_letter():

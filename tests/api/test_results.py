@@ -204,7 +204,10 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").scenario("dip", step=-1), "step = -1; it must be a time above 0"),
         (lambda: face.load("infinite_bus").scenario("dip", step="1 m"), "step: '1 m' is in m"),
         (lambda: face.load("infinite_bus").scenario("dip").modes((2, 1)), "the lower one first"),
-        (lambda: face.load("infinite_bus").scenario("dip").modes(critical=20), "damping ratio between 0 and 1"),
+        (
+            lambda: face.load("infinite_bus").scenario("dip").modes(critical=0.2),
+            "is read in percent, at least 1; write 20",
+        ),
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 0.2), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0), "workers = 0; it must be"),

@@ -197,13 +197,13 @@ def test_a_wrong_outage_is_refused(gfor, day, tmp_path, text, said):
 
 
 def test_what_is_not_computed_is_named_and_counted(gfor, day, tmp_path):
-    """The only line splits the system, and without a unit the other cannot carry the power."""
+    """The only line splits the system; without a unit, the line can carry what the others share at two points only."""
     options = ("--scenario", "gfor", "--points", day, "--outages", "L,sg1", "--workers", "1", "--out", tmp_path / "out")
     code, out, _ = gfor("screen", "two_area", *options, "--json", "--fail-unstable")
     found = json.loads(out)
     assert code == 1
     assert found["stable"] is None
-    assert found["counts"] == {"computed": 5, "islanding": 5, "no power flow": 5}
+    assert found["counts"] == {"computed": 7, "islanding": 5, "no power flow": 3}
     assert "2600 MW of load" in found["failures"][0]["why"]
     rows = (tmp_path / "out" / "items.csv").read_text().splitlines()
     assert len(rows) == 1 + 15

@@ -4,6 +4,7 @@ import pytest
 
 from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import AnalysisError
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
@@ -18,11 +19,12 @@ def case():
     return load_case("ieee39")
 
 
-def screened(case, tmp_path, text, outages=None, scenario="base"):
+def screened(case, tmp_path, text, outages=None, scenario="base", sharing=None):
     tmp_path.mkdir(exist_ok=True)
     path = tmp_path / "points.csv"
     path.write_text(text)
-    return run_screening(plan_screening(case, path, outages, scenario), Serial(), PointStore(tmp_path / "points"))
+    plan = plan_screening(case, path, outages, scenario, sharing=sharing)
+    return run_screening(plan, Serial(), PointStore(tmp_path / "points"))
 
 
 def critical(item):
@@ -36,7 +38,8 @@ def switched_off(case, scenario, unit):
 
 
 def test_outages_of_units_have_the_modes_of_units_switched_off(case, tmp_path):
-    result = screened(case, tmp_path, "name\nonly\n", "sg33,sg36")
+    """A unit that is switched off in a case leaves its power to the slack."""
+    result = screened(case, tmp_path, "name\nonly\n", "sg33,sg36", sharing=SharingRule.SLACK)
     assert [item.record.status for item in result.items] == [Status.COMPUTED] * 3
     for item in result.items[1:]:
         assert critical(item) == pytest.approx(switched_off(case, "base", item.outage.name), rel=1e-6)

@@ -152,10 +152,10 @@ def test_a_screening_has_the_modes_of_each_point(folder, capsys):
     points = folder / "points.csv"
     points.write_text("name,ibr.P_0\nfull,0.7\nlow,0.3\n", encoding="utf-8")
     options = ["--points", str(points), "--workers", "1", "--out", str(folder / "screen"), "--json"]
-    assert main(["screen", str(folder / "net.toml"), "--damping", "0.6", *options]) == 0
+    assert main(["screen", str(folder / "net.toml"), "--damping", "60", *options]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["stable"], found["counts"]) == (True, {"computed": 2})
-    assert main(["screen", str(folder / "net.toml"), "--damping", "0.6", *options[:-1]]) == 0
+    assert main(["screen", str(folder / "net.toml"), "--damping", "60", *options[:-1]]) == 0
     assert "of the map over 200 communication steps (0.02 s), after which sampled" in said(capsys)
 
 

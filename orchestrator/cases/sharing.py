@@ -1,0 +1,231 @@
+"""Who feeds what an outage takes away: units by their governors or by their ratings, or the slack alone."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from orchestrator.cases.power_flow import FlowUnit, PowerFlow
+from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import ErrorKind, InputError
+
+_CLOSE = 1e-6
+"""Power [MW] that may be left to the units at the slack bus beside their share."""
+
+_ROUNDS = 30
+_ROOM = 1e-3
+"""So much of its rating stays between a unit and its limit: at the limit itself no model starts."""
+
+_ISOCHRONOUS = 1e6
+"""Gain of a droop of 0 [pu]: such a unit feeds all that it can."""
+
+
+class SharingRule(StrEnum):
+    """By what units share the power that an outage takes away."""
+
+    DROOP = "droop"
+    RATING = "rating"
+    SLACK = "slack"
+
+
+@dataclass(frozen=True)
+class Dispatch:
+    """What the units feed before an outage [pu, S_n], how they share it, and about how much they have to share [MW]."""
+
+    rule: SharingRule
+    powers: Mapping[str, complex]
+    change: float
+
+
+@dataclass(frozen=True)
+class Reserve:
+    """A unit's share and its room: ``before``, ``least`` and ``most`` in MW, ``gain`` in MW by any common unit."""
+
+    name: str
+    before: float
+    gain: float
+    least: float
+    most: float
+
+
+def _number(plan: ComponentPlan, name: str) -> float | None:
+    return plan.number(name) if name in plan.description.variables else None
+
+
+def _fractions(plan: ComponentPlan) -> float:
+    """Part of a steam valve's opening that becomes mechanical power."""
+    return sum(_number(plan, f"governor.K_{k}") or 0.0 for k in range(1, 9))
+
+
+def droop_gain(plan: ComponentPlan) -> float:
+    """Power that a unit adds in steady state by frequency [pu, S_n and f_n]; 0 of one that does not answer to it."""
+    if gain := _number(plan, "governor.inverse_R"):
+        return gain
+    if gain := _number(plan, "governor.K"):
+        return gain * _fractions(plan)
+    for name in ("governor.R", "droop.R_f", "frequency_droop.R_f", "mp"):
+        if (droop := _number(plan, name)) is not None:
+            if not droop:
+                return 0.0 if name == "frequency_droop.R_f" else _ISOCHRONOUS
+            return (_number(plan, "governor.A_t") or 1.0) / droop
+    return 0.0
+
+
+def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, float]:
+    """Least and most active power from which a unit starts [pu, S_n]; infinite where its model has no limit.
+
+    Parameters
+    ----------
+    plan
+        Its values.
+    reactive
+        Reactive power that it feeds [pu, S_n]: the current that is left is active.
+    """
+    low, high = [-math.inf], [math.inf]
+
+    def turbine(least: str, most: str, factor: float = 1.0, idle: float = 0.0) -> None:
+        for name, found in ((least, low), (most, high)):
+            if (value := _number(plan, f"governor.{name}")) is not None:
+                found.append(factor * (value - idle))
+
+    turbine("V_MIN", "V_MAX")
+    turbine("P_MIN", "P_MAX", _fractions(plan))
+    turbine("G_MIN", "G_MAX", _number(plan, "governor.A_t") or 1.0, _number(plan, "governor.q_NL") or 0.0)
+    turbine("", "A_T")
+    v_0 = _number(plan, "v_0") or 1.0
+    kind = _number(plan, "current_limit.kind")
+    box = _number(plan, "voltage_control.i_q_max")
+    circle = _number(plan, "current_limit.I_max")
+    if box is not None and (kind is None or kind < 0.5):
+        high.append(v_0 * box)
+    elif circle is not None:
+        high.append(math.sqrt(max(0.0, (v_0 * circle) ** 2 - reactive**2)))
+    if len(high) > 1 and low == [-math.inf]:
+        low.append(-min(high))
+    if (most := plan.description.variables["P_0"].maximum) is not None:
+        high.append(most)
+    losses = 1.5 * (_number(plan, "machine.R_s") or 0.0)
+    return max(low) + _ROOM, min(high) - _ROOM - losses
+
+
+def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
+    """Power of each unit [MW] after a change of the units' whole power; a unit at its limit leaves the rest to others.
+
+    Parameters
+    ----------
+    reserves
+        The units that are left.
+    change
+        What they have to feed beside what they fed [MW].
+
+    Raises
+    ------
+    InputError
+        If they cannot; its kind is `ErrorKind.START`.
+    """
+    found = {one.name: one.before for one in reserves}
+    free = [one for one in reserves if one.gain > 0]
+    rest = change
+    while free and rest:
+        step = rest / sum(one.gain for one in free)
+        wanted = {one.name: one.before + step * one.gain for one in free}
+        stopped = [one for one in free if not one.least <= wanted[one.name] <= one.most]
+        if not stopped:
+            return found | wanted
+        for one in stopped:
+            found[one.name] = max(min(one.before, one.least), min(max(one.before, one.most), wanted[one.name]))
+            rest -= found[one.name] - one.before
+        free = [one for one in free if one not in stopped]
+    if abs(rest) <= _CLOSE:
+        return found
+    raise InputError(_overload(reserves, change, rest), kind=ErrorKind.START)
+
+
+def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
+    """Which unit would need most of its limit, and what is missing."""
+    able = [one for one in reserves if one.gain > 0] or list(reserves)
+    step = change / (sum(one.gain for one in able) or 1.0)
+    worst = max(able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0)
+    need = worst.before + step * worst.gain
+    if change > 0:
+        first = f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
+    else:
+        first = f"{worst.name} would have to go down to {need:.4g} MW"
+    return (
+        f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {abs(rest):.4g} MW "
+        "are left when all units with a governor or a droop are at their limits; give another dispatch, or lose load "
+        "with the unit (unit+load)"
+    )
+
+
+def shared_flow(
+    solve: Callable[[Sequence[FlowUnit]], PowerFlow],
+    units: Sequence[FlowUnit],
+    plans: Mapping[str, ComponentPlan],
+    slack_bus: str,
+    dispatch: Dispatch,
+) -> PowerFlow:
+    """The power flow in which the units share what the dispatch before lacks now, with the change of the losses.
+
+    Parameters
+    ----------
+    solve
+        Solves the power flow of units that feed their ``P_0``; those at the slack bus feed what is left.
+    units, plans
+        As they are after the outage, and their values.
+    slack_bus
+        As in `orchestrator.cases.power_flow.solve_power_flow`.
+    dispatch
+        What they fed before.
+
+    Raises
+    ------
+    InputError
+        If there is no power flow, or the units that are left cannot feed it.
+    """
+    left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
+    if dispatch.rule is SharingRule.SLACK:
+        return solve(left)
+    reserves = _reserves(left, plans, dispatch)
+    at_slack = {one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None}
+    rating = {one.name: one.S_n for one in left}
+    change, before = dispatch.change, (0.0, 0.0)
+    for _ in range(_ROUNDS):
+        found = shares(reserves, change)
+        flow = solve(
+            [
+                replace(one, P_0=found[one.name] / one.S_n) if one.name in found and one.connected else one
+                for one in left
+            ]
+        )
+        missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
+        if abs(missing) <= _CLOSE:
+            return replace(flow, powers=_as_shared(flow, found, rating, at_slack))
+        # Losses depend but little on the shares: what is missing falls by about what is shared more.
+        slope = (missing - before[1]) / (change - before[0]) if before[1] and change != before[0] else -1.0
+        before, change = (change, missing), change - missing / (slope or -1.0)
+    raise InputError(
+        f'power flow: the shares of the units do not settle in {_ROUNDS} rounds; take sharing = "slack"',
+        kind=ErrorKind.POWER_FLOW,
+    )
+
+
+def _reserves(units: Sequence[FlowUnit], plans: Mapping[str, ComponentPlan], dispatch: Dispatch) -> list[Reserve]:
+    """Of the units that are left. Where none answers to the frequency, ratings decide."""
+    left = [one for one in units if one.connected]
+    gains = {one.name: droop_gain(plans[one.name]) for one in left}
+    if dispatch.rule is SharingRule.RATING or not any(gains.values()):
+        gains = {one.name: 1.0 if one.Q_0 is None else 0.0 for one in left}
+    limits = {one.name: power_limits(plans[one.name], dispatch.powers[one.name].imag) for one in left}
+    return [
+        Reserve(one.name, one.P_0 * one.S_n, gains[one.name] * one.S_n, *(x * one.S_n for x in limits[one.name]))
+        for one in left
+    ]
+
+
+def _as_shared(
+    flow: PowerFlow, found: Mapping[str, float], rating: Mapping[str, float], at_slack: set[str]
+) -> dict[str, complex]:
+    """The units' powers, those at the slack bus with their own shares instead of equal ones."""
+    own = {name: complex(found[name] / rating[name], flow.powers[name].imag) for name in at_slack}
+    return flow.powers | own

@@ -1,0 +1,175 @@
+"""What an outage takes is shared as by hand, nobody beyond his limit; what hangs on a line is lost with it."""
+
+import csv
+import json
+import re
+
+import pytest
+
+from orchestrator.analysis.modes import find_modes
+from orchestrator.cases.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
+from orchestrator.errors import ErrorKind, InputError
+from orchestrator.points.serial import Serial
+from orchestrator.points.store import PointStore
+from orchestrator.screening.columns import Elements
+from orchestrator.screening.outages import what_remains
+from orchestrator.screening.preparation import ItemPreparation
+from orchestrator.screening.record import Item, Status
+from orchestrator.screening.study import plan_screening, run_screening
+from orchestrator.study.modes import compute_modes
+from tests.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
+
+
+@pytest.fixture
+def five(tmp_path):
+    return five_machines(tmp_path)
+
+
+def screened(case, folder, outages, text="name\nonly\n", sharing=None):
+    path = folder / "points.csv"
+    path.write_text(text)
+    plan = plan_screening(case, path, outages, "base", sharing=sharing)
+    return run_screening(plan, Serial(), PointStore(folder / "points")).items
+
+
+def critical(item):
+    return item.record.eigenvalues[list(item.record.critical)]
+
+
+def at(case, lost, sharing=None):
+    """The prepared item of an outage: powers [MW] by unit."""
+    item = Item(0, 1, {}, tuple(lost), tuple(lost))
+    found = ItemPreparation(case, "base", (), None, sharing).prepared(item).scenario
+    flow = found.power_flow
+    return {name: flow.powers[name].real * RATINGS[int(name[2:])] for name in found.system.components if name != "grid"}
+
+
+def test_shares_follow_the_gains_until_a_limit():
+    units = [
+        Reserve("a", 50, 2, 0, 100),
+        Reserve("b", 50, 1, 0, 60),
+        Reserve("c", 50, 1, 0, 100),
+        Reserve("d", 9, 0, 9, 9),
+    ]
+    assert shares(units, 20) == pytest.approx({"a": 60, "b": 55, "c": 55, "d": 9})
+    assert shares(units, 60) == pytest.approx({"a": 50 + 50 * 2 / 3, "b": 60, "c": 50 + 50 / 3, "d": 9})
+    assert shares(units, -20) == pytest.approx({"a": 40, "b": 45, "c": 45, "d": 9})
+    assert shares(units, 110) == pytest.approx({"a": 100, "b": 60, "c": 100, "d": 9})
+    for change, words in ((111, "b would need 130 % of its 60 MW: 111 MW more"), (-160, "MW less cannot be shared")):
+        with pytest.raises(InputError, match=re.escape(words)) as caught:
+            shares(units, change)
+        assert caught.value.kind is ErrorKind.START
+
+
+def test_a_units_droop_and_limits_are_those_of_its_model(five):
+    (prepared,) = five.prepare(["base"])
+    plans = prepared.system.components
+    assert {n: droop_gain(plans[f"sg{n}"]) for n in RATINGS} == pytest.approx(
+        {n: 1 / DROOPS[n] if n in DROOPS else 0 for n in RATINGS}
+    )
+    assert power_limits(plans["sg1"]) == pytest.approx((0.001, 1.199))
+    assert power_limits(plans["sg4"])[1] > 1.1  # without a governor nothing but the port limits it
+
+
+@pytest.mark.parametrize("lost", [("sg1",), ("sg5",), ("line_15_5",)])
+def test_an_outage_has_the_modes_of_the_dispatch_by_hand(five, tmp_path, lost):
+    """By hand: each unit adds power by its rating and droop; another unit is the reference."""
+    unit = lost[0] if lost[0].startswith("sg") else "sg5"
+    found = at(five, lost)
+    intact = {f"sg{n}": power for n, power in POWERS.items()}
+    (base,) = five.prepare(["base"])
+    intact["sg5"] = base.power_flow.powers["sg5"].real * RATINGS[5]
+    left = [name for name in intact if name != unit]
+    gain = {name: RATINGS[int(name[2:])] / DROOPS[int(name[2:])] if int(name[2:]) in DROOPS else 0.0 for name in left}
+    added = {name: found[name] - intact[name] for name in left}
+    step = sum(added.values()) / sum(gain.values())
+    assert added == pytest.approx({name: step * gain[name] for name in left}, abs=1e-5)
+    assert sum(added.values()) == pytest.approx(intact[unit], rel=0.1)  # the rest is the change of the losses
+    other = next(name for name in left if gain[name])
+    values = {f"{name}.P_0": found[name] / RATINGS[int(name[2:])] for name in left}
+    values |= {f"grid.{unit}.connected": False, f"{unit}.governor.V_MIN": -0.1}
+    folder = tmp_path / "hand"
+    folder.mkdir()
+    (hand,) = five_machines(folder, flow=f'slack = "{other}"').prepare(["base"], values)
+    assert hand.power_flow.powers[other].real * RATINGS[int(other[2:])] == pytest.approx(found[other], abs=1e-5)
+    expected = [m.eigenvalue for m in find_modes(compute_modes(hand).system, 0.1, 2.0) if m.damping_ratio <= 0.2]
+    item = screened(five, tmp_path, lost[0])[-1]
+    assert item.record.status is Status.COMPUTED
+    assert item.record.text.startswith(f"{unit} is lost, which fed {intact[unit]:.4g} MW; shared: ")
+    assert critical(item) == pytest.approx(expected, rel=1e-6)
+
+
+def test_ratings_or_the_slack_share_where_they_are_asked_for(five, tmp_path):
+    before, by_rating = at(five, ()), at(five, ("sg1",), SharingRule.RATING)
+    added = {name: (by_rating[name] - before[name]) / RATINGS[int(name[2:])] for name in by_rating}
+    assert set(added) == {"sg2", "sg3", "sg4", "sg5"}
+    assert max(added.values()) == pytest.approx(min(added.values()), abs=1e-7)
+    alone = at(five, ("sg1",), SharingRule.SLACK)
+    assert [name for name in alone if abs(alone[name] - before[name]) > 1e-6] == ["sg5"]
+    folder = tmp_path / "case"
+    folder.mkdir()
+    assert at(five_machines(folder, flow='sharing = "slack"'), ("sg1",)) == alone
+
+
+def test_nobody_is_beyond_a_limit_while_others_have_room(tmp_path):
+    """sg1 has 0.76 of 0.9 pu before; its share alone would be 1.0 pu."""
+    found = at(five_machines(tmp_path, highest=0.9), ("sg3",))
+    loading = {name: power / RATINGS[int(name[2:])] for name, power in found.items()}
+    assert loading["sg1"] == pytest.approx(0.899)
+    assert all(value <= 0.899 + 1e-9 for name, value in loading.items() if name != "sg4")
+    (_, item) = screened(five_machines(tmp_path, highest=0.9), tmp_path, "sg3")
+    assert item.record.status is Status.COMPUTED
+
+
+def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
+    (_, lost, fine) = screened(five, tmp_path, "sg1+sg2,sg2")
+    assert (lost.record.status, fine.record.status) == (Status.STEADY_STATE, Status.COMPUTED)
+    assert re.search(r"sg3 would need 122 % of its 263.8 MW: 320 MW more cannot be shared", lost.record.text)
+
+
+def test_what_hangs_on_a_branch_is_lost_with_it(five, tmp_path):
+    items = {item.outage.name: item for item in screened(five, tmp_path, "sg5,line_15_5,load_16,line_13_16,line_11_12")}
+    assert all(item.record.status is Status.COMPUTED for item in items.values())
+    assert critical(items["line_15_5"]) == pytest.approx(critical(items["sg5"]), rel=1e-6)
+    # Beside its load, the charging of the dead line, 2 Mvar, is gone too.
+    assert critical(items["line_13_16"]) == pytest.approx(critical(items["load_16"]), rel=1e-3)
+    assert items["line_13_16"].record.text.startswith("30 MW of load lost; shared: ")
+    assert not items["line_11_12"].record.text
+
+
+def test_nothing_remains_without_a_unit(five):
+    (prepared,) = five.prepare(["base"])
+    elements = Elements.of(prepared)
+    assert what_remains(prepared, elements, list(elements.units)).none
+    both = what_remains(prepared, elements, ["line_15_11", "line_14_15"])
+    # The slack's unit may feed 120 MW alone: an island, and the smaller side is what is cut off.
+    assert both.none == "bus_5, bus_15 cut off, with 120 MW of load and the units sg5, which may go on alone"
+    plant = what_remains(prepared, elements, ["line_15_5"])
+    assert (plant.units, plant.loads, plant.ties, plant.dead) == (("sg5",), (), ("line_15_5",), ("bus_5",))
+
+
+def test_a_question_besides_does_not_change_the_kind(five, tmp_path):
+    """Loads that no line can carry have no power flow, whatever else is questioned."""
+    text = "name,load,sg1.machine.H,sg1.machine.X_d\nheavy,9,,\nasked,9,500,\n"
+    heavy, asked = screened(five, tmp_path, None, text)
+    assert heavy.record.status is asked.record.status is Status.POWER_FLOW
+    assert "questioned besides" in asked.record.text
+
+
+def test_without_points_the_case_itself_is_the_only_one(gfor, five, tmp_path):
+    plan = plan_screening(five, None, "sg2", "base")
+    assert [(point.name, point.values, point.out) for point in plan.points] == [("case", {}, ())]
+    code, _, error = gfor("screen", five.path, "--outages", "sg2", "--damping", "0.2", "--out", tmp_path / "out")
+    assert code == 2
+    assert "'0.2' is read in percent; write 20" in error
+    code, out, _ = gfor(
+        "screen", five.path, "--outages", "sg2", "--sharing", "slack", "--out", tmp_path / "out", "--json"
+    )
+    assert code == 0
+    found = json.loads(out)
+    assert (found["points"], found["outages"], found["counts"]) == (1, 1, {"computed": 2})
+    with (tmp_path / "out" / "items.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["point", "outage", "hours", "status", "stable", "counted", "least_damping_percent",
+                             "frequency_hz", "why"]  # fmt: skip
+    assert rows[1]["why"].startswith("sg2 is lost, which fed 130 MW; shared: sg5 +")
