@@ -21,7 +21,7 @@ from orchestrator.points.failure import Failure
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.preparation import failure
-from orchestrator.screening.record import Status
+from orchestrator.screening.record import Item, Status
 from orchestrator.screening.study import plan_screening, run_screening
 
 ROOT = Path(__file__).parents[2]
@@ -47,11 +47,21 @@ TEXT = "the power flow asks it for more, no steady state, parameters cannot be u
     ],
 )
 def test_a_status_follows_from_the_kind_alone(error, status, lasting):
-    found, text, lasts = failure(error)
+    found, text, lasts = failure(error, Item(0, 0, {"sg1.P_0": 1.3, "sg2.H": 3.0}, ()))
     assert (found, lasts) == (status, lasting)
     assert "the power flow asks it for more" in text
     kept = Failure.of(error)
     assert Failure.restored({"kind": str(kept.kind), "text": kept.text, "lasting": kept.lasting}) == kept
+
+
+def test_a_component_that_refuses_its_own_values_has_no_other_operating_point():
+    """The operating point is to blame only where nothing else of the component was set."""
+    error = StartError("c", Problem("c", TEXT, ErrorKind.START), "sg1")
+    own, others = ({"sg1.governor.T_3": 0.0, "sg1.P_0": 0.5}, {"sg2.governor.T_3": 0.0, "sg1.P_0": 0.5})
+    assert [failure(error, Item(0, 0, values, ()))[0] for values in (own, others)] == [
+        Status.VALUES,
+        Status.STEADY_STATE,
+    ]
 
 
 def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
