@@ -20,6 +20,8 @@ from tests.benchmarks.mutations import (
     run_all,
 )
 
+pytestmark = [pytest.mark.slow, pytest.mark.nightly]
+
 MUTATIONS = read_list()
 
 

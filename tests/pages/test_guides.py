@@ -78,6 +78,7 @@ def change(block, path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("guide", IN_A_CHECKOUT)
 def test_a_guide_for_contributors_works_as_written(guide, tmp_path, environment):
     checkout = tmp_path / "checkout"

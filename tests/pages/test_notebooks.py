@@ -89,6 +89,7 @@ def test_every_cell_that_draws_shows_its_picture(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name_of)
 def test_a_notebook_computes_what_it_shows_and_says(path, tmp_path):
     kept = nbformat.read(path, as_version=4)
