@@ -37,6 +37,8 @@ def checked(path, binding=None, only=()):
         ("base_of_own_rating", "ratings"),
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
+        ("refused_in_the_run", "tunables"),
+        ("ignored_in_the_run", "tunables"),
         ("hidden_state", "state"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),

@@ -17,10 +17,11 @@ from orchestrator.acceptance.checks import (
     signs,
     state,
     timing,
+    tuning,
 )
 
 MODULES = (
-    *(file, loading, running, initialisation, instances, state, sampling, timing),
+    *(file, loading, running, initialisation, instances, state, sampling, timing, tuning),
     *(port, points, signs, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
@@ -29,7 +30,8 @@ ORDER = (
     "fmi_validity", "units", "declared_starts", "declared_dependencies", "loads",
     "runs", "start_values", "initial_outputs", "call_order", "independence", "repeatability", "reading",
     "reset", "reinstantiation",
-    "state", "settable_states", "state_size", "feedthrough", "sample_time", "delay", "step_invariance", "internal_step",
+    "state", "settable_states", "state_size", "tunables", "feedthrough", "sample_time", "delay", "step_invariance",
+    "internal_step",
     "steady_state", "rated_frequency", "power_balance", "operating_points", "ratings", "signs", "limits", "after_dips",
     "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip

@@ -5,6 +5,7 @@ from typing import TypeVar
 
 from orchestrator.acceptance.checks.subject import Running, Subject
 from orchestrator.errors import ComponentError
+from orchestrator.fmi.description import VariableInfo
 
 Look = TypeVar("Look")
 
@@ -13,7 +14,7 @@ Setting = Mapping[str, float | bool]
 
 
 def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | bool]:
-    """Other values of the tunable parameters, within their bounds.
+    """Other values of the tunable parameters, within their bounds; flags and counts move by 1, where bounds allow that.
 
     Parameters
     ----------
@@ -24,13 +25,18 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
     for name, info in subject.description.variables.items():
         if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
             continue
-        if info.type == "Real":
-            value = info.start_number
+        value = info.start_number
+        if info.type == "Real" and _may_be_a_flag(info):
+            low, high = info.minimum, info.maximum
+            if low is not None and high is not None and value + 1 <= high:
+                found[name] = value + 1
+            elif low is not None and high is not None and value - 1 >= low:
+                found[name] = value - 1
+        elif info.type == "Real":
             moved = value * 1.1 if value else 0.1
             if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
                 found[name] = moved
         elif info.type == "Integer" and info.minimum is not None and info.maximum is not None:
-            value = info.start_number
             others = [other for other in (value - 1, value + 1) if info.minimum <= other <= info.maximum]
             if others and switches:
                 found[name] = others[-1]
@@ -38,6 +44,13 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
             found[name] = not _switched_on(subject, name)
     return found
 
+
+def _may_be_a_flag(info: VariableInfo) -> bool:
+    """Whether a Real may stand for a flag, a mode or a count, which has no values between: a whole number, no unit."""
+    return info.start_number == round(info.start_number) and (info.unit or "").strip().lower() in _NO_UNIT
+
+
+_NO_UNIT = ("", "1", "-", "n/a", "na", "none", "unitless", "flag", "bool", "mode")
 
 _MOST_SWITCHES = 3
 """Switches that are tried one by one; where there are more, all together as well."""

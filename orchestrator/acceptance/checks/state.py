@@ -54,7 +54,7 @@ def state(subject: Subject) -> CheckResult:
             "state",
             "hidden state",
             f"{subject.watched[place]} differs by {worst:.3g} of its range after "
-            f"fmi2SetFMUstate and {steps} equal steps{where}",
+            f"fmi2SetFMUstate and {steps} equal steps{where}{_which(subject)}",
             difference=worst,
         )
     least = _CLEAR if worst <= _EXACT else _RESTARTED
@@ -73,6 +73,24 @@ def state(subject: Subject) -> CheckResult:
         )
     says = f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g}){in_events}"
     return passed("state", says, difference=worst)
+
+
+def _which(subject: Subject) -> str:
+    """The parameters without whose movement, before the state was saved and back after it, everything is restored."""
+
+    def restored(moved: Setting) -> bool:
+        try:
+            return _brought_back(subject, {}, moved)[1] <= _CLEAR
+        except ComponentError:
+            return True
+
+    every = elsewhere(subject)
+    if not every or not restored({}):
+        return ""
+    alone = [name for name in every if not restored({name: every[name]})] or list(every)
+    starts = subject.description.variables
+    moves = [f"{name} from {starts[name].start} to {every[name]:g}" for name in alone[:3]]
+    return f"; only where it was moved before: {', '.join(moves)}{' and more' if len(alone) > 3 else ''}"
 
 
 def _in_events(subject: Subject, setting: Setting) -> tuple[float, str]:

@@ -333,6 +333,8 @@ def points_and_ratings():
         one("base_of_own_rating", "base of another rating", "ratings", FAULT_BASE_OF_START=1),
         one("limit_of_own_rating", "limit of another rating", "ratings", FAULT_BASE_OF_LIMIT=1),
         one("droop_while_charging", "uneven droop", "signs", FAULT_CHARGING_DROOP=4),
+        one("refused_in_the_run", "parameter not taken", "tunables", FAULT_REFUSES_IN_RUN=1),
+        one("ignored_in_the_run", "parameter not taken", "tunables", FAULT_IGNORES_IN_RUN=1),
         one("resonance", "keeps moving", "signs", FAULT_RINGS=7),
     ]
 
