@@ -57,6 +57,8 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f"{source}: it is not a TOML file: {error}") from error
+    except ValueError as error:  # Python's own words: it converts at most 4,300 digits
+        raise InputError(f"{source}: a whole number in it has too many digits to be read; shorten it") from error
     except RecursionError as error:
         raise InputError(f"{source}: its brackets nest too deeply to be read; {subject} nests at most five") from error
 

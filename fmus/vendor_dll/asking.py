@@ -1,7 +1,6 @@
 """Ask the process that reads a DLL, and tell how it ended: by the DLL's own doing or for want of time."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.temporary import own_folder, remove
+from fmus.vendor_dll.answer_file import ForeignAnswerError, read_answer, read_plain_file
 
 BEFORE_IT_STARTS = 300.0
 """For Python, and Wine, to start, until the DLL's own code runs [s]."""
@@ -84,14 +84,30 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
             used = 0.0 if in_time else _processor_time(process.pid)
         finally:
             _end(process)
-        doing = note.read_text(encoding="utf-8").strip() if note.exists() else ""
+        doing = _doing(note)
         if not in_time:
             return _out_of_time(doing, longest, used)
-        if answer.exists():
-            return Answer(json.loads(answer.read_text(encoding="utf-8")))
+        if os.path.lexists(answer):
+            try:
+                return Answer(read_answer(answer))
+            except ForeignAnswerError as error:
+                return Answer(
+                    end=f"gives no answer of its form ({error})",
+                    why="the DLL's code wrote where a DLL has no business; do not run this file",
+                )
         return _ended(doing, process.returncode)
     finally:
         remove(folder)
+
+
+def _doing(note: Path) -> str:
+    """What the DLL is doing by the note; its code can write there too."""
+    if not os.path.lexists(note):
+        return ""
+    try:
+        return "".join(filter(str.isprintable, read_plain_file(note, 1000).decode("utf-8", "replace"))).strip()
+    except ForeignAnswerError:
+        return "its code runs"
 
 
 def _wait(process: "subprocess.Popen[bytes]", note: Path, longest: float) -> bool:

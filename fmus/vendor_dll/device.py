@@ -146,7 +146,7 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
         raise DeviceFileError(
             f"{path}: cannot be read: {error.strerror}; give a device's file, which lays a circuit around a DLL"
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise DeviceFileError(f"{path}: it is not TOML: {error}") from error
     if unknown := sorted(table.keys() - _KEYS):
         raise DeviceFileError(f"{path}: {unknown[0]!r} is no key here; there are: {', '.join(sorted(_KEYS))}")

@@ -10,15 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fmus.vendor_dll.answer_file import MOST_TEXT, TEXTS
 from fmus.vendor_dll.asking import note_beside
 from fmus.vendor_dll.interface import CALLS, DATA_TYPES, DllInterface, DllParameter, Number, Signal
 from fmus.vendor_dll.memory import Library, LocalLibrary, Note
 from fmus.vendor_dll.state_trial import Trial, tried
 
-_TEXTS = (
-    *("ModelName", "ModelVersion", "ModelDescription", "GeneralInformation", "ModelCreated", "ModelCreator"),
-    *("ModelLastModifiedDate", "ModelLastModifiedBy", "ModelModifiedComment", "ModelModifiedHistory"),
-)
 _MOST = 100_000
 """More signals or parameters than this are taken for a structure of another layout."""
 
@@ -59,7 +56,7 @@ class _Parameter(c.Structure):
 class _ModelInfo(c.Structure):
     _fields_ = (
         ("interface_version", c.c_uint8 * 4),
-        *((name, c.c_void_p) for name in _TEXTS),
+        *((name, c.c_void_p) for name in TEXTS),
         ("sample_time", c.c_double),
         ("mode", c.c_uint8),
         *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
@@ -84,7 +81,10 @@ def read_interface(library: Library) -> DllInterface:
         raise ValueError("Model_GetInfo returns no model information")
 
     def text(address: int | None) -> str:
-        return library.text(address).decode("utf-8", "replace").strip()
+        found = library.text(address)
+        if len(found) > MOST_TEXT:
+            raise ValueError(f"it declares a text of {len(found)} bytes; at most {MOST_TEXT} are read")
+        return found.decode("utf-8", "replace").strip()
 
     def rows(kind: type[_Row], address: int | None, count: int) -> list[_Row]:
         size = c.sizeof(kind)
@@ -97,7 +97,7 @@ def read_interface(library: Library) -> DllInterface:
                 f"Model_GetInfo tells {getattr(info, name)} {name[2:]}; its structure is of another layout"
             )
     return DllInterface(
-        texts={name: text(getattr(info, name)) for name in _TEXTS},
+        texts={name: text(getattr(info, name)) for name in TEXTS},
         interface_version=tuple(info.interface_version),
         sample_time=info.sample_time,
         mode=info.mode,

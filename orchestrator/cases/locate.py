@@ -43,7 +43,7 @@ def _unquoted(text: str) -> str:
     """A key in double quotes without them, its escapes resolved; the text itself where that cannot be done."""
     try:
         return str(tomllib.loads(f"key = {text}")["key"]) if text else ""
-    except tomllib.TOMLDecodeError:
+    except ValueError:
         return text
 
 

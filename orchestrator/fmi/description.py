@@ -317,7 +317,7 @@ def _root(path: Path, text: bytes) -> ElementTree.Element:
     """What the file says, parsed once: in a large network that takes longer than all else."""
     try:
         return ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
         raise FmuFileError(f"{path}: modelDescription.xml is not XML: {error}; export it again") from error
 
 

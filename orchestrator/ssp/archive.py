@@ -83,7 +83,10 @@ class SspArchive:
         """
         text = self.read(member)
         check_xml(self.path, member, text)
-        return ElementTree.fromstring(text)
+        try:
+            return ElementTree.fromstring(text)
+        except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
+            raise InputError(f"{self.path}: {member} is not XML: {error}; export it again") from error
 
     def unpack(self, member: str, folder: Path) -> Path:
         """Copy a member into the cache, under its own path in a folder there; an intact copy stays.

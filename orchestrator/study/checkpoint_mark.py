@@ -67,7 +67,7 @@ def _read(text: str) -> Any:
     """What a case file says, without its comments."""
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:  # nothing that was run; a file that somebody damaged
+    except (ValueError, RecursionError):  # nothing that was run; a file that somebody damaged
         return text
 
 

@@ -1,10 +1,15 @@
 """How the process that reads a DLL ends: the DLL's own doing lasts as a verdict, want of time does not."""
 
+import contextlib
+import json
+
 import pytest
 
-from fmus.vendor_dll import asking
+from fmus.vendor_dll import answer_file, asking
 from fmus.vendor_dll import fmu as dll_module
 from fmus.vendor_dll.fmu import DllError, read_dll
+from fmus.vendor_dll.interface import DllInterface
+from fmus.vendor_dll.state_trial import Trial
 from orchestrator.fmi import vendor_files
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.vendor_files import as_fmu
@@ -68,3 +73,114 @@ def test_a_crash_names_the_function_that_was_called(tmp_path):
     source = lag().replace("{ return &INFO; }", "{ abort(); return &INFO; }")
     with pytest.raises(DllError, match="ends with SIGABRT while Model_GetInfo runs: it crashes there"):
         read_dll(compiled(source, tmp_path))
+
+
+# -- answers that the DLL's code writes --------------------------------------------------------------
+
+FORGES = r"""
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+#include <sys/stat.h>
+__attribute__((constructor)) static void forge(void) {
+    static char words[65536];
+    FILE *line = fopen("/proc/self/cmdline", "rb");
+    size_t n = fread(words, 1, sizeof words - 1, line);
+    fclose(line);
+    for (char *word = words; word < words + n; word += strlen(word) + 1)
+        if (strstr(word, "answer.json")) { CONTENT }
+    _exit(0);
+}
+"""
+WRITES = 'FILE *f = fopen(word, "wb"); fputs({}, f); fclose(f);'
+ERROR = r'"{\"error\": \"the model \\u001b[2Jis fine\"}"'
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        WRITES.format('"[1, 2]"'),
+        WRITES.format('"\\xff\\xfe"'),
+        WRITES.format('""'),
+        WRITES.format('"{\\"interface\\": {}, \\"trial\\": 3}"'),
+        'FILE *f = fopen(word, "wb"); for (int k = 0; k < 200000; ++k) putc(91, f); fclose(f);',
+        "mkfifo(word, 0600);",
+        'symlink("/dev/zero", word);',
+        "mkdir(word, 0700);",
+    ],
+)
+def test_an_answer_that_the_dll_wrote_is_refused_in_words(what, tmp_path):
+    library = compiled(lag(head=FORGES.replace("CONTENT", what)), tmp_path)
+    with pytest.raises(DllError, match="gives no answer of its form .* do not run this file"):
+        read_dll(library)
+
+
+def honest():
+    text = dict.fromkeys(answer_file.TEXTS, "a")
+    signal = {"name": "u", "description": "", "unit": "", "data_type": 9, "width": 1}
+    parameter = {"name": "K", "group": "", "description": "", "unit": "", "data_type": 9, "fixed": False,
+                 "default": 1.0, "minimum": None, "maximum": None}  # fmt: skip
+    return {
+        "interface": {"texts": text, "interface_version": [1, 0, 0, 0], "sample_time": 1e-4, "mode": 1,
+                      "inputs": [signal], "outputs": [signal], "parameters": [parameter], "states": [0, 0, 1],
+                      "calls": ["Initialize"]},
+        "trial": {"state": "library", "doubles": [8], "floats": [], "regions": [[0, 64]], "why": "", "passing": False},
+    }  # fmt: skip
+
+
+def test_an_honest_answer_is_taken_as_it_is(tmp_path):
+    path = tmp_path / "answer.json"
+    path.write_text(json.dumps(honest()))
+    assert answer_file.read_answer(path) == honest()
+    read = answer_file.read_answer(path)
+    assert DllInterface.from_json(read["interface"]).as_json()["states"] == (0, 0, 1)
+    assert Trial.from_json(read["trial"]).regions == ((0, 64),)
+
+
+def places(value, path=()):
+    yield path
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in entries:
+        yield from places(inner, (*path, key))
+
+
+@pytest.mark.parametrize("wrong", [[], {}, "9" * 100_001, 10**30, -1, True, ["x"], {"a": 1}, 1.5])
+def test_no_wrong_value_at_any_place_is_a_traceback(wrong, tmp_path):
+    path = tmp_path / "answer.json"
+    for place in places(honest()):
+        if not place:
+            continue
+        content = honest()
+        table = content
+        for key in place[:-1]:
+            table = table[key]
+        table[place[-1]] = wrong
+        path.write_text(json.dumps(content))
+        with contextlib.suppress(answer_file.ForeignAnswerError):
+            read = answer_file.read_answer(path)
+            DllInterface.from_json(read["interface"]).faults()
+            Trial.from_json(read["trial"])
+
+
+def test_no_control_character_of_a_dll_reaches_a_file_or_a_terminal(tmp_path):
+    """A name with ESC made a model description that is no XML: "export it again", of our own file."""
+    source = lag().replace('"lag"', '"l\\x1b[2Ja\\x01g"', 1)
+    assert source != lag()
+    found = read_dll(compiled(source, tmp_path))
+    assert "\x1b" not in json.dumps(found.interface.as_json(), ensure_ascii=False)
+    assert read_description(as_fmu(found.path)).variables
+    library = compiled(lag(head=FORGES.replace("CONTENT", WRITES.format(ERROR))), tmp_path)
+    with pytest.raises(DllError, match="the model \ufffd"):
+        read_dll(library)
+
+
+def test_a_text_that_never_ends_is_told_as_such(tmp_path):
+    """300 MB of a name became "zip bomb", of our own file."""
+    source = lag().replace('"lag"', "endless", 1)
+    head = (
+        "#include <string.h>\nstatic char endless[300000001];\n"
+        "__attribute__((constructor)) static void fill(void) { memset(endless, 97, 300000000); }\n"
+    )
+    with pytest.raises(DllError, match="declares a text of 300000000 bytes; at most 100000"):
+        read_dll(compiled(head + source, tmp_path))
