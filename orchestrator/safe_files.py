@@ -1,6 +1,7 @@
 """Files that are whole or absent: written beside their place, flushed to the disk, and renamed into it."""
 
 import errno
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,6 +11,11 @@ from orchestrator.errors import InputError, ResultsError
 
 PARTIAL = ".part-"
 """Begins the names of files that are not finished, and stands in those of folders that are not."""
+
+
+def file_hash(path: Path | None) -> str | None:
+    """SHA-256 of a file; None for none."""
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def made_folder(path: Path, label: str = "", what: str = "results cannot be written there") -> Path:

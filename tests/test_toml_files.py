@@ -25,6 +25,7 @@ def test_a_file_comes_as_text_and_as_tables(tmp_path):
             b"a = 1\nb = ",
             "it is not a TOML file: Invalid value (at the end of line 2, the last one); write NAME = VALUE",
         ),
+        (b"a = " + 5000 * b"9", "a whole number in it has too many digits to be read; shorten it"),
         (b"\xff\xfe", "it is not a TOML file: 'utf-8' codec can't decode"),
     ],
 )

@@ -46,6 +46,7 @@ from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection, missing
+from orchestrator.safe_files import file_hash
 
 CRASH, _LAST = "crash", 3
 """Fault of a process that dies; how many checks before it are named."""
@@ -123,11 +124,6 @@ FILE_CHECKS = {
     "binding": "Does the binding fit the file?",
 }
 """Checks that run before the FMU does: of the archive and the binding."""
-
-
-def file_hash(path: Path | None) -> str | None:
-    """SHA-256 of a file; None for none."""
-    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def question_of(name: str) -> str:

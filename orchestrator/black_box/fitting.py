@@ -10,7 +10,6 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from fmus.toolchain.extras import require
 from orchestrator.arrays import Complex, Matrix
@@ -127,7 +126,9 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     residues = np.asarray(fitting.residues).reshape(ports, ports, -1)[:p, :m]
     constant = np.asarray(fitting.constant_coeff).reshape(ports, ports)[:p, :m].real
     blocks = _realisation(np.asarray(fitting.poles), residues, float(np.abs(data).max()))
-    A, B, C, _, _ = scipy.signal.cont2discrete((*blocks, constant), H, method="bilinear")
+    from scipy.signal import cont2discrete  # noqa: PLC0415 - it takes a second to import
+
+    A, B, C, _, _ = cont2discrete((*blocks, constant), H, method="bilinear")
     if not len(A) or not np.isfinite(A).all() or np.abs(np.linalg.eigvals(A)).max() >= 1:
         return None
     model = IdentifiedModel(A, B, C, response.feedthrough, H, response.inputs, response.outputs, np.nan)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.figures import certification_json
@@ -18,7 +17,7 @@ from orchestrator.certification.report import page
 from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
 from orchestrator.results.storage import save_netcdf
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import file_hash, write_text
 
 HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
 
@@ -47,6 +46,27 @@ def write_sealed(content: Mapping[str, Any], path: Path) -> None:
     """Write JSON that contains a hash of all its other contents."""
     text = json.dumps({**content, "seal": seal_of(content)}, indent=1, ensure_ascii=False)
     write_text(path, text + "\n")
+
+
+def read_record(file: Path) -> Any:
+    """What a certificate's JSON says.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        If it is not JSON, or a key stands twice in it: readers of such a file differ in what it says.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        content = dict(pairs)
+        if len(content) < len(pairs):
+            names = [name for name, _ in pairs]
+            raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r} stands twice in it")
+        return content
+
+    return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=once)
 
 
 def seal_of(content: Mapping[str, Any]) -> str:

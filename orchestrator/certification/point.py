@@ -14,6 +14,7 @@ from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
+from orchestrator.certification.frequency import bus_frequency
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.points.executor import WorkerLostError
@@ -201,25 +202,3 @@ def _keep_signals(result: PointResult, recorder: Recorder, master: Master, f_n: 
         component, _, variable = name.partition(".")
         known = master.components[component].description.variables if component in master.components else {}
         result.units[name] = known[variable].unit if variable in known else "Hz"
-
-
-def bus_frequency(times: Numbers, v_re: Numbers, v_im: Numbers, f_n: float) -> Numbers:
-    """Frequency of a voltage [Hz]: the turn of its angle over one period of the grid, around each instant.
-
-    Over a whole period the 50 Hz component of an electromagnetic transient drops out.
-
-    Parameters
-    ----------
-    times
-        Evenly spaced [s], shape (n,).
-    v_re, v_im
-        Voltage in the network frame, in any unit, shape (n,).
-    f_n
-        Rated frequency [Hz], at which that frame turns.
-    """
-    angle = np.unwrap(np.angle(v_re + 1j * v_im))
-    half = max(1, round(0.5 / f_n / (times[1] - times[0])))
-    last = len(times) - 1
-    here = np.arange(len(times))
-    before, after = np.maximum(here - half, 0), np.minimum(here + half, last)
-    return np.asarray(f_n + (angle[after] - angle[before]) / (times[after] - times[before]) / (2 * np.pi))

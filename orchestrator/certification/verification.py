@@ -1,6 +1,5 @@
 """Whether a certificate still holds: its hashes, its verdict from its own figures, and its points computed anew."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -10,14 +9,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.arrays import Numbers
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
 from orchestrator.certification.derivation import derived_faults
 from orchestrator.certification.figures import FORMAT
-from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
+from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, read_record, seal_of
 from orchestrator.certification.form import check_form
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
 from orchestrator.certification.rejudgement import rejudge
@@ -25,6 +23,7 @@ from orchestrator.certification.request import same_reactance
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor, WorkerLostError
 from orchestrator.points.key import fingerprint, key_of, reference_to
+from orchestrator.safe_files import file_hash
 
 TOLERANCE = 1e-5
 """Largest difference of a recomputed eigenvalue relative to its size, and of a signal relative to its range. Different
@@ -68,7 +67,7 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
     """
     file = path / JSON if path.is_dir() else path
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = read_record(file)
     except OSError as error:
         raise InputError(
             f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor certify` wrote"

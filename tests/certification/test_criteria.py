@@ -12,8 +12,8 @@ from orchestrator.certification.criteria import (
     neighbouring_modes,
     stability_fault,
 )
+from orchestrator.certification.frequency import bus_frequency
 from orchestrator.certification.judgement import PointVerdict
-from orchestrator.certification.point import bus_frequency
 
 
 def mode(frequency, ratio):

@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 from orchestrator.certification import case_file
-from orchestrator.certification.point import FREQUENCY, POWER, bus_frequency
+from orchestrator.certification.frequency import bus_frequency
+from orchestrator.certification.point import FREQUENCY, POWER
 from orchestrator.cli import main
 from tests.support.bindings import GFOR
 

@@ -56,7 +56,7 @@ def test_all_thirteen_pass_and_a_failed_acceptance_test_is_loud(certified, monke
     def check(fmu, binding, *_):
         return AcceptanceReport(fmu, binding, [passed("archive", "fine"), failed("runs", "crash", "it died")])
 
-    monkeypatch.setattr("orchestrator.certification.acceptance.check_fmu", check)
+    monkeypatch.setattr("orchestrator.acceptance.runner.check_fmu", check)
     code, _, content, page = certified("--check-them")
     assert code == 4
     assert content["verdict"] == "passes"

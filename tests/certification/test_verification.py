@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
+from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.certification import acceptance, verification
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
@@ -18,6 +18,7 @@ from orchestrator.certification.point import POWER
 from orchestrator.certification.request import REACTANCES, CertificationRequest
 from orchestrator.cli import main
 from orchestrator.errors import InputError
+from orchestrator.safe_files import file_hash
 from tests.certification.fabricated import rings
 from tests.certification.test_recomputing import BOUND
 
@@ -354,7 +355,7 @@ def test_a_name_with_a_new_line_is_escaped_in_the_case_file(tmp_path, fmu_path):
 
 def test_a_report_in_which_nothing_was_passed_is_refused(tmp_path, fmu_path):
     fmu = fmu_path("gfor")
-    checks = [{"check": name, "verdict": "not applicable", "fault": ""} for name in acceptance.CHECKS]
+    checks = [{"check": name, "verdict": "not applicable", "fault": ""} for name in CHECKS]
     report = {"tool": acceptance._tool(), "trusted": True, "checks": checks,
               "sha256": {"fmu": file_hash(fmu), "binding": None}}  # fmt: skip
     path = tmp_path / "check.json"

@@ -112,7 +112,7 @@ ERROR = r'"{\"error\": \"the model \\u001b[2Jis fine\"}"'
 )
 def test_an_answer_that_the_dll_wrote_is_refused_in_words(what, tmp_path):
     library = compiled(lag(head=FORGES.replace("CONTENT", what)), tmp_path)
-    with pytest.raises(DllError, match="gives no answer of its form .* do not run this file"):
+    with pytest.raises(DllError, match=r"gives no answer of its form .* do not run this file"):
         read_dll(library)
 
 

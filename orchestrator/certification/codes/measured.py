@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.certification.point import bus_frequency
+from orchestrator.certification.frequency import bus_frequency
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 
 NOTHING, ALIVE, GONE = 5e-3, 0.1, 0.1

@@ -1,13 +1,11 @@
 """Whether a code's certificate still holds: its hashes, and its verdict judged again from its responses."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
@@ -16,17 +14,18 @@ from orchestrator.certification.codes.certificate import departures_of, missing_
 from orchestrator.certification.codes.record import FORMAT, finding_json
 from orchestrator.certification.codes.row import GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
-from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
+from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, read_record, seal_of
 from orchestrator.certification.verification import Verification
 from orchestrator.errors import ErrorKind, InputError
 from orchestrator.points.failure import Failure
+from orchestrator.safe_files import file_hash
 
 
 def read_code_certificate(path: Path) -> tuple[Path, dict[str, Any]] | None:
     """Folder and content of a code's certificate; None where there is none of this form."""
     file = path / JSON if path.is_dir() else path
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = read_record(file)
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -56,6 +55,8 @@ def verify_code(folder: Path, content: dict[str, Any]) -> Verification:
             found.faults.append(f"{name}: it is not the file that was certified: its SHA-256 differs")
         else:
             found.agreed.append(f"{name}: SHA-256")
+    found.faults += [f"{name}: the record does not know it; take it away, or certify anew"
+                     for name in _strangers(folder, content)]  # fmt: skip
     page = folder / HTML
     if page.is_file() and figures_hash(content) not in page.read_text(encoding="utf-8", errors="replace"):
         found.faults.append(f"{HTML}: it was made of other figures than those of {JSON}")
@@ -66,6 +67,13 @@ def verify_code(folder: Path, content: dict[str, Any]) -> Verification:
     found.faults += faults
     found.agreed += [] if faults else ["every row and the verdict, judged again from the responses"]
     return found
+
+
+def _strangers(folder: Path, content: dict[str, Any]) -> list[str]:
+    """Files of rows that neither the record has nor any code, as those of an earlier certificate of another code."""
+    codes = [*CODES.values(), code_for(content["code"], content["declared"])]
+    known = {*content["files"], *(case_name(row.name) for code in codes for row in code.rows)}
+    return sorted(path.name for path in folder.glob("row_*.toml") if path.name not in known)
 
 
 def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:

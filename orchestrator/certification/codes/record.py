@@ -7,7 +7,6 @@ from typing import Any
 
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.codes.bench_case import case_name
@@ -20,7 +19,7 @@ from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, table
 from orchestrator.results.storage import save_netcdf
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import file_hash, write_text
 
 FORMAT = "code-2"
 """Form of the JSON of a code's certificate."""

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.acceptance.runner import file_hash
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.bench_point import BenchResult
@@ -16,7 +15,10 @@ from orchestrator.certification.codes.record import save_certificate
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, seal_of
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.verification import read_certificate
+from orchestrator.errors import InputError
 from orchestrator.results.storage import save_netcdf
+from orchestrator.safe_files import file_hash
 
 CODE = CODES["fingrid"]
 
@@ -109,3 +111,23 @@ def test_a_count_or_a_part_that_is_not_of_the_rows_is_named(fails, key, value, w
     _, content = read_code_certificate(fails)
     content[key] = value
     assert words in sealed(fails, content)
+
+
+def test_a_key_that_stands_twice_is_refused(fails):
+    """Readers that take the first of two verdicts read a pass."""
+    path = fails / JSON
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('"verdict":', '"verdict": "passes",\n "verdict":', 1), encoding="utf-8")
+    assert read_code_certificate(fails) is None
+    with pytest.raises(InputError, match="'verdict' stands twice"):
+        read_certificate(fails)
+
+
+def test_a_row_file_that_the_record_does_not_know_is_told(fails):
+    other = next(row.name for row in CODES["ercot"].rows)
+    (fails / case_name(other)).write_text("", encoding="utf-8")  # of an earlier certificate
+    assert verify_code(*read_code_certificate(fails)).holds
+    (fails / "row_more.toml").write_text("", encoding="utf-8")
+    assert verify_code(*read_code_certificate(fails)).faults == [
+        "row_more.toml: the record does not know it; take it away, or certify anew"
+    ]
