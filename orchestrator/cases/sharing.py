@@ -63,10 +63,11 @@ def droop_gain(plan: ComponentPlan) -> float:
         return gain
     if gain := _number(plan, "governor.K"):
         return gain * _fractions(plan)
-    for name in ("governor.R", "droop.R_f", "frequency_droop.R_f", "mp"):
+    following = "frequency_droop.R_f" if _number(plan, "frequency_droop.enabled") else ""
+    for name in ("governor.R", "droop.R_f", following, "mp"):
         if (droop := _number(plan, name)) is not None:
             if not droop:
-                return 0.0 if name == "frequency_droop.R_f" else _ISOCHRONOUS
+                return _ISOCHRONOUS
             return (_number(plan, "governor.A_t") or 1.0) / droop
     return 0.0
 

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -69,6 +70,22 @@ def test_a_units_droop_and_limits_are_those_of_its_model(five):
     )
     assert power_limits(plans["sg1"]) == pytest.approx((0.001, 1.199))
     assert power_limits(plans["sg4"])[1] > 1.1  # without a governor nothing but the port limits it
+
+
+def plan_of(**values):
+    values = {name.replace("__", "."): value for name, value in values.items()}
+    return SimpleNamespace(description=SimpleNamespace(variables=values), number=lambda name: float(values[name]))
+
+
+def test_a_droop_counts_where_it_acts():
+    """A grid-following converter has a droop that is off by default; a valve's power goes through its fractions."""
+    assert droop_gain(plan_of(frequency_droop__R_f=0.05, frequency_droop__enabled=False)) == 0
+    assert droop_gain(plan_of(frequency_droop__R_f=0.05, frequency_droop__enabled=True)) == 20
+    assert droop_gain(plan_of(governor__K=20, governor__K_1=0.3, governor__K_3=0.7)) == 20
+    assert droop_gain(plan_of(governor__R=0.05, governor__A_t=1.2)) == pytest.approx(24)
+    assert droop_gain(plan_of(governor__inverse_R=25)) == 25
+    assert droop_gain(plan_of(droop__R_f=0)) > 1e5
+    assert droop_gain(plan_of(S_n=100)) == 0
 
 
 @pytest.mark.parametrize("lost", [("sg1",), ("sg5",), ("line_15_5",)])
