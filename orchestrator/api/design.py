@@ -14,6 +14,7 @@ from orchestrator.api.values import text_or_none
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.parameter_files import ParameterFile, parameter_file_text
 from orchestrator.cases.schema import Value
+from orchestrator.coordinated_design.one_point import search_settings
 from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, PodDesign, StageReport, design_pod
 from orchestrator.pod_design.files import design_json, parameters_of, provenance
@@ -185,7 +186,7 @@ def design_controller(
     request = DesignRequest(
         controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wishes
     )
-    return ControllerDesign(design_pod(file, request, report, store))
+    return ControllerDesign(design_pod(file, request, report, store, search_settings))
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:

@@ -11,6 +11,7 @@ import numpy as np
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.cases.case import Case
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
@@ -167,14 +168,15 @@ def plan_points_design(
     clash = {key for item in items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
     if clash:
         raise InputError(f"{points}: the column for {min(clash)} sets what is to be designed; leave it out")
-    naming = partial(_naming, case) if request.modes else None
+    naming = partial(naming_of, case) if request.modes else None
     aim = Aim(request.modes, request.least_damping, naming)
     return PointsDesignPlan(case=case, request=request, prepared=screened.prepared, groups=groups,
                             candidates=candidates, points=screened.points, outages=screened.outages, items=items,
                             off=off, aim=aim)  # fmt: skip
 
 
-def _naming(case: Case, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
+def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
+    """The modes that a case names, from the names of the states and the candidates."""
     return modes_named(case, names, modes).named
 
 

@@ -129,6 +129,17 @@ class PodLoop:
         self._linearize_converters(self._continuous_blocks, setting)
         return continuous(self._continuous_blocks)
 
+    def opened(self) -> tuple[Master, LinearModel, Blocks]:
+        """The running system with the controllers off, its continuous model, and the blocks of which that is made.
+
+        Raises
+        ------
+        AnalysisError
+            If a component does not give its derivatives.
+        """
+        model = self._continuous_model(PodSetting(0.0, NO_COMPENSATION))
+        return self._master, model, self._continuous_blocks
+
     @cached_property
     def _continuous_blocks(self) -> Blocks:
         return Blocks(self._master, without_step=True)

@@ -14,6 +14,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_rati
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import Case
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -79,6 +80,13 @@ class DesignRequest:
     overrides: Mapping[str, Value] = field(default_factory=dict)
     parameters: Sequence[ParameterFile] = ()
     step_size: float | None = None
+
+
+SearchOnLinearModels = Callable[
+    [CaseDefinition, DesignRequest, Target, str, PodLoop, float], Sequence[tuple[str, PodSetting]]
+]
+"""From case, request, target, the mode's name, the running system and the mode's frequency [rad/s]: the best settings
+with where they come from."""
 
 
 @dataclass(frozen=True)
@@ -192,6 +200,7 @@ def design_pod(
     request: DesignRequest,
     report: StageReport = lambda text: None,
     store: PointStore | None = None,
+    search: SearchOnLinearModels | None = None,
 ) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
@@ -203,6 +212,8 @@ def design_pod(
         Called with the name of each stage when the stage begins.
     store
         Keeps figures on the way as soon as they are there; those that are there already are not computed again.
+    search
+        Gives a refinement settings to try; by default it surveys all itself.
 
     Raises
     ------
@@ -256,7 +267,7 @@ def design_pod(
                 )
             off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
             start = _Start(
-                case.name, request, target, prepared, name, off, before.without(before.named), naming, examined
+                case.name, request, target, prepared, name, off, before.without(before.named), naming, examined, search
             )
             return _design(start, loop, report)
 
@@ -285,6 +296,7 @@ class _Start:
     before: Surroundings
     naming: Naming
     examined: Examination
+    search: SearchOnLinearModels | None
 
 
 def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
@@ -296,10 +308,19 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     def around(placed: Placed) -> Surroundings:
         return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
 
+    judged: dict[PodSetting, Judgement] = {}
+
     def judge(placed: Placed) -> Judgement:
-        after = around(placed)
-        damping = damping_ratio(after.counting(placed.eigenvalue))
-        return Judgement(damping, breach(before, after, request.least_damping))
+        if placed.setting not in judged:
+            after = around(placed)
+            damping = damping_ratio(after.counting(placed.eigenvalue))
+            least = min([damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)])
+            judged[placed.setting] = Judgement(damping, breach(before, after, request.least_damping), least)
+        return judged[placed.setting]
+
+    def settings() -> Sequence[tuple[str, PodSetting]]:
+        assert start.search is not None
+        return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
 
     report("sensitivity of the mode")
     bare = loop.place(off, request.delta_gain)
@@ -316,8 +337,9 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     if request.refine:
         report("refinement")
         refinement = refine(
-            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others]
-        )
+            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others],
+            settings if start.search else None, evenly=request.mode is None,
+        )  # fmt: skip
         final = refinement.chosen or designed
     after, examined = around(final), loop.examine(final.setting)
     margins = None

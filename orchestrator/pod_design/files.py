@@ -1,6 +1,7 @@
 """A POD design as JSON, and as a parameter file's values and comments."""
 
 from collections.abc import Mapping
+from itertools import zip_longest
 from typing import Any
 
 from orchestrator.analysis.modes import Mode, damping_ratio
@@ -128,6 +129,9 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
     def placed(p: Placed) -> dict[str, Any]:
         return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio}
 
+    def with_least(p: Placed, least: float | None) -> dict[str, Any]:
+        return placed(p) | {"least_damping_ratio": least}
+
     def filters(f: LeadLag) -> dict[str, float]:
         return {"T_S1": f.T_S1, "T_S2": f.T_S2}
 
@@ -139,8 +143,8 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
             {
                 "lead_lag": s.why,
                 **filters(s.filters),
-                "points": [placed(p) for p in s.points],
-                "chosen": placed(s.chosen),
+                "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
+                "chosen": with_least(s.chosen, s.chosen_least),
                 "unstable_gains": list(s.unstable),
             }
             for s in refinement.sweeps

@@ -119,11 +119,6 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     return weakest, fastest_growth(values, step_map=model.step_size is not None)
 
 
-def is_unstable(model: LinearModel) -> bool:
-    """Whether an eigenvalue grows, at any frequency."""
-    return extremes(model)[1] is not None
-
-
 def guarded(values: Vector) -> Vector:
     """The eigenvalues [rad/s] in the guarded range of frequencies."""
     hertz = values.imag / (2 * np.pi)

@@ -6,14 +6,15 @@ sensitivity that it has there. Where that does not do either, all settings are s
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
 
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
-from orchestrator.pod_design.closed_loop import Placed, PodLoop
-from orchestrator.pod_design.guard import is_unstable
+from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
+from orchestrator.pod_design.guard import extremes
 from orchestrator.pod_design.lead_lag import (
     LARGEST_TURN,
     LeadLag,
@@ -28,13 +29,19 @@ from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
 
 @dataclass(frozen=True)
 class Judgement:
-    """The judgement on a setting: the damping ratio that counts, and its prohibited effect on other modes."""
+    """The judgement on a setting: the damping ratio that counts, its prohibited effect on other modes, and the least
+    damping ratio of all modes from 0.1 to 2 Hz.
+    """
 
     damping: float
     broken: str | None
+    least: float | None = None
 
 
 Judge = Callable[[Placed], Judgement]
+
+SearchSettings = Callable[[], Sequence[tuple[str, PodSetting]]]
+"""Gives settings to try, each with where it comes from; raises AnalysisError where it cannot search."""
 
 _GAINS = 9
 _TURN = 15.0
@@ -64,6 +71,10 @@ class GainSweep:
     unstable
         The gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which
         are not examined.
+    least
+        Least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems.
+    chosen_least
+        The same with ``chosen``; None where it is not known.
     """
 
     why: str
@@ -71,6 +82,8 @@ class GainSweep:
     points: tuple[Placed, ...]
     chosen: Placed
     unstable: tuple[float, ...] = ()
+    least: tuple[float, ...] = ()
+    chosen_least: float | None = None
 
 
 @dataclass
@@ -85,23 +98,21 @@ class Refinement:
         Damping ratio of ``chosen`` that counts.
     met
         Whether ``chosen`` has the required damping.
+    even
+        The setting with the best least damping of all modes; None where it is not asked for.
     """
 
     sweeps: list[GainSweep] = field(default_factory=list)
     chosen: Placed | None = None
     score: float = -1.0
     met: bool = False
+    even: Placed | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
     def best(self) -> Placed:
         """The best damping of all tried settings, whatever their effect on other modes."""
         return max((s.chosen for s in self.sweeps), key=lambda p: p.damping_ratio)
-
-    @property
-    def highest_swept(self) -> Placed:
-        """The best damping at any gain of any sweep."""
-        return max((p for s in self.sweeps for p in (*s.points, s.chosen)), key=lambda p: p.damping_ratio)
 
 
 def refine(
@@ -112,6 +123,9 @@ def refine(
     bounds: tuple[float, float],
     judge: Judge,
     others: Sequence[complex],
+    search: SearchSettings | None = None,
+    *,
+    evenly: bool = False,
 ) -> Refinement:
     """Search gain and lead/lag on the closed loop.
 
@@ -131,20 +145,33 @@ def refine(
         Judges a setting by all modes of the system.
     others
         The other modes without the controller [rad/s].
+    search
+        Gives settings where nothing near the design meets the requirement; by default a survey does.
+    evenly
+        Whether, where no setting meets the requirement, that with the best least damping of all modes is chosen.
     """
     result = Refinement()
+    even = -1.0
     near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
-    for why, candidate, gain in chain(near, _surveyed(loop, result, off, others, filters.N_S, bounds)):
+    far = _surveyed(loop, result, off, others, filters.N_S, bounds) if search is None else _searched(result, search)
+    for why, candidate, gain in chain(near, far):
         try:
             found = sweep(loop, off, candidate, required, bounds, why, gain)
         except AnalysisError as error:
             result.notes.append(f"{why}: {error}")
             continue
+        found = replace(found, chosen_least=judge(found.chosen).least)
         result.sweeps.append(found)
+        for own in (point for point in found.points if point.setting.gain == gain):
+            least = judge(own).least
+            if evenly and least is not None and least > even and judge(own).broken is None:
+                even, result.even = least, own
         allowed = _guarded(loop, found, judge, result.notes)
         if allowed is None:
             continue
-        damping = judge(allowed).damping
+        damping, least = judge(allowed).damping, judge(allowed).least
+        if evenly and least is not None and least > even:
+            even, result.even = least, allowed
         if damping < allowed.damping_ratio:
             result.notes.append(
                 f"{why}: at a gain of {allowed.setting.gain:.4g} the target trades places with another mode, which "
@@ -155,6 +182,8 @@ def refine(
         if damping >= required - _TOLERANCE:
             result.met = True
             break
+    if not result.met and result.even is not None:
+        result.chosen, result.score = result.even, judge(result.even).damping
     return result
 
 
@@ -203,17 +232,19 @@ def sweep(
         chosen = _crossing(loop, points[above - 1], points[above], required)
     else:
         chosen = _peak(loop, points)
-    return GainSweep(why, filters, tuple(points), chosen, _unstable(loop, points))
+    unstable, least = _of_all_modes(loop, points)
+    return GainSweep(why, filters, tuple(points), chosen, unstable, least)
 
 
-def _unstable(loop: PodLoop, points: Sequence[Placed]) -> tuple[float, ...]:
-    """The gains with which the system is unstable; empty for a system with more states than are surveyed."""
-    models = (loop.model(p.setting) for p in points)
-    return tuple(
-        p.setting.gain
-        for p, model in zip(points, models, strict=True)
-        if len(model.names) <= MOST_STATES and is_unstable(model)
-    )
+def _of_all_modes(loop: PodLoop, points: Sequence[Placed]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The gains with which the system is unstable, and the least damping ratio of all modes from 0.1 to 2 Hz at each;
+    empty for a system with more states than are surveyed.
+    """
+    if len(loop.model(points[0].setting).names) > MOST_STATES:
+        return (), ()
+    found = [extremes(loop.model(point.setting)) for point in points]
+    unstable = [p.setting.gain for p, (_, growing) in zip(points, found, strict=True) if growing is not None]
+    return tuple(unstable), tuple(damping_ratio(weakest) for weakest, _ in found)
 
 
 def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Placed:
@@ -292,6 +323,17 @@ def _surveyed(
     )
     for number, setting in enumerate(found.best, start=1):
         yield f"surveyed, {number}", setting.filters, setting.gain
+
+
+def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str, LeadLag, float | None]]:
+    """The settings of a search, which is made only if no other setting has met the requirement."""
+    try:
+        found = search()
+    except AnalysisError as error:
+        result.notes.append(f"search: {error}")
+        return
+    for why, setting in found:
+        yield why, setting.filters, setting.gain
 
 
 def _turned(base: Placed, turn: float) -> LeadLag | None:

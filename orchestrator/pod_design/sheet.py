@@ -108,17 +108,20 @@ def _requirement(d: PodDesign) -> str:
 
 def _refinement(r: Refinement, required: float) -> Table:
     table = _table("Refinement on the closed loop", "Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gains swept [pu]",
-                   "Damping over them [%]", f"Best, or first with {percent(required)}")  # fmt: skip
+                   "Least damping of all modes over them [%]",
+                   f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
     for s in r.sweeps:
         gains = [p.setting.gain for p in s.points]
-        dampings = [f"{100 * p.damping_ratio:.1f}{_MARK * (p.setting.gain in s.unstable)}" for p in s.points]
+        marks = [_MARK * (gain in s.unstable) for gain in gains]
+        dampings = [f"{100 * least:.1f}{mark}" for least, mark in zip(s.least, marks, strict=False)]
         table.add_row(
             s.why,
             f"{s.filters.T_S1:.4f}",
             f"{s.filters.T_S2:.4f}",
             f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-            " ".join(dampings),
+            " ".join(dampings) or "–",
             f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
+            "–" if s.chosen_least is None else percent(s.chosen_least),
         )
     return table
 
@@ -204,15 +207,13 @@ def _out_of_reach(d: PodDesign, r: Refinement) -> str:
     """Why the sweeps show that the requirement is out of reach."""
     if not r.sweeps:
         return "; the refinement could not follow the mode with any setting within the bounds"
-    low, high = d.request.gain_bounds[0], max(s.points[-1].setting.gain for s in r.sweeps)
-    best = r.highest_swept
+    low, high = d.request.gain_bounds
     text = (
-        f"; no setting within the bounds was found that meets it: {len(r.sweeps)} lead/lag settings were swept over "
-        f"gains from {low:g} to {high:g} pu. The best damping of the followed mode at any of them was "
-        f"{percent(best.damping_ratio)}, with {_setting(best)}"
+        f"; no setting with K from {low:g} to {high:g} pu was found that meets it, of {len(r.sweeps)} lead/lag "
+        "settings swept over the gain"
     )
-    if best.damping_ratio > d.final.damping_ratio + 5e-4:
-        text += ", which the limits for the other modes rule out, or the trading of places, as said above"
+    if r.even is not None:
+        text += ". The setting chosen gives the best least damping of all modes that was found"
     if d.final.setting.gain == low > 0:
         text += ". The setting chosen is at the lower bound of the gain: a lower one in --gain-bounds may allow more"
     return text

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LeadLag
 from orchestrator.pod_design.refinement import Judgement, refine
 from orchestrator.pod_design.survey import MOST_STATES
@@ -92,3 +93,21 @@ def test_gains_that_leave_the_system_unstable_are_listed():
     found = refined(plant, required=0.9)
     assert found.sweeps[0].unstable == tuple(p.setting.gain for p in found.sweeps[0].points if p.setting.gain > 30)
     assert found.sweeps[0].unstable
+
+
+@pytest.mark.parametrize("evenly", [True, False])
+def test_where_nothing_meets_it_the_least_of_all_modes_decides_if_no_mode_is_named(evenly):
+    """The gain damps the target and takes from another mode; at 8.33 both have the same."""
+    plant = Plant(modes=(-0.4 + 4j, -1.0 + 8j), slopes=(-0.01 + 0j, 0.004 + 0j))
+
+    def judge(placed):
+        return Judgement(placed.damping_ratio, None, min(-z.real / abs(z) for z in plant.eigenvalues(placed.setting)))
+
+    found = refine(plant, plant.off, NONE, 0.9, (0.0, 100.0), judge, plant.modes[1:],
+                   lambda: [("searched", PodSetting(8.33, NONE))], evenly=evenly)  # fmt: skip
+    assert not found.met
+    assert found.chosen.setting.gain == pytest.approx(8.33 if evenly else 100.0)
+    assert found.score == pytest.approx(found.chosen.damping_ratio)
+    for sweep in found.sweeps:
+        assert sweep.least == pytest.approx([judge(point).least for point in sweep.points])
+        assert sweep.chosen_least == pytest.approx(judge(sweep.chosen).least)

@@ -1,0 +1,44 @@
+"""The search over settings for a design at one operating point, whose system runs already."""
+
+from functools import partial
+
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.coordinated_design.measured_loops import measure
+from orchestrator.coordinated_design.objective import Aim, RatedPoint
+from orchestrator.coordinated_design.search import SettingSearch
+from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
+from orchestrator.coordinated_design.study import naming_of
+from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
+from orchestrator.pod_design.design import DesignRequest
+from orchestrator.pod_design.target import Target
+
+
+def search_settings(
+    case: CaseDefinition, request: DesignRequest, target: Target, mode: str, loop: PodLoop, frequency: float
+) -> list[tuple[str, PodSetting]]:
+    """The best settings for one mode and, where none was named, for all modes from 0.1 to 2 Hz.
+
+    The search is that of a design over operating points, and finds the same.
+
+    Parameters
+    ----------
+    case, request, target, mode
+        What is designed, and the mode's name.
+    loop
+        The running system.
+    frequency
+        The mode's [rad/s], to which the centres of the lead/lag relate.
+    """
+    group = PodGroup(request.controller, target.components, target.key, target.stages)
+    loops = measure(*loop.opened(), group.places)
+    space = SettingSpace([group], request.gain_bounds, frequency)
+    largest = dict.fromkeys(group.places, request.gain_bounds[1])
+    aims = {f"searched for {mode}": Aim((mode,), request.least_damping, partial(naming_of, case))}
+    if request.mode is None:
+        aims["searched for all modes"] = Aim((), request.least_damping)
+    found = []
+    for why, aim in aims.items():
+        search = SettingSearch(space, [RatedPoint(0, loops, aim, largest)])
+        best, _ = search.over_grid(search.best())
+        found.append((why, space.group_settings(best.x)[0]))
+    return found
