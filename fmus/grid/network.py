@@ -1,5 +1,7 @@
 """A network as data: buses, lines, loads, shunts, and the ports where devices meet it."""
 
+import difflib
+import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -125,14 +127,21 @@ class Network:
         known = set(self.buses)
         for line in self.lines:
             for bus in {line.from_bus, line.to_bus} - known:
-                yield f"line {line.name!r} ends at bus {bus!r}, which does not exist"
+                yield f"line {line.name!r} ends at bus {bus!r}, which does not exist{self._near(bus)}"
         attached = [("load", x.name, x.bus) for x in self.loads] + [("shunt", x.name, x.bus) for x in self.shunts]
         attached += [("port", x.name, x.bus) for x in self.ports]
         attached += [("transformer", x.name, bus) for x in self.transformers for bus in x.buses]
         attached += [("fault", bus, bus) for bus in self.faults]
         for kind, name, bus in attached:
             if bus not in known:
-                yield f"{kind} {name!r} is at bus {bus!r}, which does not exist"
+                yield f"{kind} {name!r} is at bus {bus!r}, which does not exist{self._near(bus)}"
+
+    def _near(self, bus: str) -> str:
+        """A hint at buses of nearly this name, such as another case of letters or the same number."""
+        number = re.sub(r"\D", "", bus)
+        alike = [x for x in self.buses if x.lower() == bus.lower() or (number and re.sub(r"\D", "", x) == number)]
+        close = alike or difflib.get_close_matches(bus, self.buses, 3)
+        return f"; did you mean {' or '.join(map(repr, close[:3]))}?" if close else ""
 
     def _repeated_names(self) -> Iterable[str]:
         names = [*self.buses, *(x.name for x in self.lines), *(x.name for x in self.loads)]

@@ -16,6 +16,7 @@ from orchestrator.cases.contradictions import contradictions
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
+from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
@@ -28,6 +29,14 @@ from orchestrator.toml_files import fault_of, read_toml
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
+_SOURCES = {
+    ".raw": ("a network of PSS/E", "network", "raw"),
+    ".dyr": ("dynamics data of PSS/E", "units", "dyr"),
+    ".m": ("a MATPOWER case", "network", "matpower"),
+    ".mat": ("a MATPOWER case", "network", "matpower"),
+    ".zip": ("an archive, perhaps a CGMES model", "network", "cgmes"),
+}
+"""Files of other programs by their suffix: what each is, and where a case names it."""
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -191,6 +200,12 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
         )
     if path.suffix.lower() == ".ssp":
         return _from_ssp(path, trust_fmus)
+    if (source := _SOURCES.get(path.suffix.lower())) is not None:
+        what, section, key = source
+        raise InputError(
+            f"{name_or_path}: this is {what}, not a case; write a case file (.toml) whose [{section}] has "
+            f'{key} = "{path.name}", and give that'
+        )
     text, raw = read_toml(path, "the case file", "make it readable for you")
     table, problems = _validate(raw, text, path)
     return _case(table, text, path, problems, path.parent, trust_fmus=trust_fmus)
@@ -320,7 +335,9 @@ def _schema_message(detail: Any) -> str:
         case "extra_forbidden" | "missing":
             return fault_of(detail)
         case "union_tag_invalid":
-            return f"type {detail['ctx']['tag']!r} is unknown; choose from {detail['ctx']['expected_tags']}"
+            tag, known = detail["ctx"]["tag"], detail["ctx"]["expected_tags"]
+            hint = close_names(tag, (one.strip(" '") for one in known.split(",")))
+            return f"type {tag!r} is unknown; {f'{hint} ' if hint else ''}choose from {known}"
         case "union_tag_not_found":
             return "the key 'type' is missing; it says what kind of event this is"
         case _:

@@ -1,6 +1,7 @@
 """Names in a case file: variables in the expression of a signal, and hints at the intended name."""
 
 import difflib
+import fnmatch
 import re
 from collections.abc import Iterable
 
@@ -8,6 +9,9 @@ from orchestrator.errors import InputError
 
 LONGEST = 200
 """Bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to it."""
+
+_TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
+"""Outputs of one meaning in EMT and phasor models."""
 
 _RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
@@ -40,9 +44,16 @@ def file_name(name: str) -> str:
 
 
 def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
-    """A hint at names with the same parts (``line_5_4`` for ``line_4_5``), or otherwise at similar names."""
+    """A hint at the name in another kind of model, at names with the same parts (``line_5_4`` for ``line_4_5``), at the
+    same name in a part of the component (``pod_p.K`` for ``K``), or otherwise at similar names.
+    """
     names = list(known)
+    head, dot, last = wanted.rpartition(".")
+    twin = f"{head}{dot}{_TWINS.get(last, last)}"
+    if twin != wanted and fnmatch.filter(names, twin):
+        return f"phasor and EMT models name it differently: here it is {twin}"
     close = [name for name in names if _parts(name) == _parts(wanted)]
+    close = close or [name for name in names if name.endswith(f".{wanted}")][:3]
     close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else otherwise
 

@@ -34,6 +34,8 @@ PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
 Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
 Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
+Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
+"""A number is no bus' name here, but the error that there is none such names the near ones."""
 FileName = Annotated[str, AfterValidator(file_name)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
@@ -63,7 +65,7 @@ class ComponentTable(Table):
     binding: str | None = None
     isolated: bool | None = None
     vendor: str | None = Field(default=None, min_length=1)
-    bus: str | None = None
+    bus: Bus | None = None
     native: bool = False
     machine: str | None = None
     exciter: str | None = None
@@ -92,8 +94,8 @@ class PowerFlowTable(Table):
 class LineTable(Table):
     """A line or transformer of the network."""
 
-    from_bus: str = Field(alias="from")
-    to_bus: str = Field(alias="to")
+    from_bus: Bus = Field(alias="from")
+    to_bus: Bus = Field(alias="to")
     X: PerUnit
     R: PerUnit = 0.0
     B: PerUnit = 0.0
@@ -141,7 +143,7 @@ class LoadModelTable(Table):
 class LoadTable(LoadModelTable):
     """A load of the network; p < 0 is static generation."""
 
-    bus: str
+    bus: Bus
     p: Megawatt
     q: Megavar = 0.0
 
@@ -149,7 +151,7 @@ class LoadTable(LoadModelTable):
 class ShuntTable(Table):
     """An admittance to earth, by the power that it draws and generates at 1 pu."""
 
-    bus: str
+    bus: Bus
     g: Megawatt = 0.0
     b: Megavar = 0.0
 
@@ -378,7 +380,7 @@ class BusFaultTable(GridEventBase):
     """A three-phase fault at a bus; where a line clears it, that line opens when the fault ends."""
 
     type: Literal["bus_fault"]
-    bus: str
+    bus: Bus
     R: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     X: PerUnit = Field(default=0.0, ge=0, allow_inf_nan=False)
     duration: Seconds | None = Field(default=None, gt=0)
