@@ -35,6 +35,17 @@ class FlowLine:
         b = self.B / 2 * (1.0 if self.closed else OPEN_CHARGING)
         return b / self.tap**2, b
 
+    def powers(self, v_from: complex, v_to: complex) -> tuple[complex, complex]:
+        """P + jQ [pu, 100 MVA] that flow into it at both ends; into an open line only that of its charging."""
+        b_from, b_to = self.charging
+        into, out = -1j * b_from * abs(v_from) ** 2, -1j * b_to * abs(v_to) ** 2
+        if self.closed:
+            behind = v_from / (self.tap * np.exp(1j * self.shift))
+            current = (behind - v_to) / complex(self.R, self.X)
+            into += complex(behind * current.conjugate())
+            out -= complex(v_to * current.conjugate())
+        return into, out
+
 
 @dataclass(frozen=True, slots=True)
 class FlowLoad:
@@ -72,15 +83,9 @@ def nodal_powers(
     """
     needed = dict.fromkeys(voltages, 0j)
     for line in lines:
-        v_from, v_to = voltages[line.from_bus], voltages[line.to_bus]
-        b_from, b_to = line.charging
-        needed[line.from_bus] -= 1j * b_from * abs(v_from) ** 2
-        needed[line.to_bus] -= 1j * b_to * abs(v_to) ** 2
-        if line.closed:
-            behind = v_from / (line.tap * np.exp(1j * line.shift))
-            current = (behind - v_to) / complex(line.R, line.X)
-            needed[line.from_bus] += complex(behind * current.conjugate())
-            needed[line.to_bus] -= complex(v_to * current.conjugate())
+        into, out = line.powers(voltages[line.from_bus], voltages[line.to_bus])
+        needed[line.from_bus] += into
+        needed[line.to_bus] += out
     for load in loads:
         needed[load.bus] += complex(load.p_mw, load.q_mvar) / SYSTEM_BASE_MVA
     for shunt in shunts:

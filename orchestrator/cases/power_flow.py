@@ -53,6 +53,10 @@ class PowerFlow:
         Buses that feed a limit of reactive power instead of holding their voltage.
     beyond_limits
         Buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack.
+    lines
+        What it was solved with; a transformer of three windings is three of them.
+    slack
+        Bus that feeds what is left.
     """
 
     voltages: dict[str, complex]
@@ -60,6 +64,8 @@ class PowerFlow:
     residual: float
     at_limits: tuple[Excess, ...] = ()
     beyond_limits: tuple[Excess, ...] = ()
+    lines: tuple[FlowLine, ...] = ()
+    slack: str = ""
 
 
 def solve_power_flow(
@@ -145,7 +151,7 @@ def solve_power_flow(
     powers = flow.powers | {u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None}
     powers |= {unit.name: 0j for unit in units if not unit.connected}
     beyond = (*exceeded(final, result.voltages, known), *_fed_beyond(fixed, at_bus, limits or {}, voltages))
-    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond)
+    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond, tuple(lines), slack_bus)
 
 
 def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:

@@ -20,12 +20,13 @@ from orchestrator.cli.terminal import (
     print_warnings,
     said_stages,
 )
-from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
+from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.study import tables
 from orchestrator.study.all_modes import compute_all_modes
+from orchestrator.study.answers import of_modes
 from orchestrator.study.load_model_weight import load_model_weight
 from orchestrator.study.modes import modes_json
 
@@ -61,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
     parser.add_argument("--json", action="store_true", help="print JSON")
     add_verdict_argument(parser)
+    add_details_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -107,13 +109,14 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
 
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
         with staged(folder, new_run_id()) as staging:
-            written += [path.name for path in save_modes(results, staging)]
+            plots = [path.name for path in save_modes(results, staging)]
+            written += [*sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
     weight = None if options.black_box else load_model_weight(scenarios[0], results[0])
     if options.json:
         print(json.dumps(modes_json(results, [weight] if weight else []), indent=1, ensure_ascii=False))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
-    print_verdicts(console, results)
+    print_answers(console, [of_modes(r) for r in results], results)
     print_warnings(results)
     if weight:
         make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(weight)}")
@@ -121,6 +124,8 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, results)
     print_sources(console, results)
+    if options.details:
+        print_details(console, results)
     if folder:
         console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
     return exit_code(options, [r.stability for r in results])

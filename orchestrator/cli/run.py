@@ -23,7 +23,7 @@ from orchestrator.cli.terminal import (
     print_recording_questions,
     print_warnings,
 )
-from orchestrator.cli.verdict import add_verdict_argument, exit_code
+from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
@@ -62,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print the summary as JSON")
     add_verdict_argument(parser)
+    add_details_argument(parser)
     run_request.add_arguments(parser)
     like.add_arguments(parser)
     federates.add_arguments(parser)
@@ -145,7 +146,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     if options.json:
         print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
     else:
-        print_run(console, results, early_end)
+        print_run(console, results, early_end, details=options.details)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
         words = (
             f"Results in {folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "

@@ -7,10 +7,11 @@ from rich.markup import escape
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.terminal import print_named_modes, print_sources
-from orchestrator.cli.verdict import print_verdicts
+from orchestrator.cli.verdict import print_answers, print_details
 from orchestrator.coupling.statistics import StepCounts, StepStatistics
 from orchestrator.fmi.loaded import PYTHON_BACKED
 from orchestrator.study import tables
+from orchestrator.study.answers import of_run
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.run import RunResult
 
@@ -51,7 +52,9 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
     )
 
 
-def print_run(console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None) -> None:
+def print_run(
+    console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None, *, details: bool = False
+) -> None:
     """How a study came out.
 
     Parameters
@@ -62,27 +65,20 @@ def print_run(console: Console, results: Sequence[RunResult], early_end: EarlyEn
         Of the scenarios that ran.
     early_end
         Where it ended before its last scenario.
+    details
+        Print all that is known of the operating point.
     """
     if early_end is not None:
         colour = "yellow" if early_end.interrupted else "red"
         words = f"[bold {colour}]{early_end.word}[/] {escape(early_end.place)}"
         console.print(words, soft_wrap=True, highlight=False)
     modes = [r.modes for r in results]
-    for r in results:
-        for finding in r.went_unstable:
-            words = escape(f"{r.modes.prepared.title}: {finding.message}")
-            console.print(f"[bold red]UNSTABLE in the simulation[/]: {words}", soft_wrap=True, highlight=False)
-        if r.stable_in_simulation is None:
-            words = f"{escape(r.modes.prepared.title)}: not judged throughout; the warnings above say where and why"
-            console.print(f"[bold yellow]stability in the simulation[/]: {words}", soft_wrap=True, highlight=False)
-    if not all(r.stable_in_simulation for r in results):
-        console.print("[bold]By the modes at the operating point:[/]")
-    print_verdicts(console, modes)
-    console.print(tables.steady_states(modes), "")
+    print_answers(console, [of_run(r) for r in results], modes)
     print_named_modes(console, modes)
     print_sources(console, modes)
     if any(r.ring_down for r in results):
         console.print("", tables.ring_downs(results))
+    console.print("", tables.steady_states(modes))
     if any(r.shifts for r in results):
         console.print("", tables.mode_shifts(results))
     if any(r.linear is not None for r in results):
@@ -94,3 +90,5 @@ def print_run(console: Console, results: Sequence[RunResult], early_end: EarlyEn
             console.print(escape(words), soft_wrap=True, highlight=False)
     for words in dict.fromkeys(text for r in results if r.statistics and (text := on_one_thread(r.statistics))):
         console.print(escape(words), soft_wrap=True)
+    if details:
+        print_details(console, modes)

@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
 from orchestrator.report.verdict import COLOURS, VerdictSentence
+from orchestrator.study import tables
+from orchestrator.study.answers import Answer, answers_table, outside
 from orchestrator.study.modes import ModesResult
 
 NOT_MET = 3
@@ -50,6 +53,29 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
         if found:
             return f"[bold {COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
     return f"[bold green]stable[/]: all {len(verdicts)}"
+
+
+def add_details_argument(parser: argparse.ArgumentParser) -> None:
+    """``--details``."""
+    parser.add_argument(
+        "--details", action="store_true", help="print also the power flow, and each verdict with its eigenvalue"
+    )
+
+
+def print_answers(console: Console, answers: Sequence[Answer], results: Sequence[ModesResult]) -> None:
+    """The first table, and what its range leaves out."""
+    ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
+    console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
+    if rest := outside(results):
+        console.print(escape(rest), style="dim", soft_wrap=True, highlight=False)
+    console.print("")
+
+
+def print_details(console: Console, results: Sequence[ModesResult]) -> None:
+    """The power flow, and the eigenvalue behind each verdict."""
+    for table in tables.power_flows(results):
+        console.print(table, "")
+    print_verdicts(console, results)
 
 
 def print_verdicts(console: Console, results: Sequence[ModesResult]) -> None:

@@ -16,9 +16,11 @@ from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
+from orchestrator.study.answers import of_run
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.study.modes import ModesResult
+from orchestrator.study.power_flow import COLUMNS, power_flow_json
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
 
@@ -49,6 +51,10 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     save_table(_mode_rows(results), folder / "modes.csv")
     save_table(_participation_rows(results), folder / "participation.csv")
     save_table(_shape_rows(results), folder / "mode_shapes.csv")
+    flows = {r.prepared.name: flow for r in results if (flow := power_flow_json(r.prepared)) is not None}
+    for kind in COLUMNS if flows else ():
+        rows = [{"scenario": name, **row} for name, flow in flows.items() for row in flow[kind]]
+        save_table(rows, folder / f"power_flow_{kind}.csv")
     reference = results[0].prepared.case.table.reference
     names = ", ".join(dict.fromkeys(name for r in results for name in r.named))
     circles = reference.title if reference and any(r.references for r in results) else ""
@@ -190,6 +196,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "tolerance": modes.prepared.schedule.tolerance,
         "adaptive_steps": None if stats is None or stats.adaptive is None else asdict(stats.adaptive),
         "events": [str(event) for event in modes.prepared.events],
+        "answer": of_run(result).as_json(),
         "power_flow": _power_flow(modes.prepared),
         "linearised": modes.linearised,
         "fit_errors": modes.fit_errors,
@@ -212,7 +219,8 @@ def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
         rating = prepared.system.components[name].number("S_n")
         units[name] = {"rating_mva": rating, "p_mw": power.real * rating, "q_mvar": power.imag * rating}
     buses = {bus: [abs(v), math.degrees(cmath.phase(v))] for bus, v in flow.voltages.items()}
-    return {"residual": flow.residual, "buses": buses, "units": units}
+    found = power_flow_json(prepared) or {}
+    return {**found, "residual": flow.residual, "buses": buses, "units": units}
 
 
 def _linear_differences(result: RunResult) -> dict[str, float] | None:

@@ -41,6 +41,7 @@ from orchestrator.federation.federation import Federation
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.naming import named_modes
+from orchestrator.study.power_flow import power_flow_json
 from orchestrator.study.start_errors import start_error
 
 _LEADING = 3
@@ -463,6 +464,7 @@ def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) ->
                 "largest_growth_rate": r.stability.largest_growth_rate,
                 "stability": r.stability.as_json(),
                 "outside_range": None if r.hidden is None else r.hidden.as_json(),
+                "power_flow": power_flow_json(r.prepared),
                 "linearised": r.linearised,
                 "fit_errors": r.fit_errors,
                 "warnings": list(r.warnings),

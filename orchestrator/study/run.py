@@ -102,11 +102,16 @@ class RunResult:
         return [finding for finding in self.findings if finding.kind in UNSTABLE]
 
     @property
+    def missing_limits(self) -> list[Finding]:
+        """Limits that would have acted, and that the models lack."""
+        return [finding for finding in self.findings if not finding.represented]
+
+    @property
     def stable_in_simulation(self) -> bool | None:
-        """None where a part of the run was not judged and nothing else was wrong."""
+        """None where a part was not judged or a limit would act that the model lacks, and nothing else was wrong."""
         if self.went_unstable:
             return False
-        return None if any(finding.kind == NOT_JUDGED for finding in self.findings) else True
+        return None if any(finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings) else True
 
 
 def run_scenario(

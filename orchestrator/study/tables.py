@@ -1,12 +1,14 @@
 """Tables of modes and runs for a terminal."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from rich.table import Table
 
 from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
+from orchestrator.study import power_flow
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 
@@ -88,6 +90,26 @@ def mode_shapes(results: Sequence[ModesResult]) -> Table:
         row += [first_few(r.by_area(mode).items(), share_text)] if len(columns) > 4 else []
         table.add_row(*row)
     return table
+
+
+def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
+    """Machines, buses and branches of every power flow."""
+    flows: dict[str, dict[str, Any]] = {}
+    for r in results:
+        if flow := power_flow.power_flow_json(r.prepared):
+            same = next((titles for titles, other in flows.items() if other == flow), "")
+            flows.pop(same, None)
+            flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
+    for titles, flow in flows.items():
+        for kind, columns in power_flow.COLUMNS.items():
+            table = make_table(f"{kind.capitalize()}: {titles}", *columns.values(), left=power_flow.TEXTS[kind])
+            for row in power_flow.cells(flow[kind], kind):
+                table.add_row(*row)
+            yield table
+        table = make_table(f"Power flow: {titles}", "What", "Value")
+        for what, value in power_flow.totals(flow):
+            table.add_row(what, value)
+        yield table
 
 
 def ring_downs(results: Sequence[RunResult]) -> Table:

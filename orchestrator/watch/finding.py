@@ -40,6 +40,8 @@ class Finding:
         Its end [s]; None if it lasts to the end of the run, or has no duration.
     figures
         By name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations.
+    represented
+        False of a limit that would act and that the model lacks.
     """
 
     kind: Kind
@@ -49,6 +51,7 @@ class Finding:
     message: str
     until: float | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
+    represented: bool = True
 
     def as_json(self) -> dict[str, Any]:
         """The finding for a summary."""
@@ -60,4 +63,5 @@ class Finding:
             "variable": self.variable,
             "message": self.message,
             **self.figures,
+            **({} if self.represented else {"represented": False}),
         }

@@ -17,6 +17,9 @@ LEAST_DURATION = 0.1
 """Shortest total time of a limit's action that is reported [s]. A limit that acts for less, as in a short dip, works as
 intended."""
 
+LEAST_MISSING = 0.02
+"""The same for a limit that the model lacks [s]: from one cycle on, the course after it is another."""
+
 AT_LIMIT = 1 - 1e-9
 """A signal is at its limit from this part of the limit on: a saturated signal equals its limit except for the last
 digits."""
@@ -82,7 +85,8 @@ def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Fi
             acting = {parameter: acts & present for parameter, acts in _acting(seen, name, limit, settings).items()}
             either = np.logical_or.reduce([*acting.values()])
             duration = _duration(seen, either)
-            if duration > LEAST_DURATION or (len(either) > 1 and either[-1]):
+            least = LEAST_DURATION if limit.represented else LEAST_MISSING
+            if duration > least or (len(either) > 1 and either[-1]):
                 of_each = {parameter: _duration(seen, acts) for parameter, acts in acting.items() if parameter}
                 yield _finding(seen.times, name, limit, either, duration, of_each)
 
@@ -141,5 +145,7 @@ def _finding(
         f"the {limit.name} of {name}{named} {acts} from t = {begin:.4g} s "
         f"{'to the end of the run' if end is None else f'to t = {end:.4g} s'}, for {duration:.3g} s in all{times_over}"
     )
+    if not limit.represented:
+        message += "; what follows is not known: repeat with EMT models, whose names lack `_phasor`"
     figures = {"duration_s": duration, "stretches": float(stretches)}
-    return Finding("active_limit", begin, name, limit.signal, message, end, figures)
+    return Finding("active_limit", begin, name, limit.signal, message, end, figures, limit.represented)

@@ -57,6 +57,26 @@ def test_voltages_are_pandapowers(name):
     assert flow.residual < 1e-10
 
 
+@pytest.mark.parametrize("name", ["case9", "case14", "case39"])
+def test_flows_and_losses_are_pandapowers(name):
+    elements, _ = of_pandapower(name)
+    flow = solve_power_flow(*elements)
+    net = getattr(pandapower.networks, name)()
+    pandapower.runpp(net, numba=False, tolerance_mva=1e-9, voltage_depend_loads=False)
+    ours = [line.powers(flow.voltages[line.from_bus], flow.voltages[line.to_bus]) for line in flow.lines]
+    lines, trafos = net.res_line, net.res_trafo
+    theirs = [
+        *zip(lines.p_from_mw + 1j * lines.q_from_mvar, lines.p_to_mw + 1j * lines.q_to_mvar, strict=True),
+        *zip(trafos.p_hv_mw + 1j * trafos.q_hv_mvar, trafos.p_lv_mw + 1j * trafos.q_lv_mvar, strict=True),
+    ]
+    assert len(ours) == len(theirs)
+    for part in (np.real, np.imag):
+        sums = [np.sort([100 * part(a + b) for a, b in ours]), np.sort([part(a + b) for a, b in theirs])]
+        ends = [np.sort([100 * part(x) for pair in ours for x in pair]), np.sort([part(x) for p in theirs for x in p])]
+        assert np.abs(sums[0] - sums[1]).max() < 1e-5
+        assert np.abs(ends[0] - ends[1]).max() < 1e-5
+
+
 def equations_of(elements):
     buses, lines, loads, units, slack, shunts, _ = elements
     active = {u.bus: u.P_0 * u.S_n / 100 for u in units}

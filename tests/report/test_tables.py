@@ -176,11 +176,14 @@ def test_what_is_poorly_damped_is_marked(studied, page):
     assert not [cell for cell in marked if value(cell) >= 5]
 
 
-def test_the_findings_say_what_is_unstable(studied, page, summary):
-    text = (studied[0] / "report.html").read_text(encoding="utf-8")
-    for title, s in summary.items():
-        said = re.search(re.escape(title) + r": the electromechanical mode is (\w+)", text)
-        assert said.group(1) == ("unstable" if s["modes"]["electromechanical"]["real"] > 0 else "damped")
+def test_the_first_box_has_the_verdict_and_the_least_damped_mode(page, summary):
+    rows = table(page, "Verdicts")
+    assert [row["Scenario"] for row in rows] == list(summary)
+    for row in rows:
+        s = summary[row["Scenario"]]
+        assert row["Verdict"] == s["answer"]["verdict"]
+        agrees(row, "Least damped: f [Hz]", s["answer"]["frequency_hz"])
+        agrees(row, "Damping [%]", s["answer"]["damping_percent"])
 
 
 def test_the_pages_ring_down(page, summary):

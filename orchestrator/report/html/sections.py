@@ -13,6 +13,7 @@ from orchestrator.report.html.elements import Figures, colour, damping, eigenval
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.signals import relative_difference, signal
+from orchestrator.study.power_flow import COLUMNS, TEXTS, cells
 from orchestrator.watch.finding import NOT_JUDGED
 
 _BARS = 8
@@ -58,41 +59,45 @@ def findings(results: Results) -> str:
             items.append(f'{escape(s["title"])}: <span class="soft">the run was {escape(s["failure"])}</span>')
         elif s["failure"]:
             items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
-        if verdict := s.get("stability"):
-            shade = {True: "good", False: "bad"}.get(verdict["stable"], "soft")
-            by_modes = f'<b class="{shade}">{escape(verdict["sentence"])}</b>'
-            in_simulation = s.get("stable_in_simulation", True)
-            if in_simulation:
-                items.append(f"{escape(s['title'])}: {by_modes}")
-            else:
-                shade, words = ("bad", "UNSTABLE") if in_simulation is False else ("soft", "not judged throughout")
-                items.append(
-                    f'{escape(s["title"])}: in the simulation <b class="{shade}">{words}</b>; by the modes at the '
-                    f"operating point {by_modes}"
-                )
         items += [
             f'{escape(s["title"])}: <span class="{_shade(f)}">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
             f"{escape(f['message'])}"
             for f in s.get("findings", [])
             if f["message"] != s["failure"]
         ]
-        for name, mode in s["modes"].items():
-            state = "unstable" if mode["damping_percent"] < 0 else "damped"
-            items.append(
-                f"{escape(s['title'])}: the {escape(name)} mode is {state}: {mode['frequency_hz']:.3f} Hz at "
-                f"{damping(mode['damping_percent'])} % damping"
-            )
-    worst = [
-        f"{escape(title)}: {damping(float(row['damping [%]']))} % at {float(row['frequency [Hz]']):.3f} Hz"
-        for title, row in _least_damped(results)
-    ]
-    items.append(f"Least damped of all modes from 0.1 to 2 Hz: {'; '.join(worst)}")
     warnings = "".join(
         f'<div class="warning"><b>{escape(s["title"])}:</b> {escape(text)}</div>'
         for s in results.scenarios
         for text in s["warnings"]
     )
-    return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{warnings}'
+    found = f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>" if items else ""
+    by_modes = "".join(
+        f'<li>{escape(s["title"])}: <b class="{_verdict_shade(v["stable"])}">{escape(v["sentence"])}</b></li>'
+        for s in results.scenarios
+        if (v := s.get("stability"))
+    )
+    details = f"<details><summary>By the modes at the operating point</summary><ul>{by_modes}</ul></details>"
+    return f'<div class="findings">{_answers(results)}{found}{details if by_modes else ""}</div>{warnings}'
+
+
+def _verdict_shade(stable: bool | None) -> str:
+    return {True: "good", False: "bad"}.get(stable, "soft")  # type: ignore[arg-type]
+
+
+def _answers(results: Results) -> str:
+    """One line a scenario: verdict, least damped mode, remark."""
+    least = dict(_least_damped(results))
+    rows = []
+    for s in results.scenarios:
+        answer = s.get("answer") or {**s.get("stability", {"stable": None}), "remark": ""}
+        row = least.get(s["title"])
+        figures = ["–", "–"] if row is None else [
+            f"{float(row['frequency [Hz]']):.3f}", damping(float(row["damping [%]"]))
+        ]  # fmt: skip
+        word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(answer["stable"], "not known")
+        shade = _verdict_shade(answer["stable"])
+        rows.append([escape(s["title"]), f'<b class="{shade}">{word}</b>', escape(answer["remark"]), *figures])
+    return table("Verdicts", ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"], rows, left=3)
 
 
 def _shade(finding: Mapping[str, Any]) -> str:
@@ -168,16 +173,20 @@ def operating_point(results: Results) -> str:
         low = high = "–"
         if flow:
             low, high = (f"{pick(v[0] for v in flow['buses'].values()):.4f}" for pick in (min, max))
-            units = [
-                [escape(n), f"{u['rating_mva']:g}", number(u["p_mw"], 1), number(u["q_mvar"], 1)]
-                for n, u in flow["units"].items()
+            buses = [{"name": bus, "v_pu": v, "angle_deg": angle} for bus, (v, angle) in flow["buses"].items()]
+            found = {"machines": flow.get("machines", []), "buses": buses, "branches": flow.get("branches", [])}
+            shown = [
+                table(
+                    "Units" if kind == "machines" else kind.capitalize(),
+                    list(COLUMNS[kind].values()),
+                    [[escape(cell) for cell in row] for row in cells(found[kind], kind)],
+                    left=TEXTS[kind],
+                )
+                for kind in found
             ]
-            buses = [[escape(b), f"{v:.4f}", number(angle, 2)] for b, (v, angle) in flow["buses"].items()]
             details.append(
-                f"<details><summary>{escape(s['title'])}: {len(units)} units, {len(buses)} buses</summary>"
-                + table("Units", ["Unit", "Rating [MVA]", "P [MW]", "Q [Mvar]"], units)
-                + table("Buses", ["Bus", "Voltage [pu]", "Angle [°]"], buses)
-                + "</details>"
+                f"<details><summary>{escape(s['title'])}: {len(found['machines'])} units, {len(buses)} buses</summary>"
+                f"{''.join(shown)}</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"
         change = "–" if s["residual"] is None else f"{s['residual']:.1e}"

@@ -1,0 +1,140 @@
+"""The answer to what a study was run for, one line a scenario: verdict, the mode in question, one remark."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.stability import Cause
+from orchestrator.errors import RunInterruptedError
+from orchestrator.report.tables import first_few, make_table
+from orchestrator.report.verdict import COLOURS
+from orchestrator.study.modes import ModesResult
+from orchestrator.study.run import RunResult
+
+_LONGEST = 120
+"""Of a remark [characters]; the whole text stands among the details."""
+
+KINDS = {
+    "growth": "grows", "growing_oscillation": "an oscillation grows", "sustained_oscillation": "oscillates on",
+    "run_away": "runs away", "loss_of_synchronism": "loses synchronism", "not_finite": "values are no numbers",
+    "failure": "fails",
+}  # fmt: skip
+"""In words, the findings that no stable system gives."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One line of the first table.
+
+    Attributes
+    ----------
+    subject
+        What it is about, such as a scenario's title.
+    good
+        Whether that is good; None where it is not known.
+    verdict
+        In a word or two.
+    mode
+        The least damped mode of the range.
+    """
+
+    subject: str
+    good: bool | None
+    verdict: str
+    mode: Mode | None
+    remark: str
+
+    def as_json(self) -> dict[str, Any]:
+        """For a summary."""
+        return {
+            "stable": self.good,
+            "verdict": self.verdict,
+            "frequency_hz": None if self.mode is None else self.mode.frequency_hz,
+            "damping_percent": None if self.mode is None else self.mode.damping_percent,
+            "remark": self.remark,
+        }
+
+
+def of_modes(result: ModesResult) -> Answer:
+    """By the eigenvalues at the operating point."""
+    verdict, mode = result.stability, min(result.modes, key=lambda m: m.damping_percent, default=None)
+    swing = "" if mode is None else _swing(result, mode)
+    remark = swing
+    if verdict.stable is None:
+        remark = verdict.reason
+    elif verdict.stable is False and verdict.mode is not None:
+        low, high = (0.0, 0.0) if result.hidden is None else result.hidden.frequency_range
+        hertz = verdict.mode.frequency_hz
+        where = "" if low <= hertz <= high else f" at {hertz:.4g} Hz" if hertz else " without oscillation"
+        by = f": {verdict.mode.participation[0][0]}" if where and verdict.mode.participation else ""
+        because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
+        remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
+        remark += f"; {swing}" if swing and not where else ""
+    return Answer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short(remark))
+
+
+def of_run(result: RunResult) -> Answer:
+    """By what the run showed; its eigenvalues are those before its events."""
+    by_modes = of_modes(result.modes)
+    title, mode = by_modes.subject, by_modes.mode
+    if isinstance(result.failure, RunInterruptedError):
+        return Answer(title, None, "interrupted", mode, _short(str(result.failure)))
+    if result.went_unstable:
+        worst = result.went_unstable[0]
+        what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
+        return Answer(title, False, "UNSTABLE", mode, what)
+    if result.failure is not None:
+        return Answer(title, False, "failed", mode, _short(str(result.failure)))
+    if by_modes.good is False:
+        return by_modes
+    if missing := result.missing_limits:
+        names = ", ".join(dict.fromkeys(finding.component for finding in missing))
+        remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
+        return Answer(title, None, "not known", mode, _short(remark))
+    if result.stable_in_simulation is None:
+        return Answer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
+    if by_modes.good is None or not result.modes.prepared.events:
+        return by_modes
+    rest = f"; {by_modes.remark}" if by_modes.remark else ""
+    end = result.modes.prepared.stop_time
+    return Answer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+
+
+def answers_table(answers: Sequence[Answer], frequency_range: tuple[float, float]) -> Table:
+    """The first thing that a command prints."""
+    low, high = frequency_range
+    table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
+    table.title = None
+    table.add_column(f"Least damped mode from {low:g} to {high:g} Hz: who swings; remark", overflow="fold")
+    for answer in answers:
+        mode = answer.mode
+        figures = ("–", "–") if mode is None else (f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}")
+        word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
+        table.add_row(answer.subject, word, *figures, answer.remark)
+    return table
+
+
+def outside(results: Sequence[ModesResult]) -> str:
+    """How many modes lie outside of the range, which are mostly the network's own; "" where it is not known."""
+    counts = sorted({r.hidden.count for r in results if r.hidden is not None})
+    if not counts or counts == [0]:
+        return ""
+    number = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
+    swings = max((r.hidden for r in results if r.hidden is not None), key=lambda hidden: len(hidden.electromechanical))
+    wide = f", of which machines swing in {len(swings.electromechanical)}" if swings.electromechanical else ""
+    return f"Outside of the range: {number} oscillatory modes{wide}; --details tells of them."
+
+
+def _swing(result: ModesResult, mode: Mode) -> str:
+    sides = [first_few(side, str) for side in result.swing_of(mode)]
+    if all(sides):
+        return f"{sides[0]} against {sides[1]}"
+    return sides[0] or sides[1] or ", ".join(state for state, _ in mode.participation[:2])
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2].rstrip()} …"

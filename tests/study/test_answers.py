@@ -1,0 +1,83 @@
+"""What is read first: verdict and mode of each scenario, and the power flow beside pandapower's."""
+
+import csv
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.analysis.modes import make_mode
+from orchestrator.analysis.stability import Stability
+from orchestrator.cli import main
+from orchestrator.study.answers import of_modes, of_run
+from orchestrator.study.run import RunResult
+from orchestrator.watch.finding import Finding
+
+
+def lines(capsys, *words):
+    assert main([*map(str, words)]) in (0, 1)
+    return capsys.readouterr().out.splitlines()
+
+
+def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
+    text = lines(capsys, "modes", "two_area_rms")
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in text[3:8]]
+    assert [row[1] for row in rows] == ["UNSTABLE", "stable", "stable", "stable", "stable"]
+    assert float(rows[1][3]) == pytest.approx(10.6, abs=0.3)
+    assert all("sg1" in row[4] for row in rows)
+    assert not [line for line in text if "largest real part" in line or "a mode grows" in line]
+
+
+def result(findings=(), stable=True, events=("fault",), failure=None):
+    mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
+    prepared = SimpleNamespace(title="S", events=events, stop_time=5.0)
+    modes = SimpleNamespace(
+        prepared=prepared, modes=[mode], hidden=None, swing_of=lambda _: (["sg1"], ["sg2"]),
+        stability=Stability(stable, mode, reason="" if stable else "not searched"),
+    )  # fmt: skip
+    return RunResult(modes, None, findings=list(findings), failure=failure)
+
+
+def finding(kind, **more):
+    return Finding(kind, 1.0, "gfor", "x", "message", **more)
+
+
+@pytest.mark.parametrize(
+    ("findings", "stable", "word", "remark"),
+    [
+        ([], True, "stable", "keeps synchronism and settles until 5 s"),
+        ([finding("active_limit")], True, "stable", "keeps synchronism"),  # a limit that the model has
+        ([finding("active_limit", represented=False)], True, "not known", "repeat with EMT models"),
+        ([finding("not_judged")], True, "not known", "not judged"),
+        ([finding("loss_of_synchronism")], True, "UNSTABLE", "gfor: loses synchronism from 1 s"),
+        ([finding("active_limit", represented=False), finding("run_away")], True, "UNSTABLE", "runs away"),
+        ([], None, "not known", "not searched"),
+    ],
+)
+def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
+    answer = of_run(result(findings, stable))
+    assert (answer.verdict, answer.good) == (word, {"stable": True, "UNSTABLE": False}.get(word))
+    assert remark in answer.remark
+
+
+def test_stable_eigenvalues_are_no_verdict_of_a_run_with_a_fault():
+    run = result([finding("active_limit", represented=False)])
+    assert of_modes(run.modes).good is True
+    assert run.stable_in_simulation is None
+
+
+def test_the_power_flow_is_given_and_written(capsys, tmp_path):
+    assert main(["modes", "wscc9", "--scenario", "base", "--json", "--out", str(tmp_path)]) == 0
+    (scenario,) = json.loads(capsys.readouterr().out)["scenarios"]
+    flow = scenario["power_flow"]
+    assert {"name", "v_pu", "angle_deg"} <= set(flow["buses"][0])
+    assert {"name", "p_mw", "q_mvar", "loading_percent"} <= set(flow["machines"][0])
+    assert flow["slack"]["units"] == ["sg1"]
+    # what is fed is drawn by the loads and lost in branches
+    assert flow["generation_mw"] - flow["losses_mw"] == pytest.approx(315.0, abs=1e-6)
+    for machine in flow["machines"]:
+        apparent = abs(complex(machine["p_mw"], machine["q_mvar"]))
+        assert machine["loading_percent"] == pytest.approx(100 * apparent / machine["rating_mva"])
+    with (tmp_path / "power_flow_branches.csv").open(encoding="utf-8", newline="") as file:
+        assert len(list(csv.DictReader(file))) == len(flow["branches"])
