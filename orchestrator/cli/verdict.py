@@ -10,7 +10,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
 from orchestrator.report.verdict import COLOURS, VerdictSentence
 from orchestrator.study import tables
-from orchestrator.study.answers import Answer, answers_table, outside
+from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
 from orchestrator.study.modes import ModesResult
 
 NOT_MET = 3
@@ -62,7 +62,7 @@ def add_details_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def print_answers(console: Console, answers: Sequence[Answer], results: Sequence[ModesResult]) -> None:
+def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult]) -> None:
     """The first table, and what its range leaves out."""
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))

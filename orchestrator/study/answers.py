@@ -27,7 +27,7 @@ KINDS = {
 
 
 @dataclass(frozen=True)
-class Answer:
+class ScenarioAnswer:
     """One line of the first table.
 
     Attributes
@@ -59,7 +59,7 @@ class Answer:
         }
 
 
-def of_modes(result: ModesResult) -> Answer:
+def of_modes(result: ModesResult) -> ScenarioAnswer:
     """By the eigenvalues at the operating point."""
     verdict, mode = result.stability, min(result.modes, key=lambda m: m.damping_percent, default=None)
     swing = "" if mode is None else _swing(result, mode)
@@ -74,37 +74,37 @@ def of_modes(result: ModesResult) -> Answer:
         because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
         remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
         remark += f"; {swing}" if swing and not where else ""
-    return Answer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short(remark))
+    return ScenarioAnswer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short(remark))
 
 
-def of_run(result: RunResult) -> Answer:
+def of_run(result: RunResult) -> ScenarioAnswer:
     """By what the run showed; its eigenvalues are those before its events."""
     by_modes = of_modes(result.modes)
     title, mode = by_modes.subject, by_modes.mode
     if isinstance(result.failure, RunInterruptedError):
-        return Answer(title, None, "interrupted", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, None, "interrupted", mode, _short(str(result.failure)))
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
-        return Answer(title, False, "UNSTABLE", mode, what)
+        return ScenarioAnswer(title, False, "UNSTABLE", mode, what)
     if result.failure is not None:
-        return Answer(title, False, "failed", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, False, "failed", mode, _short(str(result.failure)))
     if by_modes.good is False:
         return by_modes
     if missing := result.missing_limits:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
-        return Answer(title, None, "not known", mode, _short(remark))
+        return ScenarioAnswer(title, None, "not known", mode, _short(remark))
     if result.stable_in_simulation is None:
-        return Answer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
+        return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
     if by_modes.good is None or not result.modes.prepared.events:
         return by_modes
     rest = f"; {by_modes.remark}" if by_modes.remark else ""
     end = result.modes.prepared.stop_time
-    return Answer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+    return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
 
 
-def answers_table(answers: Sequence[Answer], frequency_range: tuple[float, float]) -> Table:
+def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
     """The first thing that a command prints."""
     low, high = frequency_range
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)

@@ -9,6 +9,7 @@ from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import RunInterruptedError
+from orchestrator.report.power_flow import COLUMNS, power_flow_json
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import in_memory, open_whole
 from orchestrator.results.recording import TRAJECTORY
@@ -20,7 +21,6 @@ from orchestrator.study.answers import of_run
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
 from orchestrator.study.modes import ModesResult
-from orchestrator.study.power_flow import COLUMNS, power_flow_json
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
 

@@ -38,10 +38,10 @@ from orchestrator.coupling.coupled import open_plan
 from orchestrator.coupling.master import Master
 from orchestrator.errors import ComponentError
 from orchestrator.federation.federation import Federation
+from orchestrator.report.power_flow import power_flow_json
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.naming import named_modes
-from orchestrator.study.power_flow import power_flow_json
 from orchestrator.study.start_errors import start_error
 
 _LEADING = 3

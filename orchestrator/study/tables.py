@@ -6,9 +6,9 @@ from typing import Any
 
 from rich.table import Table
 
+from orchestrator.report import power_flow
 from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
-from orchestrator.study import power_flow
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 

@@ -12,8 +12,8 @@ from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
+from orchestrator.report.power_flow import COLUMNS, TEXTS, cells
 from orchestrator.results.signals import relative_difference, signal
-from orchestrator.study.power_flow import COLUMNS, TEXTS, cells
 from orchestrator.watch.finding import NOT_JUDGED
 
 _BARS = 8
