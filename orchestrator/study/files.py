@@ -7,9 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import RunInterruptedError
-from orchestrator.report.power_flow import COLUMNS, power_flow_json
+from orchestrator.report.power_flow import COLUMNS
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import in_memory, open_whole
 from orchestrator.results.recording import TRAJECTORY

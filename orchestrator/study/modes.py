@@ -32,13 +32,13 @@ from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
+from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.coupling.coupled import open_plan
 from orchestrator.coupling.master import Master
 from orchestrator.errors import ComponentError
 from orchestrator.federation.federation import Federation
-from orchestrator.report.power_flow import power_flow_json
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.naming import named_modes

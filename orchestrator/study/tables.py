@@ -6,6 +6,7 @@ from typing import Any
 
 from rich.table import Table
 
+from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.report import power_flow
 from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
@@ -96,7 +97,7 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
     """Machines, buses and branches of every power flow."""
     flows: dict[str, dict[str, Any]] = {}
     for r in results:
-        if flow := power_flow.power_flow_json(r.prepared):
+        if flow := power_flow_json(r.prepared):
             same = next((titles for titles, other in flows.items() if other == flow), "")
             flows.pop(same, None)
             flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
