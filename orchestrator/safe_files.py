@@ -19,22 +19,7 @@ def file_hash(path: Path | None) -> str | None:
 
 
 def made_folder(path: Path, label: str = "", what: str = "results cannot be written there") -> Path:
-    """A folder, made where it is missing, before anything is computed for it.
-
-    Parameters
-    ----------
-    path
-        Of the folder.
-    label
-        The option that names it.
-    what
-        Cannot be done without it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made.
-    """
+    """A folder, made where it is missing, before anything is computed for it."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -45,13 +30,7 @@ def made_folder(path: Path, label: str = "", what: str = "results cannot be writ
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path to write to; the file there gets the name ``path`` at the end, or is removed if something fails.
-
-    Raises
-    ------
-    ResultsError
-        If the file cannot be written; what had the name before stays.
-    """
+    """A path to write to; the file there gets the name ``path`` at the end, or is removed if something fails."""
     partial = path.with_name(f"{PARTIAL}{os.getpid()}-{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

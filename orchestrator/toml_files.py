@@ -21,17 +21,6 @@ class Table(BaseModel):
 def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[str, dict[str, Any]]:
     """Read a TOML file; its text, and what the text says.
 
-    Parameters
-    ----------
-    path
-        Of the file.
-    subject
-        The file in an error's words, such as "the binding".
-    remedy
-        How to get such a file; ends the error of one that cannot be read.
-    option
-        Option of the command line that named the file; errors begin with it.
-
     Raises
     ------
     InputError

@@ -67,11 +67,6 @@ def to_unit(value: float | int | str, unit: str) -> float:
         A number, which is taken to be in ``unit`` already, or a text such as ``"1350 MW"``.
     unit
         The declared unit; ``"1"`` or ``""`` for a plain number.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a quantity or its unit does not fit.
     """
     if isinstance(value, int | float):
         return float(value)

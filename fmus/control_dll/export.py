@@ -45,13 +45,7 @@ def control_names() -> tuple[str, ...]:
 
 
 def control_part_of(name: str) -> ControlPart:
-    """The control part of a converter.
-
-    Raises
-    ------
-    ControlDllError
-        If no converter of that name has one.
-    """
+    """The control part of a converter."""
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             part = entry.load()()
@@ -127,13 +121,6 @@ def write_dll(
         Other defaults of the DLL's parameters, by name.
     report
         Called with a sentence before each part of the work.
-
-    Raises
-    ------
-    ControlDllError
-        If a platform, the sample time or a value cannot be used.
-    RuntimeError
-        If the compiler fails.
     """
     if unknown := [name for name in platforms if name not in DLL_TARGETS]:
         raise ControlDllError(f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}")

@@ -22,11 +22,6 @@ def dll_source(model: Model, sample_time: float) -> str:
         Integrated by explicit steps, as the kernel does in an FMU.
     sample_time
         ``FixedStepBaseSampleTime`` [s].
-
-    Raises
-    ------
-    ValueError
-        If the model has an implicit integrator, or two names become one name in C.
     """
     if model.integrator != "runge_kutta":
         raise ValueError(f"model {model.name}: only models with explicit steps become DLLs")

@@ -54,17 +54,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class DeclaredLoad:
-    """A load at scale 1 [pu, 100 MVA], and its ``scale``.
-
-    Attributes
-    ----------
-    G_0, B_0
-        Conductance, and susceptance (capacitors positive), that draw its power at the power flow's voltage.
-    G
-        The conductance that it is at all times.
-    branches
-        Its inductor, where it has one.
-    """
+    """A load at scale 1 [pu, 100 MVA], and its ``scale``."""
 
     G_0: Scalar
     B_0: Scalar

@@ -17,17 +17,7 @@ Admittances = dict[str, dict[str, Phasor]]
 
 
 def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None:
-    """Add a value to one element of the matrix.
-
-    Parameters
-    ----------
-    Y
-        The admittances, which are changed in place.
-    row, column
-        Names of buses; the row is there already.
-    value
-        The admittance to add, in the unit of the others.
-    """
+    """Add a value to one element of the matrix."""
     Y[row][column] = Y[row].get(column, ZERO) + value
 
 

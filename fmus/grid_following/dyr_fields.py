@@ -61,11 +61,6 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
     -------
     tuple
         Values by parameter, and one text for each thing that is replaced or left out.
-
-    Raises
-    ------
-    ValueError
-        If a record is missing, or its mode has no counterpart.
     """
     electrical = next((name for name in records if name != CONVERTER), None)
     if electrical is None or CONVERTER not in records:

@@ -97,19 +97,7 @@ def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
 def declare_machine(
     m: ModelBuilder, port: DevicePort, data: MachineData, stator_flux: FluxDeclaration = flux_state
 ) -> Machine:
-    """Declare the machine's parameters and states; the power flow gives the operating point.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    port
-        Gives the operating point.
-    data
-        Defaults of the parameters.
-    stator_flux
-        Declares ψ̃_d and ψ̃_q: as states, or as algebraic signals that a model without stator transients closes.
-    """
+    """Declare the machine's parameters and states; the power flow gives the operating point."""
     with m.scope("transformer"):
         R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
         X_t = m.parameter("X_t", data.X_t, "pu", "Reactance", base="S_n", minimum=0, source=data.source)

@@ -82,11 +82,6 @@ def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> 
     ----------
     machine, exciter, governor, stabilizer
         Names of `MACHINES`, `EXCITERS`, `GOVERNORS` and `STABILIZERS`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such part, or the parts do not fit each other.
     """
     found = Parts(
         _part("machine", MACHINES, machine),

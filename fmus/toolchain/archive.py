@@ -40,15 +40,7 @@ def packed(contents: Mapping[str, bytes]) -> bytes:
 
 
 def write_archive(target: Path, contents: Mapping[str, bytes]) -> Path:
-    """Write an FMU; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    target
-        The .fmu file; its folder is created where missing.
-    contents
-        By path inside the archive.
-    """
+    """Write an FMU; the file appears whole or not at all."""
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_suffix(f".{uuid.uuid4().hex}.part")
     partial.write_bytes(packed(contents))

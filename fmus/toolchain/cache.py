@@ -27,11 +27,6 @@ def cache_directory(kind: str) -> Path:
     """Folder for one kind of built file; ``GFOR_COSIM_CACHE`` overrides its parent.
 
     Contents are named by a hash of what they were made from: deleting the folder is always safe.
-
-    Raises
-    ------
-    CacheError
-        If there is no home folder to keep it in.
     """
     root = os.environ.get("GFOR_COSIM_CACHE")
     if root:
@@ -77,11 +72,6 @@ def keep(path: Path, content: bytes) -> Path:
     ----------
     path
         Below a `cache_directory`; its folder is created where missing.
-
-    Raises
-    ------
-    CacheError
-        If it cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

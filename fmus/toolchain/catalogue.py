@@ -33,15 +33,7 @@ def parts_of(name: str) -> dict[str, str]:
 
 
 def entry_of(name: str) -> EntryPoint:
-    """The catalogue's entry of a model, whose code need not be loaded.
-
-    Raises
-    ------
-    KeyError
-        If no model has that name; the message lists all models.
-    MissingLibraryError
-        If the library that models are written in is not installed.
-    """
+    """The catalogue's entry of a model, whose code need not be loaded."""
     found = _entries().get(name)
     if found is None:
         raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
@@ -50,24 +42,13 @@ def entry_of(name: str) -> EntryPoint:
 
 
 def build_model(name: str, **arguments: Any) -> Model:
-    """Build one model of the catalogue.
-
-    Raises
-    ------
-    KeyError
-        If no model has that name; the message lists all models.
-    """
+    """Build one model of the catalogue."""
     return _made(name, _factory(name), arguments)
 
 
 def sketch_model(name: str, **arguments: Any) -> Model:
     """A model with the variables of one of the catalogue's, whose equations may be left out: `SKETCH` of its factory
     makes it where that has one.
-
-    Raises
-    ------
-    KeyError
-        If no model has that name; the message lists all models.
     """
     factory = _factory(name)
     return _made(name, getattr(factory, SKETCH, factory), arguments)

@@ -70,15 +70,6 @@ def compile_library(source: str, platform: str) -> Path:
         One translation unit.
     platform
         A key of `TARGETS`.
-
-    Raises
-    ------
-    ValueError
-        If the platform is unknown.
-    RuntimeError
-        If the compiler fails; its own text is in the message.
-    CacheError
-        If the library cannot be kept.
     """
     if platform not in TARGETS:
         raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
@@ -91,15 +82,7 @@ def compile_library(source: str, platform: str) -> Path:
 
 
 def compile_here(*files: Path) -> Path:
-    """Compile files of C, as one (`joined_source`), for this machine, or return the library that this package brought.
-
-    Raises
-    ------
-    MissingLibraryError
-        If there is no such library, and no compiler is installed.
-    RuntimeError
-        If the compiler fails, or has no target for this machine.
-    """
+    """Compile files of C, as one (`joined_source`), for this machine, or return the library of the package."""
     platform = host_platform()
     if platform is None:
         raise RuntimeError("there is no compiler for this platform")

@@ -71,15 +71,7 @@ def model_description(
 
 
 def with_guid(text: str, guid: str, attribute: str = "guid") -> bytes:
-    """The text of a description that was made with an empty guid, with this one.
-
-    Parameters
-    ----------
-    text, guid
-        Both texts.
-    attribute
-        What this version of FMI calls it.
-    """
+    """The text of a description that was made with an empty guid, with this one."""
     return text.replace(f' {attribute}=""', f' {attribute}="{guid}"', 1).encode()
 
 

@@ -48,15 +48,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
 
 
 def build_description(identifier: str, source_file: str) -> bytes:
-    """The text of sources/buildDescription.xml: how a tool compiles the FMU.
-
-    Parameters
-    ----------
-    identifier
-        Of the model.
-    source_file
-        Name of the C file beside it.
-    """
+    """The text of sources/buildDescription.xml: how a tool compiles the FMU."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     SubElement(SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file)

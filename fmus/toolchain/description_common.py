@@ -91,15 +91,7 @@ def described_variables(model: Model) -> Iterator[DescribedVariable]:
 
 
 def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, ...]]:
-    """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0.
-
-    Parameters
-    ----------
-    model
-        The model.
-    listed
-        Whether it is looked up what each depends on.
-    """
+    """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0."""
     known = structure(model) if listed else unlisted(model)
     return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
 

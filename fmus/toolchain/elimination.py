@@ -18,13 +18,7 @@ class Elimination:
 
 
 def plan_elimination(model: Model) -> Elimination:
-    """Plan the factorisation of a model whose implicit part is linear in its states.
-
-    Raises
-    ------
-    ValueError
-        If the Jacobian of that part depends on states or inputs.
-    """
+    """Plan the factorisation of a model whose implicit part is linear in its states."""
     n = len(model.states)
     x, u = ca.SX.sym("x", n), ca.SX.sym("u", len(model.inputs))
     p, c = ca.SX.sym("p", len(model.parameters)), ca.SX.sym("c", len(model.calculated))

@@ -10,15 +10,7 @@ from fmus.toolchain.plan import Plan
 
 
 def plan_pattern(n: int, rows: Sequence[int], columns: Sequence[int]) -> Plan:
-    """Plan the factorisation of an n×n matrix without pivoting, from the places of its elements.
-
-    Parameters
-    ----------
-    n
-        Number of rows.
-    rows, columns
-        Of its elements, those of the diagonal included.
-    """
+    """Plan the factorisation of an n×n matrix without pivoting, from the places of its elements."""
     order = _order(n, np.array(rows), np.array(columns))
     position = np.empty(n, dtype=int)
     position[order] = np.arange(n)

@@ -31,13 +31,7 @@ class Recipe(Protocol):
         """Default platforms to compile for [FMI 2.0 names]."""
 
     def host_platforms(self) -> tuple[str, ...]:
-        """Platforms to compile for where the FMU is for this machine alone [FMI 2.0 names].
-
-        Raises
-        ------
-        RuntimeError
-            If no such FMU can be made for this machine.
-        """
+        """Platforms to compile for where the FMU is for this machine alone [FMI 2.0 names]."""
 
     def description(self) -> bytes:
         """The text of modelDescription.xml, for which nothing is compiled."""
@@ -67,11 +61,6 @@ def export(
     extra
         Further members of the archive, by path.
 
-    Returns
-    -------
-    pathlib.Path
-        The FMU.
-
     Raises
     ------
     ValueError, RuntimeError
@@ -88,15 +77,7 @@ def kept_at(recipe: Recipe) -> Path:
 
 
 def cached(recipe: Recipe) -> Path:
-    """Return this machine's FMU, building it if it was not built before, or was changed since.
-
-    Raises
-    ------
-    RuntimeError
-        If no such FMU can be made for this machine.
-    CacheError
-        If it cannot be kept.
-    """
+    """Return this machine's FMU, building it if it was not built before, or was changed since."""
     platforms = recipe.host_platforms()
     target = kept_at(recipe)
     return target if intact(target) else keep(target, packed(recipe.contents(platforms)))

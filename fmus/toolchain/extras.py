@@ -35,11 +35,6 @@ def require(purpose: str, *libraries: str) -> None:
         The task, as the subject of the error's sentence, such as "building an FMU".
     libraries
         Keys of `EXTRAS`.
-
-    Raises
-    ------
-    MissingLibraryError
-        If any is missing; the message names the extra to install.
     """
     missing = [library for library in libraries if find_spec(library) is None]
     if missing:

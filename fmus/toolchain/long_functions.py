@@ -37,11 +37,6 @@ def cut(source: str, longest: int = LONGEST, part: int = _PART) -> str:
         and its work array must have room for all its local variables, as its ``sz_w`` says.
     longest, part
         Lines of a function that stays as it is, and of each part of others.
-
-    Raises
-    ------
-    ValueError
-        If a long function has a line that is no operation of CasADi's.
     """
 
     def in_parts(match: re.Match[str]) -> str:

@@ -26,17 +26,7 @@ _FOLDERS_3 = {
 
 
 class NativeFmu:
-    """All parts of a native FMU, with one hash over them.
-
-    Parameters
-    ----------
-    model
-        The exported model.
-    version
-        Of FMI.
-    sources
-        Whether the C source is in the FMU as well, for tools that compile. It is one file that needs the C library.
-    """
+    """All parts of a native FMU, with one hash over them."""
 
     cache_prefix = "native_"
 

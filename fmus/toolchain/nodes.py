@@ -46,13 +46,7 @@ class Nodes:
         return list(zip(parts[:n], parts[n:], strict=True))
 
     def equations(self, x: ca.SX, u: ca.SX, p: ca.SX, c: ca.SX) -> NodalEquations:
-        """The equations as functions, with the plan of their solution.
-
-        Parameters
-        ----------
-        x, u, p, c
-            Symbols of states, inputs, parameters and calculated parameters.
-        """
+        """The equations as functions, with the plan of their solution."""
         rows, columns = zip(*self.elements, strict=True)
         plan = plan_pattern(len(self.currents), rows, columns)
         ordered = [self.elements[place] for place in plan.entries]

@@ -9,13 +9,7 @@ _THIN = b"\xcf\xfa\xed\xfe"
 
 
 def universal_binary(libraries: Sequence[bytes]) -> bytes:
-    """Join thin 64-bit libraries, one per processor.
-
-    Raises
-    ------
-    ValueError
-        If one of them is not a thin 64-bit Mach-O file.
-    """
+    """Join thin 64-bit libraries, one per processor."""
     step = 1 << _ALIGNMENT
     header, body = struct.pack(">II", _MAGIC, len(libraries)), b""
     offset = step

@@ -51,13 +51,7 @@ def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
 
 
 def read_answer(path: Path) -> dict[str, Any]:
-    """What the process wrote: ``error``, or ``interface`` and ``trial``.
-
-    Raises
-    ------
-    ForeignAnswerError
-        If it is of another form.
-    """
+    """What the process wrote: ``error``, or ``interface`` and ``trial``."""
     try:
         content = json.loads(read_plain_file(path))
     except (ValueError, RecursionError) as error:

@@ -105,13 +105,7 @@ class Device:
     voltage_per_q: float = 0.2
 
     def around(self, name: str) -> Model:
-        """The circuit, as a model of this name.
-
-        Raises
-        ------
-        DeviceFileError
-            If it has no parameter to which the file gives a value, or not that value.
-        """
+        """The circuit, as a model of this name."""
         made = converter_circuit(name, self.filter_kind, self.bridge)
         known = {p.name: p for p in made.parameters if p.type == "Real"}
         for key, value in self.circuit.items():
@@ -133,13 +127,7 @@ class Device:
 
 
 def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
-    """The DLL that a device's file names, and the whole table.
-
-    Raises
-    ------
-    DeviceFileError
-        If it cannot be read, or has keys that it should not have.
-    """
+    """The DLL that a device's file names, and the whole table."""
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -156,13 +144,7 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
 
 
 def device_of(path: Path, table: Mapping[str, Any], interface: DllInterface) -> Device:
-    """Work out a device's file for the DLL that it names.
-
-    Raises
-    ------
-    DeviceFileError
-        With what is wrong, where, and the remedy.
-    """
+    """Work out a device's file for the DLL that it names."""
     try:
         return _Reader(table, interface).device(path.parent / table["dll"])
     except ValueError as error:

@@ -37,17 +37,7 @@ class DllError(ValueError):
 
 @dataclass(frozen=True)
 class VendorDll:
-    """A vendor's DLL, as it describes itself.
-
-    Attributes
-    ----------
-    interface
-        What it declares.
-    trial
-        How it keeps its state.
-    platform
-        FMI 2.0 name of the platform it is for.
-    """
+    """A vendor's DLL, as it describes itself."""
 
     path: Path
     interface: DllInterface
@@ -67,15 +57,6 @@ READER = "fmus.vendor_dll.reading"
 
 def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -> VendorDll:
     """Read a DLL in a process of its own, and try how it keeps its state.
-
-    Parameters
-    ----------
-    path
-        The vendor's file.
-    reader
-        Module that is run for it; one that closes its process off first.
-    also
-        Platforms beside this machine's own whose libraries the reader can load.
 
     Raises
     ------
@@ -101,20 +82,7 @@ def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -
 
 
 def platform_of(path: Path, also: Sequence[str] = ()) -> str:
-    """FMI 2.0 name of the platform that a library is for.
-
-    Parameters
-    ----------
-    path
-        Its file.
-    also
-        Platforms that are taken beside this machine's own.
-
-    Raises
-    ------
-    DllError
-        If it is no library, or for a platform that is not taken.
-    """
+    """FMI 2.0 name of the platform that a library is for."""
     try:
         with path.open("rb") as file:
             head = file.read(8)
@@ -163,16 +131,6 @@ def dll_fmu(
         Value of parameters that are text; by default the DLL's own.
     device
         The circuit around the controller; by default there is none.
-
-    Returns
-    -------
-    pathlib.Path
-        The FMU.
-
-    Raises
-    ------
-    DllError
-        If there is no such parameter.
     """
     return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
 

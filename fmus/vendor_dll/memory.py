@@ -21,15 +21,7 @@ def unheard(_doing: str) -> None:
 
 
 class LibraryEndedError(ValueError):
-    """The process that a DLL is in has ended.
-
-    Parameters
-    ----------
-    words
-        How.
-    passing
-        The reason lies in this machine, not in the DLL.
-    """
+    """The process that a DLL is in has ended."""
 
     def __init__(self, words: str, *, passing: bool = False) -> None:
         super().__init__(words)
@@ -62,20 +54,7 @@ class Library(Protocol):
 
 
 class LocalLibrary:
-    """A DLL in this process.
-
-    Parameters
-    ----------
-    path
-        Its file.
-    note
-        Told what is done with it.
-
-    Raises
-    ------
-    OSError
-        If it cannot be loaded.
-    """
+    """A DLL in this process."""
 
     def __init__(self, path: Path, note: Note = unheard) -> None:
         note("it is loaded")

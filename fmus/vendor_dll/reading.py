@@ -67,13 +67,7 @@ class _ModelInfo(c.Structure):
 
 
 def read_interface(library: Library) -> DllInterface:
-    """What a loaded DLL declares.
-
-    Raises
-    ------
-    ValueError
-        If it declares nothing, or numbers that no DLL has.
-    """
+    """What a loaded DLL declares."""
     if not library.has("Model_GetInfo"):
         raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL")
     found = library.call("Model_GetInfo")

@@ -73,17 +73,7 @@ class HostVariable:
 
 
 def device_variables(interface: DllInterface, trial: Trial, device: Device, circuit: Model) -> tuple[HostVariable, ...]:
-    """All variables of a controller with a circuit around it: what the circuit gives the controller is no input.
-
-    Parameters
-    ----------
-    interface, trial
-        What the DLL declares, and how it keeps its state.
-    device
-        What its signals mean at the circuit.
-    circuit
-        The circuit's model.
-    """
+    """All variables of a controller with a circuit around it: what the circuit gives the controller is no input."""
     measured = {route.place.name for route in device.measured}
     driven = {route.place.name for route in device.driven}
     found = []
@@ -179,21 +169,7 @@ def host_source(
     variables: Sequence[HostVariable],
     around: tuple[Device, Model] | None = None,
 ) -> str:
-    """The source without its identity.
-
-    Parameters
-    ----------
-    interface, trial
-        What the DLL declares, and how it keeps its state.
-    texts
-        Value of each parameter that is text.
-    vendor_file
-        Name of the DLL in the FMU's resources.
-    variables
-        All of the FMU.
-    around
-        The circuit around the controller, if there is one.
-    """
+    """The source without its identity."""
     code = [(_C / name).read_text(encoding="utf-8") for name in ("library.c", "host.c")]
     functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
     export = (_TOOLCHAIN / "fmi.h").read_text(encoding="utf-8").split("typedef")[0]

@@ -10,13 +10,7 @@ from orchestrator.safe_files import write_bytes
 
 
 def write_junit(report: AcceptanceReport, path: Path) -> None:
-    """Write a report.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
+    """Write a report."""
     results = report.results
     suite = Element(
         "testsuite",

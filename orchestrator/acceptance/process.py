@@ -36,15 +36,7 @@ _LOOK = 0.05
 
 
 class ProcessEndedError(Exception):
-    """The FMU's process is gone, or was given up; no error of the FMU's, so no check takes it for a refusal.
-
-    Attributes
-    ----------
-    fault
-        Its name.
-    how
-        What happened, in which call and when.
-    """
+    """The FMU's process is gone, or was given up; no error of the FMU's, so no check takes it for a refusal."""
 
     def __init__(self, fault: ProcessFault, how: str) -> None:
         self.fault, self.how = fault, how
@@ -53,13 +45,6 @@ class ProcessEndedError(Exception):
 
 class FmuProcess:
     """A process with instances of one FMU.
-
-    Parameters
-    ----------
-    description, directory
-        The FMU, bound or not, and where its archive is extracted.
-    limits
-        What it may take.
 
     Attributes
     ----------
@@ -107,17 +92,7 @@ class FmuProcess:
     # -- questions and answers -------------------------------------------------------------------
 
     def talk(self, call: str, instance: int, command: str, *arguments: Any) -> Any:
-        """Have something done that needs more than numbers.
-
-        Parameters
-        ----------
-        call
-            Name of what is asked, for the error where the process ends meanwhile.
-        instance
-            Its number in the process; −1 where no instance is meant.
-        command, arguments
-            What the worker does, and with what: plain values for JSON.
-        """
+        """Have something done that needs more than numbers."""
         if self._ended is not None:
             raise self._ended
         self.box.clear_log()
@@ -319,11 +294,6 @@ class HostedComponent(RemoteCalls, Derived):
             At which the first step starts [s].
         step_size
             Communication step [s].
-
-        Raises
-        ------
-        ComponentError
-            With the time of the step that was refused.
         """
         status, stage, done, values = self._process.run(
             self.number, _references(into), rows, _references(out), steps, time, step_size

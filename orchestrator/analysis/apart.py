@@ -12,15 +12,6 @@ def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
 
     Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
     like that, so that whoever believes it on must be told. A state in seconds is a clock.
-
-    Parameters
-    ----------
-    master
-        Has the components whose states these are.
-    model
-        Step map or continuous model.
-    zeros
-        How many eigenvalues of zero are counted beside theirs.
     """
     if zeros + len(model.apart) <= 1:
         return []

@@ -87,15 +87,7 @@ class BlockArnoldi:
         return found
 
     def knows_all_beyond(self, size: float, wanted: Callable[[int], bool]) -> bool:
-        """Whether all values of that size or more are known, and the next ones are seen to be smaller.
-
-        Parameters
-        ----------
-        size
-            Of ν.
-        wanted
-            Whether a value, by its place, may be one of those that are looked for. Others need not settle as far.
-        """
+        """Whether all values of that size or more are known, and the next ones are seen to be smaller."""
         larger = int((np.abs(self.values) >= size).sum())
         beyond = slice(larger, larger + _BEYOND)
         allowed = np.maximum(ROUGH, (size / np.abs(self.values[beyond]) - 1) / 2)

@@ -61,13 +61,6 @@ class Blocks:
         Names of the sampled components among them.
     declared
         By component and output: the inputs that its FMU says it depends on directly.
-
-    Raises
-    ------
-    InputError
-        If there is no such variable, or an input cannot be perturbed.
-    AnalysisError
-        If a component is known over the whole step, and does it in parts.
     """
 
     def __init__(
@@ -209,17 +202,7 @@ class Blocks:
         return {inputs.index(t.variable): targets.index(t) for t in targets if t.component == name}
 
     def entries(self, name: str, newest: Indices, arriving: Indices) -> Indices:
-        """Where the values that reach a component's inputs stand in w.
-
-        Parameters
-        ----------
-        name
-            Of the component.
-        newest
-            Where the values of all outputs and external inputs stand.
-        arriving
-            Where what arrives over the links stands.
-        """
+        """Where the values that reach a component's inputs stand in w."""
         found: Indices = newest[self.sources[name]].copy()
         for place, link in self.linked(name).items():
             found[place] = arriving[link]

@@ -175,11 +175,6 @@ def linearize_by_derivatives(
         As `linearize_component`.
     inputs, observed
         As `linearize_component`.
-
-    Raises
-    ------
-    AnalysisError
-        If the FMU gives no directional derivatives, or wrong ones.
     """
     component = exchange.component
     states = component.description.states

@@ -112,11 +112,6 @@ def follow_along(
         Ends of the path; the end may be the smaller one.
     strides
         How it is walked.
-
-    Raises
-    ------
-    AnalysisError
-        If the mode cannot be recognised even after the shortest stride.
     """
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin

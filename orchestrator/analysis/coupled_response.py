@@ -161,13 +161,7 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
 
 
 def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
-    """Disturb all states, run the FMUs, and compare with z⁺ = A·z; the smallest disagreement of all `SIZES`.
-
-    Parameters
-    ----------
-    master
-        At the operating point; it is left as it was.
-    """
+    """Disturb all states, run the FMUs, and compare with z⁺ = A·z; the smallest disagreement of all `SIZES`."""
     state = CoupledState(master)
     x_0 = state.read()
     settable = np.concatenate([

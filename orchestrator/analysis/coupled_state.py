@@ -12,18 +12,7 @@ from orchestrator.coupling.master import Master
 
 
 class CoupledState:
-    """The states of all components. A step can be tried from any state and taken back.
-
-    Parameters
-    ----------
-    master
-        A running system whose components let their states be set.
-
-    Raises
-    ------
-    AnalysisError
-        If a component does not let its states be set.
-    """
+    """The states of all components. A step can be tried from any state and taken back."""
 
     def __init__(self, master: Master) -> None:
         self._master = master

@@ -33,22 +33,7 @@ _TURNS, _LATE = 300, 100
 
 
 def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:
-    """Which black boxes make the exchange grow, in words; nothing where it does not.
-
-    Parameters
-    ----------
-    master
-        Initialised; it is left as it was.
-    boxes
-        Components that can be neither perturbed nor put back.
-
-    Raises
-    ------
-    ComponentError
-        If a further instance of one of them cannot be run.
-    AnalysisError
-        If one of the others cannot be linearised.
-    """
+    """Which black boxes make the exchange grow, in words; nothing where it does not."""
     known = {name: _responding(master, name) for name in boxes}
     blocks = Blocks(master, known=known)
     growth = _growth(compose(blocks, master.schedule))

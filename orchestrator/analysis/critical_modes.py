@@ -87,11 +87,6 @@ def find_critical_modes(
         Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
     damping
         Damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of −0.1.
-
-    Raises
-    ------
-    AnalysisError
-        If the range is empty or begins at 0, or Arnoldi's method does not converge.
     """
     if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
@@ -108,13 +103,7 @@ def find_critical_modes(
 
 
 def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
-    """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone.
-
-    Raises
-    ------
-    AnalysisError
-        If Arnoldi's method does not converge.
-    """
+    """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone."""
     if len(model.names) <= DENSE:
         values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return complex(values[np.argmin(np.abs(values - wanted))])
@@ -123,13 +112,7 @@ def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
 
 
 def nearest_pairs(model: LinearModel, wanted: complex, count: int) -> list[tuple[complex, Vector, Vector]]:
-    """The eigenvalues λ [rad/s] nearest to a given one, each with its left and right eigenvector.
-
-    Raises
-    ------
-    AnalysisError
-        If Arnoldi's method does not converge.
-    """
+    """The eigenvalues λ [rad/s] nearest to a given one, each with its left and right eigenvector."""
     search = Search(model, wanted)
     search.nearest(count)
     return search.pairs(range(count))

@@ -41,11 +41,6 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
         Variables whose derivatives are given, one for each row: rates and outputs.
     knowns
         Variables by which the unknowns are differentiated, one for each column: states and inputs.
-
-    Raises
-    ------
-    AnalysisError
-        Naming the derivative that is farthest off.
     """
     one, two = _central_differences(component, unknowns, knowns)
     allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]

@@ -42,11 +42,6 @@ def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector
     alone
         All eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
         determinant is theirs.
-
-    Raises
-    ------
-    AnalysisError
-        If an eigenvalue lies on the line that is followed.
     """
     poles = np.asarray(alone, dtype=complex)
 

@@ -22,13 +22,7 @@ def embedded_model(component: Component) -> EmbeddedModel | None:
 
 
 def check_operating_point(component: Component, model: EmbeddedModel) -> None:
-    """Compare a running FMU with the operating point and the parameters of the model inside it.
-
-    Raises
-    ------
-    AnalysisError
-        Naming what differs most.
-    """
+    """Compare a running FMU with the operating point and the parameters of the model inside it."""
     where = f"component {component.name!r}: the linear model inside its FMU"
     if tuple(model.states) != component.description.states:
         raise AnalysisError(f"{where} has other states than the FMU; build the FMU again with its model")

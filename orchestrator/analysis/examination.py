@@ -59,11 +59,6 @@ def examine(
         Modes that must not depend on the communication step; by default the same.
     frequency_range
         [Hz]
-
-    Raises
-    ------
-    InputError
-        If the communication step is so long that a slow mode is lost.
     """
     if spectrum is None:
         small = len(model.names) <= WHOLE

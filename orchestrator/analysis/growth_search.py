@@ -84,13 +84,7 @@ class _Sector:
 
 
 def find_growing_modes(model: LinearModel) -> GrowthSearch:
-    """Every mode that grows, of a step map or continuous matrix of any size.
-
-    Raises
-    ------
-    AnalysisError
-        If Arnoldi's method does not converge, or too many modes lie in one place.
-    """
+    """Every mode that grows, of a step map or continuous matrix of any size."""
     H = model.step_size
     farthest = FASTEST if H is None else np.pi / H
     rings = 1 + int(np.ceil(np.log(farthest / SLOWEST) / np.log(_RING)))
@@ -119,13 +113,7 @@ def _ring(inner: float, outer: float, limit: float) -> list[_Sector]:
 
 
 def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
-    """Modes of a step map that grow so fast that their multipliers are far larger than all others.
-
-    Raises
-    ------
-    AnalysisError
-        If there are more such modes than the search looks for.
-    """
+    """Modes of a step map that grow so fast that their multipliers are far larger than all others."""
     n = len(model.names)
     step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
     start = np.random.default_rng(0).standard_normal(n)

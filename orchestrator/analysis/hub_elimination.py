@@ -146,17 +146,7 @@ class HubEquations:
 
 @dataclass(frozen=True)
 class HubFactors:
-    """A − σI, factorised in its parts.
-
-    Attributes
-    ----------
-    blocks
-        P, with σ in it.
-    inside
-        P⁻¹·Q: what the hub's unknowns do to the blocks'.
-    port
-        T − R·P⁻¹·Q.
-    """
+    """A − σI, factorised in its parts."""
 
     equations: HubEquations
     sigma: complex

@@ -66,16 +66,6 @@ def identify_modes(
         Most exponentials looked for.
     highest_hz
         The signal is thinned to ten samples per period of this frequency.
-
-    Returns
-    -------
-    list of IdentifiedMode
-        One of each conjugate pair, largest amplitude first.
-
-    Raises
-    ------
-    AnalysisError
-        If the signal is shorter than 20 samples or constant.
     """
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval
@@ -143,13 +133,7 @@ class Sampling:
 
 
 def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
-    """Which samples `identify_modes` uses.
-
-    Parameters
-    ----------
-    times, highest_hz
-        As there.
-    """
+    """Which samples `identify_modes` uses."""
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     finest = 1 / (10 * highest_hz)
     thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1

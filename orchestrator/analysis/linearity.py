@@ -77,19 +77,7 @@ class Doubt:
 
 
 def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]) -> list[Doubt]:
-    """Components whose perturbation leaves the modes in doubt; empty for a smooth system.
-
-    Parameters
-    ----------
-    blocks
-        The linearised components.
-    schedule
-        The order in which the components are stepped and exchange values.
-    model
-        The step map composed of the blocks.
-    modes
-        Modes that must not depend on the perturbation.
-    """
+    """Components whose perturbation leaves the modes in doubt; empty for a smooth system."""
     found = []
     for kind, why in enumerate(_WHY):
         perturbed = [name for name, c in blocks.components.items() if len(c.variants) > kind]

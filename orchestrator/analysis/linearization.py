@@ -32,30 +32,12 @@ def linearize(master: Master, step_size: float | None = None, schedule: Schedule
         At an operating point; it is left as it was.
     step_size, schedule
         By default the master's own; other values show the coupling's effect with another step or schedule.
-
-    Raises
-    ------
-    AnalysisError
-        If a component cannot be perturbed.
     """
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
 
 def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) -> LinearModel:
-    """Walk once through the schedule. Every output gets an index in w each time that it is computed.
-
-    Parameters
-    ----------
-    blocks, schedule
-        The linearised components, and the order in which they are stepped.
-    within_period
-        Whether the map of one of many steps is wanted, after which sampled components repeat.
-
-    Raises
-    ------
-    AnalysisError
-        If direct feed-through closes a loop, or sampled components make each step another.
-    """
+    """Walk once through the schedule. Every output gets an index in w each time that it is computed."""
     blocks.check_made_for(schedule)
     if blocks.period > 1 and not within_period:
         raise AnalysisError(
@@ -123,13 +105,7 @@ def _line_names(blocks: Blocks, lines: Mapping[int, tuple[DelayLine, slice]]) ->
 
 
 def continuous(blocks: Blocks) -> LinearModel:
-    """The same components, connected without any communication step: ẋ = A·x.
-
-    Raises
-    ------
-    AnalysisError
-        If a component does not give its derivatives, or direct feed-through closes a loop.
-    """
+    """The same components, connected without any communication step: ẋ = A·x."""
     blocks.check_made_for(None)
     silent = [name for name, c in blocks.components.items() if c.A_c is None]
     if silent:

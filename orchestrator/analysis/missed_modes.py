@@ -46,11 +46,6 @@ def missed(
         Range of Im λ [rad/s], above 0.
     damping
         Damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
-
-    Raises
-    ------
-    AnalysisError
-        If Arnoldi's method does not converge, or too many modes lie in one place.
     """
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T

@@ -105,13 +105,6 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
 
     A name stays free where no mode fits, where two fit about equally, or where the only mode that fits well has another
     name.
-
-    Parameters
-    ----------
-    modes
-        The candidates.
-    measures
-        By name.
     """
     names = list(measures)
     fit = np.array([[measures[name](mode) for mode in modes] for name in names]).reshape(len(names), len(modes))

@@ -173,18 +173,7 @@ def number_trajectories(
     route: Iterable[tuple[At, Sequence[At]]],
     threshold: float = THRESHOLD,
 ) -> Followed[At]:
-    """Give every mode of every point the number of a trajectory.
-
-    Parameters
-    ----------
-    points
-        Modes by place.
-    route
-        Places in the order of following, each with earlier places. Predecessors of its modes are looked for in the
-        first of these, and then in the next.
-    threshold
-        Least similarity.
-    """
+    """Give every mode of every point the number of a trajectory."""
     result: Followed[At] = Followed()
     count = 0
     for place, origins in route:

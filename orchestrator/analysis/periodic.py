@@ -87,15 +87,7 @@ def model_of(master: Master, blocks: Blocks) -> LinearModel:
 
 
 def period_model(master: Master, blocks: Blocks) -> LinearModel:
-    """A map per communication step whose power over the whole period is that of the running system.
-
-    Parameters
-    ----------
-    master
-        At a state that repeats; it is left as it was.
-    blocks
-        Its components, linearised there.
-    """
+    """A map per communication step whose power over the whole period is that of the running system."""
     names, scale = _names_and_scales(blocks, master.schedule)
     maps = _Period(master, blocks.period, names, scale).maps()
     per_step = _per_step(maps, blocks.period)
@@ -212,22 +204,7 @@ def _turns(right: Complex, left: Complex, exponents: Complex, maps: NDArray[np.f
 
 
 def find_periodic_point(master: Master, accept: float, most: int) -> PeriodicPoint:
-    """A state from which the system repeats after a period, by Newton's method on the map of a period.
-
-    Parameters
-    ----------
-    master
-        Initialised; it is left at the state that was found.
-    accept
-        Residual below which no better one is looked for.
-    most
-        Largest number of iterations; the map is linearised once.
-
-    Raises
-    ------
-    AnalysisError
-        If the components do not repeat together soon.
-    """
+    """A state from which the system repeats after a period, by Newton's method on the map of a period."""
     schedule = gauss_seidel(master.schedule.groups)
     blocks = Blocks(master, schedule=schedule)
     steps = steps_of_period(master, master.clock.step_size)

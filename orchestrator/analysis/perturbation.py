@@ -53,13 +53,6 @@ def perturb(step: PerturbedStep, rates: Sequence[str]) -> PerturbationResult:
     """Perturb every state and input, with smaller sizes where two sizes disagree.
 
     What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
-
-    Parameters
-    ----------
-    step
-        The component's step.
-    rates
-        Names of the states' time derivatives, which are differenced as well.
     """
     names, h = step.names, step.step_size
     columns: Sequence[int] = range(len(names))
@@ -96,21 +89,7 @@ def _take_over(
     agreeing: NDArray[np.bool_],
     one_sided: NDArray[np.bool_],
 ) -> None:
-    """Put those of the new columns that agree in the place of the old ones.
-
-    Parameters
-    ----------
-    kept
-        Has all columns.
-    new
-        Has only some.
-    columns
-        Places of the new ones among all.
-    agreeing
-        Which of the new ones are taken.
-    one_sided
-        Which of all keep what they answered upwards.
-    """
+    """Put those of the new columns that agree in the place of the old ones."""
     for part in Differences._fields:
         taken = [k for k in range(len(columns)) if agreeing[k]]
         if part.endswith("_up"):
@@ -121,13 +100,7 @@ def _take_over(
 
 
 def _apart(one: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix], share: float, *floors: float) -> NDArray[np.bool_]:
-    """Columns in which two answers, each the states' change and d(y), differ by more than a share of what is there.
-
-    Parameters
-    ----------
-    floors
-        Added to what is there, of the states' change and of the outputs.
-    """
+    """Columns in which two answers, each the states' change and d(y), differ by more than a share of what is there."""
     far = [
         (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=0)
         for a, b, floor in zip(one, other, floors, strict=True)

@@ -36,13 +36,6 @@ class RealSchur:
     ----------
     values
         All eigenvalues, shape (n,): the same as those of `scipy.linalg.eig`, in the same order.
-
-    Raises
-    ------
-    ValueError
-        If an element is infinite or not a number.
-    numpy.linalg.LinAlgError
-        If the eigenvalues do not converge.
     """
 
     def __init__(self, A: Matrix) -> None:

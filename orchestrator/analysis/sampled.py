@@ -48,13 +48,7 @@ def steps_of_times(times: Iterable[Fraction], step_size: float) -> int:
 
 
 def steps_of_period(master: Master, step_size: float, without: Iterable[str] = ()) -> int:
-    """Communication steps [s] after which all components repeat; 1 where each step is like every other.
-
-    Raises
-    ------
-    AnalysisError
-        If they repeat together after a second at the earliest.
-    """
+    """Communication steps [s] after which all components repeat; 1 where each step is like every other."""
     times = {name: t for name, t in repeating(master).items() if name not in set(without)}
     steps = steps_of_times((time for found in times.values() for time in found), step_size)
     if steps > 1 and steps * step_size > LONGEST * (1 + 1e-9):

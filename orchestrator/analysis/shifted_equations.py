@@ -11,15 +11,7 @@ from orchestrator.errors import AnalysisError
 
 
 class Factors:
-    """A − σI at one point σ.
-
-    Parameters
-    ----------
-    lu
-        Of the model's equations with σ in them.
-    states
-        Number n of states.
-    """
+    """A − σI at one point σ."""
 
     def __init__(self, lu: spla.SuperLU, states: int) -> None:
         self._lu, self._n = lu, states
@@ -48,13 +40,7 @@ class Factors:
 
 
 class ShiftedEquations:
-    """The equations of a model, ready for any σ.
-
-    Parameters
-    ----------
-    model
-        Step map or continuous model, with n states.
-    """
+    """The equations of a model, ready for any σ."""
 
     def __init__(self, model: LinearModel) -> None:
         n, m = model.G.shape
@@ -67,13 +53,7 @@ class ShiftedEquations:
         self._whole, self._n = whole.astype(complex), n
 
     def at(self, sigma: complex) -> Factors:
-        """Factorise A − σI.
-
-        Raises
-        ------
-        AnalysisError
-            If σ is an eigenvalue, to the last digit.
-        """
+        """Factorise A − σI."""
         shifted = self._whole.copy()
         shifted.data[self._diagonal] -= sigma
         try:

@@ -79,17 +79,7 @@ def linearize_slopes(
 
 
 class _Point:
-    """A component at its operating point, perturbed and put back.
-
-    Parameters
-    ----------
-    component
-        The FMU.
-    names
-        What is perturbed.
-    answers
-        What is read.
-    """
+    """A component at its operating point, perturbed and put back."""
 
     def __init__(self, component: Component, names: Sequence[str], answers: Sequence[str]) -> None:
         self.names = tuple(names)

@@ -33,13 +33,7 @@ def obstacle(component: Component) -> str | None:
 
 
 class StateAccess:
-    """Reads and sets the continuous states of one component; those that cannot be set stay as they are.
-
-    Raises
-    ------
-    AnalysisError
-        If the component can neither be perturbed and restored, nor has a linear model inside.
-    """
+    """Reads and sets the continuous states of one component; those that cannot be set stay as they are."""
 
     def __init__(self, component: Component) -> None:
         if reason := obstacle(component):

@@ -81,13 +81,7 @@ class StateSpace:
 
 
 def read_linear_model(path: Path) -> StateSpace:
-    """The continuous linear model that an FMU carries; names are those of its variables.
-
-    Raises
-    ------
-    InputError
-        If the file is not an FMU, or has no linear model inside.
-    """
+    """The continuous linear model that an FMU carries; names are those of its variables."""
     model = read_embedded_model(path)
     if model is None:
         raise InputError(f"{path}: there is no linear model inside; `gfor build --with-linear-model` packs one")

@@ -68,11 +68,6 @@ def find_operating_point(
         is searched for, and kept if it is better.
     max_iterations
         Largest number of iterations of Newton's method on the step map.
-
-    Raises
-    ------
-    AnalysisError
-        If no fixed point is found; the message names the states that move most.
     """
     if (steps := steps_of_period(master, master.clock.step_size)) > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)

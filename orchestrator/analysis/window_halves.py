@@ -58,11 +58,6 @@ class WindowPart:
         """Whether this part shows a mode of all of the signal; None where it cannot tell.
 
         It cannot where it is too short, or where a beat, noise or the decay hides the mode.
-
-        Parameters
-        ----------
-        mode
-            Of all of the signal.
         """
         if mode.frequency_hz * self.length < _FEWEST_PERIODS:
             return None
@@ -98,15 +93,7 @@ class WindowPart:
 
 
 def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> IdentifiedMode | None:
-    """The nearest mode within a sensible distance.
-
-    Parameters
-    ----------
-    modes
-        Among which it is looked for.
-    mode
-        As seen elsewhere.
-    """
+    """The nearest mode within a sensible distance."""
     best = min(modes or (), key=lambda other: _distance(other, mode), default=None)
     return best if best is not None and _distance(best, mode) <= SENSIBLE else None
 

@@ -39,40 +39,19 @@ def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescript
 
     The description can be added to a `System` or given to `open_component`; behind a binding it has the variables of
     our port.
-
-    Raises
-    ------
-    FmuFileError
-        If the FMU cannot be loaded.
-    BindingError
-        With every problem of the binding.
     """
     description = read_description(fmu)
     return description if binding is None else bind(description, binding)
 
 
 def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
-    """Describe an FMU through a binding file.
-
-    Raises
-    ------
-    BindingError
-        With every problem of the file.
-    """
+    """Describe an FMU through a binding file."""
     path = Path(binding)
     return BoundDescription.of(fmu, _Reader(fmu, read_table(path), str(path)).port_map())
 
 
 def read_table(path: Path) -> BindingTable:
-    """Read a binding file and check its form.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or it is not TOML.
-    BindingError
-        With every entry that is wrong.
-    """
+    """Read a binding file and check its form."""
     _, raw = read_toml(path, "the binding", "`gfor bind FILE.fmu` drafts one")
     try:
         return BindingTable.model_validate(raw)

@@ -21,13 +21,7 @@ class UnitsDifferError(ValueError):
 
 
 def unit_of(info: VariableInfo, given: str | None) -> str:
-    """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one.
-
-    Raises
-    ------
-    ValueError
-        If neither gives a unit, or they differ.
-    """
+    """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one."""
     declared = info.unit
     if given is None:
         if declared in ("", "1", "-"):
@@ -45,13 +39,7 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
 
 
 def factor(unit: str, target: str, name: str) -> float:
-    """The number of ``target`` in one ``unit``.
-
-    Raises
-    ------
-    ValueError
-        If they are of different kinds.
-    """
+    """The number of ``target`` in one ``unit``."""
     try:
         return to_unit(f"1 {unit}", target)
     except ValueError as error:

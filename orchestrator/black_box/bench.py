@@ -75,13 +75,7 @@ class Bench:
 
     @contextmanager
     def runs(self) -> Iterator["Runs"]:
-        """Runs that all begin at the same operating point.
-
-        Raises
-        ------
-        AnalysisError
-            If the device does not come to rest at the ideal bus.
-        """
+        """Runs that all begin at the same operating point."""
         runs = Runs(self)
         try:
             yield runs

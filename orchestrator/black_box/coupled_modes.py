@@ -104,13 +104,6 @@ def linearize_with_box(
         Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
     report
         As `measure`.
-
-    Raises
-    ------
-    InputError
-        If there is no such component.
-    AnalysisError
-        If the system is not at rest at the operating point, or the box cannot be identified there.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")

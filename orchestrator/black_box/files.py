@@ -20,19 +20,7 @@ from orchestrator.safe_files import write_text
 def save_identification(
     response: FrequencyResponse, model: IdentifiedModel, passive: Passivity, folder: Path
 ) -> list[Path]:
-    """Write ``admittance.csv``, ``identified_model.mat``, ``identification.json`` and ``admittance.png``.
-
-    Parameters
-    ----------
-    response
-        The measured response.
-    model
-        The fitted model.
-    passive
-        Passivity of the response.
-    folder
-        Where the files go; it is made where it is missing.
-    """
+    """Write ``admittance.csv``, ``identified_model.mat``, ``identification.json`` and ``admittance.png``."""
     names = ("admittance.csv", "identified_model.mat", "identification.json", "admittance.png")
     table, matrices, summary, picture = (folder / name for name in names)
     save_table(_rows(response, passive), table)

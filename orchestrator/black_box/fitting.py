@@ -31,13 +31,7 @@ _COUNTS = 1e-7
 
 
 def require_fitting() -> None:
-    """Refuse a measurement whose response cannot be fitted, before the measurement begins.
-
-    Raises
-    ------
-    MissingLibraryError
-        If scikit-rf is not installed.
-    """
+    """Refuse a measurement whose response cannot be fitted, before the measurement begins."""
     require("fitting a model to a measured response", "skrf")
 
 

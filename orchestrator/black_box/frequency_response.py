@@ -115,24 +115,7 @@ class FrequencyResponse:
 
 
 def measure(bench: Bench, excitation: Excitation, report: Callable[[str], None] | None = None) -> FrequencyResponse:
-    """Measure a device.
-
-    Parameters
-    ----------
-    bench
-        The device at an ideal bus.
-    excitation
-        What it is excited with.
-    report
-        Called with a sentence before each of the runs, which may take minutes.
-
-    Raises
-    ------
-    AnalysisError
-        If it does not come to rest, or its response does not settle.
-    ComponentError
-        If it refuses a call.
-    """
+    """Measure a device."""
     lines = odd_lines(excitation.lowest_hz, excitation.highest_hz, excitation.lines)
     frequencies = lines * excitation.lowest_hz
     if frequencies[-1] * bench.step_size >= 0.5:

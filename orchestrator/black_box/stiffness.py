@@ -40,11 +40,6 @@ class Stiffness:
             One of its responses, shape (f,).
         low, high
             Band [Hz].
-
-        Raises
-        ------
-        ValueError
-            If no frequency lies in the band.
         """
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):

@@ -31,19 +31,7 @@ def assign_values(draft: Draft) -> None:
 
 
 def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:
-    """The value in the variable's unit and type; None, with a note of the problem, if it does not fit.
-
-    Parameters
-    ----------
-    draft
-        Takes the note.
-    info
-        The variable.
-    value
-        A number in the variable's unit, a truth value, or text with a unit.
-    where
-        Its place in the case file, for the note.
-    """
+    """The value in the variable's unit and type; None, with a note of the problem, if it does not fit."""
     try:
         return convert(info, value)
     except ValueError as error:

@@ -47,13 +47,7 @@ class NativeChoice:
 
     @property
     def native(self) -> bool:
-        """The choice.
-
-        Raises
-        ------
-        ValueError
-            If something else than true or false is written.
-        """
+        """The choice."""
         if not isinstance(self.given, bool):
             raise ValueError(f"native = {self.given!r}; it must be true or false")
         return self.given
@@ -86,13 +80,7 @@ class PartChoice:
 
     @property
     def name(self) -> str:
-        """The choice.
-
-        Raises
-        ------
-        ValueError
-            If something else than a name is written.
-        """
+        """The choice."""
         if not isinstance(self.given, str):
             raise ValueError(f"{self.part} = {self.given!r}; it must be the name of a part, in quotes")
         return self.given
@@ -100,17 +88,7 @@ class PartChoice:
 
 @dataclass(frozen=True)
 class ShareChoice:
-    """A converter's share of its unit.
-
-    Attributes
-    ----------
-    label
-        Of the unit; empty for all units.
-    given
-        As it is written.
-    place
-        Where it is written.
-    """
+    """A converter's share of its unit."""
 
     label: str
     given: Value
@@ -118,13 +96,7 @@ class ShareChoice:
 
     @property
     def share(self) -> float:
-        """From 0 to 1.
-
-        Raises
-        ------
-        ValueError
-            If something else is written.
-        """
+        """From 0 to 1."""
         if isinstance(self.given, bool | str) or not 0 <= self.given <= 1:
             raise ValueError(f"alpha = {self.given!r}; it must be a number from 0 to 1")
         return float(self.given)

@@ -71,11 +71,6 @@ class Case(CaseDefinition):
             theirs.
         dispatch
             What the units fed before an outage that they share; None where each feeds its own ``P_0``.
-
-        Raises
-        ------
-        CaseError
-            With every problem of the file and of the overrides.
         """
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
@@ -140,13 +135,7 @@ class Case(CaseDefinition):
     def components_of(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
     ) -> dict[str, ComponentPlan]:
-        """Components of one scenario with their values; much cheaper than to prepare it.
-
-        Raises
-        ------
-        CaseError
-            With every problem of the components and of the values.
-        """
+        """Components of one scenario with their values; much cheaper than to prepare it."""
         return {name: plan for name, (_, plan) in self.placed(scenario, overrides, parameters).items()}
 
     def placed(
@@ -178,13 +167,6 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     ----------
     trust_fmus
         Whether foreign FMUs may run in this process, where the file says ``isolated = false``; else that is a problem.
-
-    Raises
-    ------
-    InputError
-        If there is neither, or the file is not TOML, or not an SSP.
-    CaseError
-        If the file lacks entries without which nothing can be checked, or an SSP has unsupported parts.
     """
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():

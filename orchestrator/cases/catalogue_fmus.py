@@ -43,26 +43,7 @@ class PlannedFmu:
 def plan_fmu(
     model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
 ) -> PlannedFmu:
-    """FMU of a catalogue's model, described and not yet built.
-
-    Parameters
-    ----------
-    model
-        Its name.
-    network
-        That a grid is built for.
-    native
-        Whether it is compiled, with no Python in it.
-    parts
-        What a model with parts is made of, as pairs of a key and a part's name.
-
-    Raises
-    ------
-    KeyError
-        If no model has that name.
-    MissingLibraryError
-        If the extra that builds FMUs is not installed.
-    """
+    """FMU of a catalogue's model, described and not yet built."""
     require(f"building the FMU {model!r} of the catalogue", "casadi", "pythonfmu", "ziglang")
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 

@@ -65,13 +65,7 @@ def place_of(row: Row) -> str:
 
 
 def number(row: Row, column: str) -> float:
-    """The number in a column.
-
-    Raises
-    ------
-    InputError
-        If the column holds no number.
-    """
+    """The number in a column."""
     try:
         value = float(row[column])
     except (TypeError, ValueError):

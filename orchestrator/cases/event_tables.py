@@ -188,19 +188,7 @@ def _fault(table: BusFaultTable, grid: str) -> list[Event]:
 
 
 def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str) -> Event | None:
-    """The event with its values in the variables' units; None if something is wrong with it.
-
-    Parameters
-    ----------
-    draft
-        Takes the notes.
-    event
-        With values as the file has them.
-    fed
-        What feeds each connected input.
-    where
-        Place of the event in the file.
-    """
+    """The event with its values in the variables' units; None if something is wrong with it."""
     before = len(draft.problems)
     for component, settings in event.changes().items():
         plan = draft.system.components.get(component)

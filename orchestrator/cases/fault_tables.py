@@ -131,17 +131,7 @@ def _trip(draft: Draft, table: ComponentTripTable, where: str) -> list[Event]:
 
 
 def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clock) -> list[Event]:
-    """Note events that set the same at the same time; the others, without ends that another beginning replaces.
-
-    Parameters
-    ----------
-    draft
-        Takes the notes.
-    events
-        Each with its place in the file.
-    clock
-        Two times in one communication step are the same.
-    """
+    """Note events that set the same at the same time; the others, without ends that another beginning replaces."""
     seen: dict[tuple[int, str], tuple[Event, str]] = {}
     for event, where in events:
         for what in _set_by(event):

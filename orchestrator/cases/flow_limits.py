@@ -74,11 +74,6 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
     -------
     tuple
         The equations that were solved at last, their result, and the buses at their limit.
-
-    Raises
-    ------
-    PowerFlowError
-        If the buses at a limit do not settle.
     """
     position = {bus: k for k, bus in enumerate(equations.buses)}
     at_limit: dict[str, float] = {}

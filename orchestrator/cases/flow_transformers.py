@@ -19,13 +19,6 @@ def legs_of(transformer: ThreeWinding, *, closed: bool = True) -> list[FlowLine]
 
     A leg with both a ratio and a negative reactance is two in series. An open transformer keeps its star point with the
     first bus, without a current.
-
-    Parameters
-    ----------
-    transformer
-        With the values that are set.
-    closed
-        Whether it is connected.
     """
     legs, star = [], f"{transformer.name}.star"
     for k, bus in enumerate(transformer.buses):

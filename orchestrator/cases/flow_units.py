@@ -11,31 +11,13 @@ _HELD = "holds its bus there, whatever reactive power that takes; give v_0, or g
 
 
 def flow_unit(name: str, bus: str, plan: ComponentPlan, *, connected: bool) -> FlowUnit:
-    """A unit as the power flow sees it: one whose ``Q_0`` is set feeds that, any other holds its ``v_0``.
-
-    Parameters
-    ----------
-    name, bus
-        Its name, and the bus where it is.
-    plan
-        Its values.
-    connected
-        Whether its breaker is closed.
-    """
+    """A unit as the power flow sees it: one whose ``Q_0`` is set feeds that, any other holds its ``v_0``."""
     Q_0 = plan.number("Q_0") if "Q_0" in plan.parameters else None
     return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected, Q_0)
 
 
 def note_contradictions(draft: Draft, units: Mapping[str, str]) -> None:
-    """Note what the power flow computes of a unit and the case sets nevertheless.
-
-    Parameters
-    ----------
-    draft
-        Takes the notes.
-    units
-        Bus of every unit.
-    """
+    """Note what the power flow computes of a unit and the case sets nevertheless."""
     for name in units:
         given = draft.system.components[name].parameters
         if "theta_0" in given:
@@ -58,15 +40,6 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
 
     They do not hold a voltage by themselves. What does, a machine or a grid-forming converter, holds 1 pu if nothing
     else is said.
-
-    Parameters
-    ----------
-    draft
-        With the values that are set; the power flow has set none yet.
-    units
-        Bus of every unit.
-    slack
-        Bus that feeds what is left.
     """
     for name, bus in units.items():
         plan = draft.system.components[name]

@@ -120,21 +120,7 @@ def _overridden(
 def imperfection_of(
     draft: Draft, table: ImperfectionTable, connection: Connection, clock: Clock, where: str
 ) -> Imperfection | None:
-    """What a table says of one connection, in the unit of its signal; None where it is wrong, which is noted.
-
-    Parameters
-    ----------
-    draft
-        Takes the note.
-    table
-        The table.
-    connection
-        The connection that it is for.
-    clock
-        Delays are whole steps of it.
-    where
-        Place of the table in the file.
-    """
+    """What a table says of one connection, in the unit of its signal; None where it is wrong, which is noted."""
     info = signal_info(draft.system, connection)
     try:
         found = _converted(table, info)
@@ -246,13 +232,7 @@ def _numbers(name: str, imperfection: Imperfection) -> dict[str, float | bool]:
 
 
 def number_info(system: System, tables: Mapping[str, ImperfectionTable], key: str) -> VariableInfo:
-    """The number that ``imperfections.NAME.KEY`` reaches, as a variable with its unit.
-
-    Raises
-    ------
-    InputError
-        If there is no such imperfection, or it has no such number.
-    """
+    """The number that ``imperfections.NAME.KEY`` reaches, as a variable with its unit."""
     _, name, field = (*key.split(".", 2), "", "")[:3]
     if name not in tables:
         hint = close_names(name, tables, f"there are: {', '.join(tables)}" if tables else "the case has none")

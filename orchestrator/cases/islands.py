@@ -17,15 +17,7 @@ _SHOWN = 5
 
 
 def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
-    """Ask about every part of the network that an event leaves with loads and without a unit.
-
-    Parameters
-    ----------
-    draft
-        With the network and its components; takes the questions.
-    events
-        Those of the run, each with its place in the file.
-    """
+    """Ask about every part of the network that an event leaves with loads and without a unit."""
     plan = draft.system.components.get(draft.grid or "")
     if draft.network is None or draft.network_failed or plan is None or draft.grid is None:
         return
@@ -56,17 +48,7 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
 
 
 def _without_unit(network: Network, units: Mapping[str, str], values: Mapping[str, object]) -> list[list[str]]:
-    """Buses of each connected part that has a load and no unit.
-
-    Parameters
-    ----------
-    network
-        The grid's.
-    units
-        Bus of each unit.
-    values
-        Of the grid's parameters; what is missing is as it was built.
-    """
+    """Buses of each connected part that has a load and no unit."""
     row = {bus: k for k, bus in enumerate(network.buses)}
     ends = [(line.from_bus, line.to_bus) for line in network.lines if values.get(line.variable("connected"), True)]
     for winding in network.transformers:

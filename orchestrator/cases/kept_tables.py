@@ -26,17 +26,7 @@ _CODE = "".join(file.read_text(encoding="utf-8") for file in _FILES)
 
 
 def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> SourceTables:
-    """The tables of a network as they are kept, or else as they are made, and kept for the next time.
-
-    Parameters
-    ----------
-    name
-        Of the network, or of its file.
-    content
-        Of the file; empty for a network of pandapower's own.
-    make
-        Makes the tables; what it raises is not kept.
-    """
+    """The tables of a network as they are kept, or else as they are made, and kept for the next time."""
     versions = _versions()
     if not versions["pandapower"]:
         return make()

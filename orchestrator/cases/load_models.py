@@ -32,15 +32,7 @@ def as_powers(table: NetworkTable) -> NetworkTable:
 
 
 def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:
-    """The question about the load model, where it is open and a load draws power.
-
-    Parameters
-    ----------
-    table, loads
-        Of the network.
-    place
-        Where the source is named.
-    """
+    """The question about the load model, where it is open and a load draws power."""
     return [Problem(place, _OPEN)] if is_open(table) and any(x.p_mw > 0 for x in loads) else []
 
 
@@ -61,11 +53,6 @@ def with_laws(
         The load's own keys, which decide first.
     parts
         What of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
-
-    Raises
-    ------
-    InputError
-        If the parts of P or Q cancel each other.
     """
     feeds = load.p_mw < 0
     models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]

@@ -18,13 +18,7 @@ _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
 
 
 def file_name(name: str) -> str:
-    """A name that can be that of a file or a folder on every system, and lead to no other place.
-
-    Raises
-    ------
-    ValueError
-        If it cannot.
-    """
+    """A name that can be that of a file or a folder on every system, and lead to no other place."""
     rule = "it becomes the name of a file or folder: use letters, digits, _ and -, at most 200 bytes"
     if not name.strip():
         raise ValueError(f"this name is empty; {rule}")
@@ -63,13 +57,7 @@ def _parts(name: str) -> list[str]:
 
 
 def variables_of(expression: str) -> list[str]:
-    """Names of the variables in a signal's expression.
-
-    Raises
-    ------
-    InputError
-        If the expression is neither a variable nor the difference of two.
-    """
+    """Names of the variables in a signal's expression."""
     names = [part.strip() for part in expression.split(" - ")]
     if not 1 <= len(names) <= 2 or not all(names):
         raise InputError(

@@ -12,13 +12,6 @@ def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list
     """The lines with each negative reactance joined to the line in series, and the buses that are no more.
 
     A negative reactance that nothing can be joined with stays, for the network to refuse by name.
-
-    Parameters
-    ----------
-    lines
-        All branches.
-    kept
-        Buses with a load, a generator or a shunt.
     """
     merged: set[str] = set()
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
@@ -57,13 +50,6 @@ def _joined_legs(line: Line, other: Line) -> Line | None:
 def without_star_points(lines: list[Line], kept: set[str]) -> tuple[list[Line], list[ThreeWinding], set[str]]:
     """The lines without those of negative reactance at star points, the transformers in their place, and the buses that
     are no more.
-
-    Parameters
-    ----------
-    lines
-        All branches.
-    kept
-        Buses with a load, a generator or a shunt.
     """
     transformers, gone = [], set[str]()
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:

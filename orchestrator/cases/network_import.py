@@ -62,13 +62,7 @@ class ImportedNetwork:
 
 
 def import_network(source: SourceTables) -> ImportedNetwork:
-    """Convert a source's tables to elements. Everything out of service is left out.
-
-    Raises
-    ------
-    InputError
-        With every part of the source that the grid model does not have.
-    """
+    """Convert a source's tables to elements. Everything out of service is left out."""
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
     lines, to_earth = _lines(source, labels)

@@ -27,13 +27,7 @@ _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
 
 
 def read_matpower(path: Path) -> SourceTables:
-    """Read a MATPOWER case, ``.m`` or ``.mat``.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it does not hold MATPOWER's tables.
-    """
+    """Read a MATPOWER case, ``.m`` or ``.mat``."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)")
     if path.suffix not in (".m", ".mat"):
@@ -63,13 +57,7 @@ def read_matpower(path: Path) -> SourceTables:
 
 
 def read_pandapower(name: str, directory: Path) -> SourceTables:
-    """Take a network of ``pandapower.networks`` by name, or one saved with ``pandapower.to_json``.
-
-    Raises
-    ------
-    InputError
-        If there is neither, or its own power flow has no solution.
-    """
+    """Take a network of ``pandapower.networks`` by name, or one saved with ``pandapower.to_json``."""
     path = seen_from_here(directory / name)
     changed = path.stat().st_mtime_ns if name.endswith(".json") and path.is_file() else 0
     return _solved_pandapower(name, path, changed)

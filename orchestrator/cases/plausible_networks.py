@@ -101,19 +101,7 @@ def _swapped(component: str, resistance: str, reactance: str, R: float, X: float
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:
-    """Place where a value of an element was set, or otherwise the place of the element.
-
-    Parameters
-    ----------
-    draft
-        Knows the places.
-    kind
-        Table of the network that such elements are written in.
-    element, key
-        The element's name, and the key of its table.
-    variables
-        Of the grid, that hold the value.
-    """
+    """Place where a value of an element was set, or otherwise the place of the element."""
     table = draft.case.network
     for variable in variables:
         if set_at := draft.places.get(f"{draft.grid}.{variable}"):

@@ -17,13 +17,7 @@ _FAR = 20.0
 
 
 def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
-    """Ask about loads below zero, capacitors, step-up transformers, saturation and a flat start.
-
-    Parameters
-    ----------
-    draft
-        With the values that are set.
-    """
+    """Ask about loads below zero, capacitors, step-up transformers, saturation and a flat start."""
     grid = draft.system.components.get(draft.grid or "")
     if grid is None or draft.network is None or draft.data is None or draft.grid is None or draft.case.network is None:
         return

@@ -46,23 +46,7 @@ def outside(
     where: str | None = None,
     scale: float = 1.0,
 ) -> Iterator[UnusualValue]:
-    """Ask about a value that is not in its usual range.
-
-    Parameters
-    ----------
-    draft
-        Knows the places.
-    component, variable
-        Whose value it is.
-    value
-        In the range's unit.
-    wanted
-        The range.
-    where
-        Its place, where that is not the component's.
-    scale
-        What carries the value to the base of the range.
-    """
+    """Ask about a value that is not in its usual range."""
     given, value = value, value * scale
     if wanted.fits(value):
         return

@@ -17,13 +17,6 @@ def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> di
 
     A condition is compared in the variable's own unit, with the value that is set, else with the default. A name that
     nothing has is noted as a problem.
-
-    Parameters
-    ----------
-    draft
-        The scenario with its values.
-    imperfections
-        Numbers of the connections' imperfections, by key.
     """
     table = draft.case.reference
     if table is None:

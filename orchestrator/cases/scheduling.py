@@ -16,15 +16,6 @@ Groups = tuple[tuple[str, ...], ...]
 def groups_of(solver: SolverTable, grid: str | None, names: Collection[str], removed: Collection[str]) -> Groups:
     """The groups of the file. By default the devices step first and then the grid, or every component is a group of
     its own.
-
-    Parameters
-    ----------
-    solver
-        The case's table.
-    grid
-        Name of the grid, if the case has one.
-    names, removed
-        Components of the scenario, and those that it leaves out.
     """
     if solver.groups is not None:
         groups = [tuple(name for name in group if name not in removed) for group in solver.groups]
@@ -37,21 +28,7 @@ def groups_of(solver: SolverTable, grid: str | None, names: Collection[str], rem
 def schedule_of(
     name: ScheduleName, solver: SolverTable, grid: str | None, system: System, removed: Collection[str]
 ) -> Schedule:
-    """The schedule of a name for a scenario's components, with the case's tolerance where it takes one.
-
-    Parameters
-    ----------
-    name
-        Of the schedule.
-    solver
-        The case's table.
-    grid
-        Name of the grid, if the case has one.
-    system
-        The components.
-    removed
-        Names of components that the scenario leaves out.
-    """
+    """The schedule of a name for a scenario's components, with the case's tolerance where it takes one."""
     if name == "jacobi":
         return jacobi(tuple(system.components))
     micro = solver.micro_step or shortest_internal_step(system)
@@ -60,17 +37,7 @@ def schedule_of(
 
 
 def schedule_in(case: CaseDefinition, scenario: str, system: System, name: ScheduleName) -> Schedule:
-    """The same, of a scenario that was prepared.
-
-    Parameters
-    ----------
-    case, scenario
-        The case, and the scenario's name.
-    system
-        Its components.
-    name
-        Of the schedule.
-    """
+    """The same, of a scenario that was prepared."""
     flow = case.table.power_flow
     grid = None if flow is None else flow.grid
     return schedule_of(name, case.table.solver, grid, system, case.scenarios[scenario].remove)

@@ -178,11 +178,6 @@ def shared_flow(
         As in `orchestrator.cases.power_flow.solve_power_flow`.
     dispatch
         What they fed before.
-
-    Raises
-    ------
-    InputError
-        If there is no power flow, or the units that are left cannot feed it.
     """
     left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
     if dispatch.rule is SharingRule.SLACK:

@@ -60,12 +60,6 @@ def start_from_power_flow(
         Units that an event connects; a limit of theirs must stay.
     dispatch
         What the units fed before an outage that they share; None where each feeds its own ``P_0``.
-
-    Raises
-    ------
-    InputError
-        If no solution is found, or a unit cannot feed the power of the
-        solution.
     """
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
 

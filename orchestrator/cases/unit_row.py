@@ -59,20 +59,7 @@ class UnitRow:
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:
-    """The row itself.
-
-    Parameters
-    ----------
-    row
-        With its figures.
-    place
-        Where they stand, for the error.
-
-    Raises
-    ------
-    InputError
-        If a figure cannot be.
-    """
+    """The row itself."""
     if not row.rating_mva > 0:
         raise InputError(
             f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"

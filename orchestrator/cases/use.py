@@ -29,11 +29,6 @@ def use_in_case(
         Communication step [s]; the case's where None.
     scenario
         Name of the scenario; None for the first one with the component.
-
-    Raises
-    ------
-    InputError
-        If no component is that FMU, no scenario has it, or the case cannot be prepared.
     """
     loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
     name = _component(loaded, component, fmu)

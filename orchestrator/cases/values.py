@@ -50,13 +50,7 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
 
 
 def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
-    """Refuse another system base for a device with our port. A bound FMU's variable of this name has another meaning.
-
-    Raises
-    ------
-    ValueError
-        If the variable is the system base and the value another one.
-    """
+    """Refuse another system base for a device with our port. In a bound FMU the name has another meaning."""
     own = not isinstance(description, BoundDescription) and I_RE.name in description.variables
     if own and variable == S_BASE.name and value != SYSTEM_BASE_MVA:
         raise ValueError(

@@ -37,11 +37,6 @@ def write_case(request: CertificationRequest, switches: Mapping[str, bool], fold
     ----------
     switches
         Values of the converter's variables that follow from ``--pod``.
-
-    Raises
-    ------
-    InputError
-        If a file is missing, or a value cannot be used.
     """
     request.check()
     _lay(request.fmu, folder / FMU)

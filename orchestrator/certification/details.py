@@ -60,15 +60,7 @@ class Details:
 
 
 def read_details(path: Path) -> Details:
-    """Read a file of details.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it is not TOML.
-    CaseError
-        With every entry that is wrong, and its line.
-    """
+    """Read a file of details."""
     text, raw = read_toml(path, "it", "`gfor certify --details-template` prints one", "--details")
     try:
         table = _Table.model_validate(raw)

@@ -49,15 +49,7 @@ def write_sealed(content: Mapping[str, Any], path: Path) -> None:
 
 
 def read_record(file: Path) -> Any:
-    """What a certificate's JSON says.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is not JSON, or a key stands twice in it: readers of such a file differ in what it says.
-    """
+    """What a certificate's JSON says."""
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         content = dict(pairs)

@@ -129,13 +129,7 @@ class _Certificate(_Table):
 
 
 def check_form(file: Path, content: dict[str, Any]) -> None:
-    """Refuse a certificate with a missing entry, or with an entry of another type.
-
-    Raises
-    ------
-    InputError
-        With the first such entry, its value, and the number of further ones.
-    """
+    """Refuse a certificate with a missing entry, or with an entry of another type."""
     remedy = "the certificate is damaged: take the file that `gfor certify` wrote, or make it anew"
     try:
         json.dumps(content, ensure_ascii=False).encode()

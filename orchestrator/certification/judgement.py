@@ -37,13 +37,7 @@ LOWERED = 2.0
 
 @dataclass(frozen=True)
 class TimeVerdict:
-    """The time-domain criterion on one response: either of its two ways is enough.
-
-    Attributes
-    ----------
-    other_reading
-        The judgement with the first extremum kept.
-    """
+    """The time-domain criterion on one response: either of its two ways is enough."""
 
     signal: str
     swings: SwingTest

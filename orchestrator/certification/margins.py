@@ -34,13 +34,7 @@ class CriterionMargin:
 
 
 def margins_of(certificate: Certification | CodeCertificate) -> list[CriterionMargin]:
-    """All criteria that count towards the verdict.
-
-    Parameters
-    ----------
-    certificate
-        Of the norm, or of a code.
-    """
+    """All criteria that count towards the verdict."""
     if isinstance(certificate, CodeCertificate):
         return [
             CriterionMargin(v.row.name, f.criterion, f.margin, f.accepted, f.text)

@@ -83,17 +83,7 @@ class MatrixCell:
 
 @dataclass(frozen=True)
 class CertificateMatrix:
-    """All cells.
-
-    Attributes
-    ----------
-    devices, codes
-        In the order in which they were asked for.
-    cells
-        By device and code.
-    left_out
-        Codes that were asked for and need values that nobody declared.
-    """
+    """All cells."""
 
     devices: tuple[str, ...]
     codes: tuple[str, ...]

@@ -34,17 +34,7 @@ READING = (
 
 
 def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Path) -> list[Path]:
-    """Write ``matrix.html`` and ``matrix.json``.
-
-    Parameters
-    ----------
-    matrix
-        All cells.
-    devices
-        What was compared, in the order of the matrix.
-    folder
-        That holds the certificates' folders.
-    """
+    """Write ``matrix.html`` and ``matrix.json``."""
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **matrix_json(matrix, devices)}
     write_text(folder / MATRIX_HTML, matrix_page(matrix, devices, made))

@@ -5,13 +5,7 @@ from orchestrator.certification.point import COMPUTED, CONVERTER
 
 
 def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
-    """Commands for the modes and the response of a point, to be given in the certificate's folder.
-
-    Parameters
-    ----------
-    identified
-        Whether an identified model replaces the converter in the modes.
-    """
+    """Commands for the modes and the response of a point, to be given in the certificate's folder."""
     which = f"{CASE} --scenario {scenario} --set grid.X_L={X_L!r}"
     low, high = COMPUTED
     modes = f"gfor modes {which} --range {low:g}:{high:g} --json"

@@ -14,19 +14,7 @@ _OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}
 
 
 def refused(request: CertificationRequest, error: CaseError, trial: str | Path, where: str) -> CaseError:
-    """The same problems, each at the option or in the file of the user that it comes from.
-
-    Parameters
-    ----------
-    request
-        That was refused.
-    error
-        Of the case file that was made of it.
-    trial
-        The folder in which that file lay.
-    where
-        What the case file was, in words.
-    """
+    """The same problems, each at the option or in the file of the user that it comes from."""
     own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
 
     def said(text: str) -> str:

@@ -27,13 +27,7 @@ _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 
 
 def page(certification: Certification, hashes: Mapping[str, str | None], made: datetime) -> str:
-    """The page's text.
-
-    Parameters
-    ----------
-    hashes
-        SHA-256 of every file beside it.
-    """
+    """The page's text."""
     figures = Figures()
     content = [
         ("For whom and by whom", details(certification)),

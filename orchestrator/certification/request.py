@@ -49,13 +49,7 @@ class CertificationRequest:
     black_box: bool = False
 
     def check(self) -> None:
-        """Check that the files exist, and that no value is set which the norm itself varies.
-
-        Raises
-        ------
-        InputError
-            With the file or value that cannot be used.
-        """
+        """Check that the files exist, and that no value is set which the norm itself varies."""
         for file in (self.fmu, *([self.binding] if self.binding else [])):
             if not file.is_file():
                 raise InputError(

@@ -137,25 +137,7 @@ def certify(
     folder: Path,
     report: CountReport = lambda done, total: None,
 ) -> Certification:
-    """Compute all points and judge them.
-
-    Parameters
-    ----------
-    request
-        The request for the certificate.
-    executor
-        Where the points are computed.
-    folder
-        Folder for the study's case file, the FMU, its binding, and every point as soon as it is computed. Stored points
-        are not computed again.
-    report
-        Called with the number of points done and the total number.
-
-    Raises
-    ------
-    InputError
-        If the FMU or a value cannot be used.
-    """
+    """Compute all points and judge them."""
     request.check()
     controllers = damping_controllers(bound_fmu(request.fmu, request.binding), request)
     prepared = _laid_case(request, controllers, folder)

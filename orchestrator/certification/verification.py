@@ -38,15 +38,7 @@ _NEEDED = (FMU, CASE, RESPONSES, HTML)
 
 @dataclass
 class Verification:
-    """The result of a verification.
-
-    Attributes
-    ----------
-    faults
-        Contradictions, in words; empty if everything agrees.
-    agreed
-        Statements that agree, in words.
-    """
+    """The result of a verification."""
 
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
@@ -58,13 +50,7 @@ class Verification:
 
 
 def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
-    """Folder and content of a certificate, from either the folder or ``certificate.json``.
-
-    Raises
-    ------
-    InputError
-        If there is no certificate, or this program does not know its form.
-    """
+    """Folder and content of a certificate, from either the folder or ``certificate.json``."""
     file = path / JSON if path.is_dir() else path
     try:
         content = read_record(file)
@@ -148,13 +134,7 @@ def least_damped(content: dict[str, Any]) -> float:
 
 
 def chosen_points(content: dict[str, Any], wanted: Sequence[float]) -> list[dict[str, Any]]:
-    """Points of the certificate at some reactances.
-
-    Raises
-    ------
-    InputError
-        If the certificate has no point at one of the reactances.
-    """
+    """Points of the certificate at some reactances."""
     chosen = []
     for X_L in wanted:
         match = [p for p in content["points"] if same_reactance(p["X_L"], X_L)]
@@ -172,21 +152,7 @@ def verify_points(
     executor: Executor,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Verification:
-    """Compute points anew, with and without the converter, and compare them with what was certified.
-
-    Parameters
-    ----------
-    folder
-        Of the certificate.
-    content
-        Contents of the certificate's JSON file.
-    points
-        Points of the certificate to compute again.
-    executor
-        Where they are computed.
-    report
-        Called with the number of computations done and their total, two for each point.
-    """
+    """Compute points anew, with and without the converter, and compare them with what was certified."""
     found = Verification()
     case = load_case(folder / CASE)
     place, mark = reference_to(case), fingerprint(case)

@@ -34,27 +34,7 @@ def certified(
     console: Console,
     told: tuple[str, str],
 ) -> tuple[Found, list[Path]]:
-    """Compute a certificate with its acceptance tests, and write its files; points are kept as they come.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    request
-        What is tested.
-    folder
-        For the results; no other command works in it meanwhile.
-    module
-        That computes a point; a worker imports it once.
-    study
-        Computes all points and judges them, given where to compute and a callback for how many are done.
-    save
-        Writes the files of a certificate into a folder.
-    console
-        Shows the progress.
-    told
-        Of what, and what is counted, for whoever has no terminal.
-    """
+    """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     made_folder(folder, "--out")

@@ -36,13 +36,6 @@ def codes_of(asked: str) -> tuple[str, ...]:
 def run_code(options: argparse.Namespace, device: Device) -> int:
     """Run one code's rows, write the certificate and print it.
 
-    Parameters
-    ----------
-    options
-        Of the command.
-    device
-        What is tested.
-
     Returns
     -------
     As `gfor certify`.
@@ -61,20 +54,7 @@ def run_code(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    """Refuse what only the norm's damping test has.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    devices
-        With the values that they are given.
-
-    Raises
-    ------
-    InputError
-        With the first such option.
-    """
+    """Refuse what only the norm's damping test has."""
     asked = {"--pod": options.pod, "--black-box": options.black_box, "--pdf": options.pdf,
              "--reactances": options.reactances != REACTANCES}  # fmt: skip
     if other := [name for name, value in asked.items() if value]:
@@ -87,18 +67,7 @@ def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -
 
 
 def bench_request(device: Device) -> CertificationRequest:
-    """A checked request for a device on the test bench.
-
-    Parameters
-    ----------
-    device
-        What is tested.
-
-    Raises
-    ------
-    InputError
-        If its files cannot be used.
-    """
+    """A checked request for a device on the test bench."""
     request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
     request.check()
     return request
@@ -107,21 +76,7 @@ def bench_request(device: Device) -> CertificationRequest:
 def certified_code(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[CodeCertificate, list[Path]]:
-    """The certificate, and its files.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    device
-        What is tested.
-    key
-        Which code.
-    folder
-        For the results.
-    console
-        Shows the progress.
-    """
+    """The certificate, and its files."""
     code = code_for(key, dict(options.declare))
     request = bench_request(device)
     return certified(
@@ -132,19 +87,7 @@ def certified_code(
 
 
 def show_code(found: CodeCertificate, files: Sequence[Path], folder: Path, console: Console) -> None:
-    """Print a certificate.
-
-    Parameters
-    ----------
-    found
-        The certificate.
-    files
-        That were written.
-    folder
-        That holds them.
-    console
-        Where to.
-    """
+    """Print a certificate."""
     console.print(_table(found), "")
     colour = {FAILS: "red", INCOMPLETE: "yellow"}.get(found.verdict, "green")
     console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)

@@ -32,21 +32,9 @@ from orchestrator.safe_files import made_folder
 def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     """Test every device by every code that is asked for, and write and print the matrix.
 
-    Parameters
-    ----------
-    options
-        Of the command.
-    devices
-        What is tested.
-
     Returns
     -------
     As `CertificateMatrix.exit_code`.
-
-    Raises
-    ------
-    InputError
-        If nothing at all could be tested, with the reasons.
     """
     codes, left_out = codes_of(options.code), tuple[str, ...]()
     if options.code == ALL and not options.declare:

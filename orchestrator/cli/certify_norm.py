@@ -28,21 +28,9 @@ from orchestrator.report.tables import PlainTable
 def run_norm(options: argparse.Namespace, device: Device) -> int:
     """Run the test for one device, write its report and print the verdict.
 
-    Parameters
-    ----------
-    options
-        Of the command.
-    device
-        What is tested.
-
     Returns
     -------
     As `gfor certify`.
-
-    Raises
-    ------
-    InputError
-        If a value is declared.
     """
     if options.declare:
         raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
@@ -60,19 +48,7 @@ def run_norm(options: argparse.Namespace, device: Device) -> int:
 def certified_norm(
     options: argparse.Namespace, device: Device, folder: Path, console: Console
 ) -> tuple[Certification, list[Path]]:
-    """The certificate, and its files.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    device
-        What is tested.
-    folder
-        For the results.
-    console
-        Shows the progress.
-    """
+    """The certificate, and its files."""
     request = _request(options, device)
     return certified(
         options, request, folder, "orchestrator.certification.point",
@@ -82,19 +58,7 @@ def certified_norm(
 
 
 def show_norm(result: Certification, files: Sequence[Path], folder: Path, console: Console) -> None:
-    """Print a certificate.
-
-    Parameters
-    ----------
-    result
-        The certificate.
-    files
-        That were written.
-    folder
-        That holds them.
-    console
-        Where to.
-    """
+    """Print a certificate."""
     console.print(_table(result), "")
     for v in result.verdicts:
         if said := v.of_base_critical():

@@ -64,22 +64,7 @@ def relative_change(text: str) -> float:
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:
-    """Refuse options that would do nothing.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    codes
-        That are asked for.
-    norm
-        The one among them that has no rows on a test bench.
-
-    Raises
-    ------
-    InputError
-        With the first such option.
-    """
+    """Refuse options that would do nothing."""
     others = {"--parameter": options.parameter, "--fixed": options.fixed, "--change": options.change,
               "--confirm": options.confirm}  # fmt: skip
     if not options.sensitivities:
@@ -97,17 +82,6 @@ def find_needs(
     options: argparse.Namespace, certificate: CodeCertificate, folder: Path, console: Console
 ) -> dict[str, Any] | None:
     """Run what failed rows would take, and write and print it.
-
-    Parameters
-    ----------
-    options
-        Of the command.
-    certificate
-        With the rows that fail.
-    folder
-        Of the certificate.
-    console
-        Where to.
 
     Returns
     -------

@@ -25,21 +25,9 @@ from orchestrator.safe_files import made_folder
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     """Measure a converter; there is no verdict, so that it neither passes nor fails.
 
-    Parameters
-    ----------
-    options
-        Of the command.
-    device
-        What is measured.
-
     Returns
     -------
     0
-
-    Raises
-    ------
-    InputError
-        If an option is given that it does not have.
     """
     checked((), dict(options.declare), GB)
     check_code_options(options, [device])
@@ -59,15 +47,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
 
 
 def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
-    """Measure a converter and write its files; says on standard error what is being done.
-
-    Parameters
-    ----------
-    device
-        What is measured.
-    folder
-        Where the files go; it is created where missing.
-    """
+    """Measure a converter and write its files; says on standard error what is being done."""
     request = bench_request(device)
     made_folder(folder, "--out")
     with said_stages() as report:

@@ -34,11 +34,6 @@ class StudyCheckpoints:
     ------
     InputError
         If the run to be resumed is made of something else now, or an FMU cannot be kept where that is required.
-
-    Attributes
-    ----------
-    run
-        Id of the run, which a resumed one keeps.
     """
 
     def __init__(self, scenarios: Sequence[PreparedScenario], folder: Path, options: argparse.Namespace) -> None:
@@ -61,15 +56,7 @@ class StudyCheckpoints:
             keep_request(folder, options)
 
     def _begin(self, scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> None:
-        """Forget an earlier run, and keep what is asked of this one.
-
-        Parameters
-        ----------
-        scenarios
-            All of them.
-        options
-            Of the command.
-        """
+        """Forget an earlier run, and keep what is asked of this one."""
         if self._interrupted():
             _say(f"{self._results} holds an interrupted run, which is given up: it would have gone on with --resume")
         rmtree(self._folder, ignore_errors=True)
@@ -86,30 +73,14 @@ class StudyCheckpoints:
         return run is not None and any(path.name.endswith(f"{PARTIAL}{run}") for path in unfinished(self._results))
 
     def of(self, name: str, recording: RecordingFolder, place: ScenarioFolder) -> Checkpoints | None:
-        """Those of a scenario, which has what it recorded until then; None where none are wanted.
-
-        Parameters
-        ----------
-        name
-            Of the scenario.
-        recording, place
-            Where its rows go, and its other files.
-        """
+        """Those of a scenario, which has what it recorded until then; None where none are wanted."""
         found = self._of.get(name)
         if found is not None:
             found.take_back(recording, [place.path / TRAJECTORY, place.place / TRAJECTORY], self.run)
         return found
 
     def end(self, *, whole: bool, interrupted: bool = False) -> None:
-        """After a study that came to its end nothing is left; else say how it goes on.
-
-        Parameters
-        ----------
-        whole
-            Whether it came to its end.
-        interrupted
-            Whether Ctrl-C or SIGTERM ended it: then it is worth to go on even where that is from the start.
-        """
+        """After a study that came to its end nothing is left; else say how it goes on."""
         if whole:
             remove_at_once(self._folder, self.run)
             return

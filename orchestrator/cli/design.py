@@ -158,13 +158,7 @@ def _given(out: Path) -> Path:
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
-    """Refuse what only a design over operating points takes.
-
-    Raises
-    ------
-    InputError
-        If one of these options is given.
-    """
+    """Refuse what only a design over operating points takes."""
     for name in ("controller", "component", "mode"):
         if len(getattr(options, name)) > 1:
             times = len(getattr(options, name))
@@ -175,13 +169,7 @@ def _check_for_one_point(options: argparse.Namespace) -> None:
 
 
 def _check_over_points(options: argparse.Namespace) -> None:
-    """Refuse what a design over operating points does not take.
-
-    Raises
-    ------
-    InputError
-        If one of these options is given.
-    """
+    """Refuse what a design over operating points does not take."""
     defaults = DesignRequest(controller="")
     given = {"--damping-increment": options.damping_increment is not None, "--refine": options.refine,
              "--delta-gain": options.delta_gain != defaults.delta_gain, "--no-margins": options.no_margins,

@@ -25,11 +25,6 @@ def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Exec
         With those of `add_executor_arguments`.
     imports
         Modules that a worker imports once.
-
-    Raises
-    ------
-    InputError
-        If both a number of workers and a scheduler are given.
     """
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")

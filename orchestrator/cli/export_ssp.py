@@ -35,13 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write every scenario to an archive of its own and print their paths.
-
-    Raises
-    ------
-    InputError
-        If several scenarios are to go into one file, or it cannot be written.
-    """
+    """Write every scenario to an archive of its own and print their paths."""
     out: Path | None = options.out
     scenarios = prepare(options)
     single = out is not None and out.suffix.lower() == ".ssp"

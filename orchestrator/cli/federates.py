@@ -43,13 +43,7 @@ def names(text: str) -> tuple[str, ...]:
 
 
 def choice(options: argparse.Namespace, number_of_scenarios: int) -> Federates | None:
-    """The choice of federates; None for the local master.
-
-    Raises
-    ------
-    InputError
-        If options contradict each other, or somebody else's federates would have to begin several times.
-    """
+    """The choice of federates; None for the local master."""
     given = {
         "names": options.federate, "external": options.external, "broker": options.broker, "port": options.broker_port,
         "patience": options.patience, "to_join": options.to_join,

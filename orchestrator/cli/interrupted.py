@@ -8,13 +8,7 @@ from orchestrator.fmi.interrupts import calls
 
 @contextmanager
 def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
-    """Have an interrupt inside carry how the study goes on; `ending` says it.
-
-    Parameters
-    ----------
-    words
-        Asked after the interrupt; "" where nothing was kept.
-    """
+    """Have an interrupt inside carry how the study goes on; `ending` says it."""
     try:
         yield
     except BaseException as error:

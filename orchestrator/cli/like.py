@@ -22,13 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def rules_of(options: argparse.Namespace) -> MasterRules | None:
-    """The master that a run is to follow; None for our own.
-
-    Raises
-    ------
-    InputError
-        If it is not known, or an order is given without it.
-    """
+    """The master that a run is to follow; None for our own."""
     if options.order and not options.like:
         raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
     if options.like and options.threads is not None:

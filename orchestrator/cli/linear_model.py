@@ -26,15 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:
-    """Members for the FMU's ``extra/`` folder; nothing without the option.
-
-    Raises
-    ------
-    InputError
-        If it is not clear what is meant.
-    AnalysisError
-        If the case has no steady state, or the component no derivatives.
-    """
+    """Members for the FMU's ``extra/`` folder; nothing without the option."""
     if options.linear_case is None:
         if options.scenario or options.component:
             raise InputError(f"--scenario and --component say more of {OPTION}; add it")

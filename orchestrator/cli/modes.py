@@ -78,17 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    """See `run`.
-
-    Parameters
-    ----------
-    scenarios
-        All of them.
-    options
-        Of the command.
-    folder
-        For the results, if they are wanted.
-    """
+    """See `run`."""
     if options.black_box:
         with said_stages() as report:
             results = [

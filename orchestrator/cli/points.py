@@ -38,13 +38,7 @@ class _Lines:
 
 
 class Progressing:
-    """A study of many points, for whoever interrupts it.
-
-    Parameters
-    ----------
-    folder
-        Of the results, which keeps the points.
-    """
+    """A study of many points, for whoever interrupts it."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._done, self._total = folder, 0, 0

@@ -91,19 +91,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Namespace, engine: Federates | None) -> int:
-    """Run the scenarios one after the other; each is written as soon as it is done.
-
-    Parameters
-    ----------
-    scenarios
-        All of them.
-    folder
-        For the results.
-    options
-        Of the command.
-    engine
-        Components that are federates.
-    """
+    """Run the scenarios one after the other; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
     if options.resume is None:
@@ -181,23 +169,7 @@ def _run_into(
     options: argparse.Namespace,
     engine: Federates | None,
 ) -> RunResult:
-    """Run a scenario; its recording grows in its folder.
-
-    Parameters
-    ----------
-    place
-        The scenario's folder.
-    scenario
-        The scenario.
-    bar
-        Shows how far it is.
-    kept
-        Checkpoints of all scenarios.
-    options
-        Of the command.
-    engine
-        Components that are federates.
-    """
+    """Run a scenario; its recording grows in its folder."""
     recording = RecordingFolder(place.path / FOLDER, scenario.prepared, {"run": place.run})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
@@ -214,19 +186,7 @@ def _run_into(
 def _early_end(
     name: str, error: BaseException, scenarios: Sequence[Scenario], results: Sequence[RunResult]
 ) -> EarlyEnd:
-    """Where a study ended, and what never began.
-
-    Parameters
-    ----------
-    name
-        Of the scenario in which it ended.
-    error
-        That ended it.
-    scenarios
-        All of them.
-    results
-        Of those that ran.
-    """
+    """Where a study ended, and what never began."""
     titles = {scenario.name: scenario.title for scenario in scenarios}
     names = list(titles)
     never = {later: titles[later] for later in names[names.index(name) + 1 :]}
@@ -245,22 +205,7 @@ def _save_together(
     stopped: tuple[str, BaseException] | None,
     early_end: EarlyEnd | None,
 ) -> list[Path]:
-    """Write what concerns all scenarios; return the plots.
-
-    Parameters
-    ----------
-    results
-        Of the scenarios that ran.
-    folder
-        For them all.
-    run_id
-        The run's id.
-    stopped
-        The scenario and the error that ended the run before its time; if nothing could be written any more, nobody
-        needs to be told a second time.
-    early_end
-        The same for the summary.
-    """
+    """Write what concerns all scenarios; return the plots."""
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]
     try:

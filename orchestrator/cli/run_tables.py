@@ -17,13 +17,7 @@ from orchestrator.study.run import RunResult
 
 
 def on_one_thread(statistics: StepStatistics) -> str:
-    """Which components one thread alone may step, and why; "" where any thread may step all.
-
-    Parameters
-    ----------
-    statistics
-        Of a run.
-    """
+    """Which components one thread alone may step, and why; "" where any thread may step all."""
     by_reason: dict[str, list[str]] = {}
     for name, reason in statistics.one_thread.items():
         by_reason.setdefault(reason, []).append(name)
@@ -33,15 +27,7 @@ def on_one_thread(statistics: StepStatistics) -> str:
 
 
 def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
-    """What a tolerance made of the communication steps.
-
-    Parameters
-    ----------
-    prepared
-        The scenario, with a tolerance.
-    counts
-        Of its run.
-    """
+    """What a tolerance made of the communication steps."""
     taken = f"{counts.accepted} steps" if counts.accepted else "no step"
     if counts.accepted:
         taken += f" of {1e3 * counts.shortest:.3g} to {1e3 * counts.longest:.3g} ms"
@@ -55,19 +41,7 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
 def print_run(
     console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None, *, details: bool = False
 ) -> None:
-    """How a study came out.
-
-    Parameters
-    ----------
-    console
-        Where it is printed.
-    results
-        Of the scenarios that ran.
-    early_end
-        Where it ended before its last scenario.
-    details
-        Print all that is known of the operating point.
-    """
+    """How a study came out."""
     if early_end is not None:
         colour = "yellow" if early_end.interrupted else "red"
         words = f"[bold {colour}]{early_end.word}[/] {escape(early_end.place)}"

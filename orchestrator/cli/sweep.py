@@ -61,21 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, options: argparse.Namespace) -> int:
-    """See `run`.
-
-    Parameters
-    ----------
-    case
-        The case.
-    folder
-        For the results; it need not be there yet.
-    progress
-        How far the points are.
-    executor
-        Where they are computed.
-    options
-        Of the command.
-    """
+    """See `run`."""
     planned = plan(
         case,
         options.vary,

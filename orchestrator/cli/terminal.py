@@ -52,13 +52,6 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
 def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
     """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
     that are most unusual.
-
-    Parameters
-    ----------
-    scenarios
-        Of one case; the facts are the first one's.
-    as_json
-        Whether standard output is JSON, which has no such line.
     """
     facts = None if as_json else facts_of(scenarios[0])
     if facts is not None:

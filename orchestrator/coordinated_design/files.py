@@ -129,17 +129,7 @@ def ranking_rows(design: PointsDesign) -> list[dict[str, Any]]:
 
 
 def save(design: PointsDesign, path: Path, command: str) -> list[Path]:
-    """Write the parameter file, and beside it JSON and two CSV files.
-
-    Parameters
-    ----------
-    design
-        The design.
-    path
-        Of the parameter file.
-    command
-        That made it.
-    """
+    """Write the parameter file, and beside it JSON and two CSV files."""
     text = parameter_file_text(values_of(design.plan.groups, design.settings), provenance(design, command))
     json_file = path.with_suffix(".json")
     points, ranking = path.with_suffix(".csv"), path.with_name(f"{path.stem}_ranking.csv")

@@ -22,24 +22,7 @@ _RANK = 1e-6
 
 
 def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]) -> OpenLoops:
-    """The system with its loops open.
-
-    Parameters
-    ----------
-    master
-        At its operating point, with the loops' controllers off and without lead/lag.
-    model
-        The continuous model there.
-    blocks
-        That the model was made of.
-    places
-        The loops; those of components that are out of service are left out.
-
-    Raises
-    ------
-    AnalysisError
-        If a controller does not act on its converter by one signal.
-    """
+    """The system with its loops open."""
     windows, known = blocks.state_windows(), blocks.components
     there = [place for place in places if place.component in known]
     p = len(blocks.output_names)

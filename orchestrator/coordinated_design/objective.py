@@ -277,15 +277,5 @@ def together(worths: Iterable[Worth]) -> Worth:
 
 
 def worth_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> Worth:
-    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves.
-
-    Parameters
-    ----------
-    loops
-        Of an operating point.
-    setting
-        Of the loops that are closed.
-    aim
-        Which modes are damped.
-    """
+    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves."""
     return RatedPoint(0, loops, aim, None).worth(setting)

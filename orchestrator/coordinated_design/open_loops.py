@@ -125,11 +125,6 @@ class OpenLoops:
     def closed(self, setting: Setting) -> Vector:
         """The matrix of the system with some loops closed.
 
-        Parameters
-        ----------
-        setting
-            Of the loops that are closed; one with gain 0 stays open.
-
         Returns
         -------
         ndarray

@@ -176,13 +176,7 @@ def _restored(entry: dict[str, Any], arrays: Arrays, k: int) -> PointModes:
 
 
 def compute_points(task: PointsTask) -> PointsRecord:
-    """Compute all points of a task; failures become records as well.
-
-    Raises
-    ------
-    InputError
-        If this worker's case file or code differs from those that the design was started with.
-    """
+    """Compute all points of a task; failures become records as well."""
     case = same_case(task.case, task.fingerprint, task.trust_fmus)
     with on_one_thread(), ScreeningBench() as bench:
         preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size)

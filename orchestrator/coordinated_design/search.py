@@ -58,15 +58,7 @@ class Tried:
 
 
 class SettingSearch:
-    """The search over the operating points.
-
-    Parameters
-    ----------
-    space
-        The settings.
-    points
-        The operating points.
-    """
+    """The search over the operating points."""
 
     def __init__(self, space: SettingSpace, points: Sequence[RatedPoint]) -> None:
         self._space, self._points = space, tuple(points)
@@ -208,15 +200,7 @@ class SettingSearch:
                 yield mode, np.array([damping_change(mode.value, shift) for shift in shifts])
 
     def with_least_gain(self, found: Tried, wanted: float) -> Tried:
-        """The smallest part of all gains that still gives a wanted damping ratio at every point.
-
-        Parameters
-        ----------
-        found
-            A vector that reaches it.
-        wanted
-            Damping ratio.
-        """
+        """The smallest part of all gains that still gives a wanted damping ratio at every point."""
         low, best = 0.0, found
         high = 1.0
         for _ in range(12):

@@ -90,15 +90,7 @@ class SettingSpace:
         return self.clipped(x)
 
     def group_settings(self, x: Numbers, *, searching: bool = False) -> list[PodSetting]:
-        """The setting of each group.
-
-        Parameters
-        ----------
-        x
-            The vector.
-        searching
-            Whether a gain of 0 is a tiny one, which keeps the number of states.
-        """
+        """The setting of each group."""
         found = []
         for group, (turn, centre, gain) in zip(self.groups, x.reshape(-1, 3).tolist(), strict=True):
             angle = turn * LARGEST_STAGE_ANGLE * group.stages

@@ -90,23 +90,7 @@ class PointsDesignRequest:
 
 @dataclass(frozen=True)
 class PointsDesignPlan:
-    """What a design over operating points computes.
-
-    Attributes
-    ----------
-    request, case, prepared
-        What is asked for, the case, and its scenario without the values of any point and without the controllers.
-    groups
-        Controllers with one setting each.
-    candidates
-        Loops that are ranked; those of the groups are among them.
-    points, outages, items
-        As in a screening.
-    off
-        Values with which the loops are measured.
-    aim
-        Which modes are damped.
-    """
+    """What a design over operating points computes."""
 
     request: PointsDesignRequest
     case: Case
@@ -139,11 +123,6 @@ def plan_points_design(
         CSV file with the operating points, as `gfor screen` takes it.
     outages
         As `orchestrator.screening.outages.read_outages` takes them.
-
-    Raises
-    ------
-    InputError
-        If points, outages, scenario, components or modes cannot be used.
     """
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -284,11 +263,6 @@ def design_over_points(
         Called with the numbers of points done and in all, first without and then with the controllers.
     stage
         Called with the name of each stage when it begins.
-
-    Raises
-    ------
-    AnalysisError
-        If no point has modes, or none has an electromechanical one.
     """
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))

@@ -126,19 +126,7 @@ def judged(
     aim: Aim,
     predicted: Mapping[int, Worth],
 ) -> Iterator[JudgedPoint]:
-    """Every point with what became of it.
-
-    Parameters
-    ----------
-    where
-        Operating point and outage of each.
-    before, after
-        The modes without and with the controllers.
-    aim
-        Which modes are damped.
-    predicted
-        What the search expected, by the number of the point.
-    """
+    """Every point with what became of it."""
     for k, here in enumerate(where):
         yield _judged(here, before[k], after[k], aim, predicted.get(k))
 

@@ -63,16 +63,6 @@ class AdaptiveLoop:
         With its tolerance.
     step_size
         The communication step [s].
-
-    Attributes
-    ----------
-    counts
-        Steps that were done and taken back.
-
-    Raises
-    ------
-    InputError
-        If a component cannot go back to a state.
     """
 
     def __init__(
@@ -144,13 +134,7 @@ class AdaptiveLoop:
                 done, m = done // 2, m - 1
 
     def _try(self, index: int, pair: float) -> float:
-        """Do a pair of steps of this length [s] together; where its error, in tolerances, is above 1 it is taken back.
-
-        Raises
-        ------
-        CosimError
-            What went wrong in a step that is too short to be halved.
-        """
+        """Do a pair of steps of this length [s]; it is taken back where its error, in tolerances, is above 1."""
         can_halve = pair / 4 >= _SHORTEST * self._communication_step
         with self._saved() as start:
             try:

@@ -8,13 +8,7 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """Communication points t = k·H.
-
-    Raises
-    ------
-    InputError
-        If the step size does not exceed 0.
-    """
+    """Communication points t = k·H."""
 
     step_size: float
 
@@ -27,13 +21,7 @@ class Clock:
         return index * self.step_size
 
     def index(self, time: float, what: str) -> int:
-        """Communication point at a time [s].
-
-        Raises
-        ------
-        InputError
-            If the time lies between two communication points, or before 0.
-        """
+        """Communication point at a time [s]."""
         if not math.isfinite(time):
             raise InputError(f"{what} at {time} s is not a time; give a finite number of seconds")
         index = round(time / self.step_size)

@@ -99,18 +99,7 @@ class CoupledComponents:
             _begin(component, plan, stop_time)
 
     def restart(self, system: System) -> None:
-        """Bring the same FMUs to another common start, as if they were new.
-
-        Parameters
-        ----------
-        system
-            The same components and connections with other values; nothing may disturb a connection.
-
-        Raises
-        ------
-        ComponentError
-            If an FMU cannot be reset or initialised; the system is of no use then.
-        """
+        """Bring the same FMUs to another common start, as if they were new."""
         self.system, self.late_starts = system, {}
         for name, plan in system.components.items():
             component = self.components[name]
@@ -236,13 +225,7 @@ def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -
 
 
 def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
-    """Whether a component has the parameters that it was given.
-
-    Raises
-    ------
-    ComponentError
-        If it reads otherwise: a study of it would be one of another device.
-    """
+    """Whether a component has the parameters that it was given."""
     try:
         values = component.values(plan.parameters)
     except ComponentError:

@@ -97,13 +97,7 @@ class WirePlan:
     later: list[Imperfection] = field(default_factory=list)
 
     def disturb(self, imperfection: Imperfection) -> None:
-        """From t = 0 on.
-
-        Raises
-        ------
-        InputError
-            If the connection has one of this kind.
-        """
+        """From t = 0 on."""
         present = self.permanent.get(type(imperfection))
         if present is not None:
             raise InputError(f"connection {self.name} has {present} already, and gets {imperfection}; remove one")

@@ -50,20 +50,7 @@ def state_of(
 
 
 def take_up(stepper: Stepper, kept: RunState) -> None:
-    """Go to where another run of the same system was.
-
-    Parameters
-    ----------
-    stepper
-        What goes on.
-    kept
-        The other run.
-
-    Raises
-    ------
-    NotTakenUpError
-        If a component does not go on from its kept state.
-    """
+    """Go to where another run of the same system was."""
     for name, content in kept.components.items():
         try:
             set_state(stepper.components[name], content)

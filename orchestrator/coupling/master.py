@@ -47,14 +47,6 @@ class Master(Stepper):
         same inputs. Its partners were initialised with the first value.
     wires
         The connections that do more than carry a value.
-
-    Raises
-    ------
-    InputError
-        If an input is fed by nothing, the schedule does not fit the components, or a connection's delay does not fit
-        the communication step.
-    ComponentError
-        If an FMU cannot be instantiated or initialised.
     """
 
     def __init__(
@@ -89,17 +81,6 @@ class Master(Stepper):
         keeper
             Says where an earlier run of the same system is taken up, and keeps this one's state when it is due, at
             the end, and where an interrupt ends it.
-
-        Raises
-        ------
-        InputError
-            If the stop time or an event is not at a communication point.
-        ComponentError
-            If an FMU fails; observers are ended first, so nothing recorded is lost.
-        NotFiniteError
-            If a coupled output is no finite number, at whatever step.
-        NotTakenUpError
-            If a component does not go on from its kept state.
         """
         calls.watch()  # again: a notebook hands Ctrl-C back to Python after each cell
         stop = self.clock.index(stop_time, "the stop")

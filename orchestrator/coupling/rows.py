@@ -17,13 +17,7 @@ class RowSink(Protocol):
         """Called once before the first block, with the names of the columns."""
 
     def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """Take a block; one that was not full comes again, longer, with the same number of its first row.
-
-        Raises
-        ------
-        ResultsError
-            If it cannot be kept.
-        """
+        """Take a block; one that was not full comes again, longer, with the same number of its first row."""
 
     def resume(self, names: Sequence[str], rows: int) -> Iterator[Block]:
         """Forget all rows from number ``rows`` on, and give the blocks before; the last one may be continued."""

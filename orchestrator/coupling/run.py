@@ -21,17 +21,7 @@ _LONGEST_STRETCH = 1000
 
 
 class Run:
-    """One run, as `orchestrator.coupling.master.Master.run` makes it.
-
-    Parameters
-    ----------
-    stepper
-        What runs.
-    observers
-        Who looks on.
-    keeper
-        As there.
-    """
+    """One run, as `orchestrator.coupling.master.Master.run` makes it."""
 
     def __init__(self, stepper: Stepper, observers: Sequence[Observer], keeper: Keeper) -> None:
         self._stepper, self._observers, self._keeper = stepper, observers, keeper
@@ -39,15 +29,7 @@ class Run:
         self._applied = -1  # the last communication point whose events have happened
 
     def until(self, stop: int, due: Mapping[int, Sequence[Event]]) -> StepStatistics:
-        """Run to a communication point.
-
-        Parameters
-        ----------
-        stop
-            The communication point.
-        due
-            Events by their communication point.
-        """
+        """Run to a communication point."""
         stepper, keeper = self._stepper, self._keeper
         kept = keeper.latest()
         first, start, before = stepper.index, perf_counter(), np.array(stepper.seconds())
@@ -80,17 +62,7 @@ class Run:
         return stepper.statistics(stepper.index - first, perf_counter() - start, before.tolist())
 
     def _begin(self, begun: list[Observer], stop: int, kept: RunState | None) -> None:
-        """Have observers look at the beginning, or go on from where a run was kept.
-
-        Parameters
-        ----------
-        begun
-            Each observer that has begun is noted.
-        stop
-            Communication point at which the run ends.
-        kept
-            State to go on from.
-        """
+        """Have observers look at the beginning, or go on from where a run was kept."""
         if kept is not None:
             resume_observers(self._observers, kept)
         for observer in self._observers:

@@ -85,13 +85,7 @@ class RunState:
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """From what `arrays` gave.
-
-        Raises
-        ------
-        KeyError, ValueError
-            If it is something else.
-        """
+        """From what `arrays` gave."""
 
         def beginning(head: str) -> dict[str, NDArray[Any]]:
             return {name.removeprefix(head): values for name, values in arrays.items() if name.startswith(head)}
@@ -117,13 +111,7 @@ class RunState:
 
 
 def resume_observers(observers: Iterable[object], kept: RunState) -> None:
-    """Tell observers how far they had come.
-
-    Raises
-    ------
-    InputError
-        If they are others than those of the kept run.
-    """
+    """Tell observers how far they had come."""
     resumable = [observer for observer in observers if isinstance(observer, Resumable)]
     if len(resumable) != len(kept.observers):
         raise InputError(
@@ -179,13 +167,7 @@ def why_not_kept(description: FmuDescription) -> str | None:
 
 
 def state_as_bytes(component: Component) -> bytes:
-    """The present state of a component.
-
-    Raises
-    ------
-    ComponentError
-        If the FMU refuses.
-    """
+    """The present state of a component."""
     state = component.save_state()
     try:
         return component.serialize_state(state)
@@ -194,13 +176,7 @@ def state_as_bytes(component: Component) -> bytes:
 
 
 def set_state(component: Component, content: bytes) -> None:
-    """Bring a component to where another instance of it was.
-
-    Raises
-    ------
-    ComponentError
-        If the FMU refuses.
-    """
+    """Bring a component to where another instance of it was."""
     state = component.deserialize_state(content)
     try:
         component.restore_state(state)

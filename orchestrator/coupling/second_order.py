@@ -44,19 +44,7 @@ Values = NDArray[np.float64]
 
 
 class _LineLoop:
-    """What both schedules share.
-
-    Parameters
-    ----------
-    groups
-        Components that step together, in the order of the schedule.
-    y
-        All coupled outputs; the loop writes them.
-    tracks
-        Where each output went; the loop writes them.
-    schedule
-        For the parts of a step.
-    """
+    """What both schedules share."""
 
     def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
         self._groups, self._y, self._tracks, self._schedule = groups, y, tracks, schedule
@@ -109,13 +97,7 @@ class _LineLoop:
         self._spent[turn.component.name] += perf_counter() - began
 
     def settle(self) -> None:
-        """Give all components the newest outputs, until those that depend on inputs directly agree.
-
-        Raises
-        ------
-        CouplingError
-            If they do not: direct feed-through closes a loop.
-        """
+        """Give all components the newest outputs, until those that depend on inputs directly agree."""
         for _ in range(_PASSES):
             changed = False
             for turn in self._turns:

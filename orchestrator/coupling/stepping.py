@@ -27,15 +27,6 @@ class Stepper(CoupledComponents):
     ----------
     system, schedule, step_size, stop_time, opener, threads
         As `orchestrator.coupling.master.Master`.
-
-    Attributes
-    ----------
-    index
-        Number of communication steps done.
-    tracks
-        Where each of the coupled outputs went, step by step, since an observer last looked.
-    handed_over
-        Whether the newest outputs were handed to all components already.
     """
 
     def __init__(
@@ -135,13 +126,7 @@ class Stepper(CoupledComponents):
         self._loop.before = values
 
     def jumped(self, y: NDArray[np.float64]) -> None:
-        """After an event: where inputs follow lines, all outputs agree again, and the lines go on from the jump.
-
-        Parameters
-        ----------
-        y
-            All outputs before the event.
-        """
+        """After an event: where inputs follow lines, all outputs agree again, and the lines go on from the jump."""
         if self.schedule.is_second_order:
             self._lines.settle()
             if self._loop.before is not None:

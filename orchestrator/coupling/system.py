@@ -41,13 +41,7 @@ class ComponentPlan:
     isolated: bool | None = None
 
     def value(self, name: str) -> Scalar | None:
-        """What a parameter or an input is set to, else its start value; None where there is neither.
-
-        Raises
-        ------
-        KeyError
-            If the FMU has no variable of that name.
-        """
+        """What a parameter or an input is set to, else its start value; None where there is neither."""
         info = self.description.variables[name]
         return self.parameters.get(name, self.inputs.get(name, info.start))
 
@@ -96,24 +90,13 @@ class System:
             Constants for inputs that nothing feeds, by variable.
         isolated
             Whether it runs in a process of its own; by default all but our own FMUs do.
-
-        Raises
-        ------
-        InputError
-            If the name is taken.
         """
         if name in self.components:
             raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
         self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}), isolated)
 
     def connect(self, source: str, target: str) -> None:
-        """Connect an output to an input, both written ``component.variable``.
-
-        Raises
-        ------
-        InputError
-            Naming both ends and why they cannot be connected.
-        """
+        """Connect an output to an input, both written ``component.variable``."""
         label = f"connection {source} → {target}"
         start, out = self._resolve(source, label)
         end, into = self._resolve(target, label)
@@ -141,23 +124,11 @@ class System:
         return self._feeding
 
     def disturb(self, connection: Connection, imperfection: Imperfection) -> None:
-        """Let a connection have an imperfection from t = 0 on.
-
-        Raises
-        ------
-        InputError
-            If there is no such connection, or it has one of this kind already.
-        """
+        """Let a connection have an imperfection from t = 0 on."""
         self._wire(connection).disturb(imperfection)
 
     def foresee(self, connection: Connection, imperfection: Imperfection) -> None:
-        """Let an event give a connection an imperfection later.
-
-        Raises
-        ------
-        InputError
-            If there is no such connection.
-        """
+        """Let an event give a connection an imperfection later."""
         later = self._wire(connection).later
         if imperfection not in later:
             later.append(imperfection)

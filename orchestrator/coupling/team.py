@@ -19,22 +19,7 @@ _LOG = logging.getLogger("gfor")
 
 
 class Team:
-    """Threads beside the calling one; `dismiss` ends them, at the latest where Python ends.
-
-    Parameters
-    ----------
-    library
-        The compiled loop, whose calls keep Python's lock.
-    members
-        Threads wanted, the caller included.
-
-    Attributes
-    ----------
-    address
-        For the compiled loop.
-    members
-        Threads that there are: fewer than were wanted where the system starts no more.
-    """
+    """Threads beside the calling one; `dismiss` ends them, at the latest where Python ends."""
 
     def __init__(self, library: Any, members: int) -> None:
         self._memory = apart(-(-library.team_size() // 8), np.float64)

@@ -10,13 +10,6 @@ class Tracks:
     """Extremes of every coupled output over the communication steps since the last look, and how often it turned.
 
     The inner loop keeps them, in C as in Python; ``inner_loop.c`` has the same five numbers an output.
-
-    Parameters
-    ----------
-    count
-        Coupled outputs.
-    more
-        Further values that the loop follows and nobody looks at.
     """
 
     def __init__(self, count: int, more: int = 0) -> None:

@@ -11,13 +11,7 @@ _VALID = 5000
 
 
 class Trial:
-    """Which way the next communication steps are done.
-
-    Attributes
-    ----------
-    together
-        Whether several threads do them.
-    """
+    """Which way the next communication steps are done."""
 
     def __init__(self) -> None:
         self._seconds, self._left = [0.0, 0.0], _BLOCK

@@ -146,13 +146,7 @@ class WireBank:
     # -- settings --------------------------------------------------------------------------------
 
     def begin(self, k: int, imperfection: Imperfection) -> None:
-        """From now on a connection has this imperfection, in place of another of its kind.
-
-        Raises
-        ------
-        InputError
-            If the connection's plan does not foresee it.
-        """
+        """From now on a connection has this imperfection, in place of another of its kind."""
         plan = self.plans[k]
         if imperfection not in (*plan.later, *plan.permanent.values()):
             raise InputError(f"connection {plan.name}: {imperfection} was not announced before the run")
@@ -204,15 +198,7 @@ class WireBank:
             self._white[k, :count] = white(self._keys[k], index, count)
 
     def settle(self, y: NDArray[np.float64], *, first: bool = False) -> None:
-        """Let what arrives be what would after a long time with these outputs, without noise and quantisation.
-
-        Parameters
-        ----------
-        y
-            Outputs of the components.
-        first
-            While the system is initialised a connection that holds its value takes the one there is.
-        """
+        """Let what arrives be what would after a long time with these outputs, without noise and quantisation."""
         for k, wire in enumerate(self._wires):
             value = y[self.sources[k]] + wire["bias"]
             self._rings[k][:] = value
@@ -276,13 +262,7 @@ class WireBank:
 
 
 def whole_steps(seconds: float, step_size: float, where: str) -> int:
-    """A delay [s] in communication steps.
-
-    Raises
-    ------
-    InputError
-        If it is no multiple of the step.
-    """
+    """A delay [s] in communication steps."""
     steps = round(seconds / step_size)
     if abs(seconds - steps * step_size) > 1e-6 * step_size:
         nearest = max(steps, 0) * step_size

@@ -26,11 +26,6 @@ class Wires:
         Where in y each coupled output stands.
     values
         y, and behind it a place for what arrives over each of these connections.
-
-    Raises
-    ------
-    InputError
-        If the schedule is one that no such connection can be part of.
     """
 
     def __init__(

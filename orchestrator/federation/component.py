@@ -162,13 +162,7 @@ class FederatedComponent(Derived):
         return self.inner is None
 
     def hand_over(self) -> None:
-        """Bring the federate to where the FMU in this process is, and end that one.
-
-        Raises
-        ------
-        ComponentError, InputError
-            If the federate refuses, cannot be brought there, or gives other outputs then.
-        """
+        """Bring the federate to where the FMU in this process is, and end that one."""
         if self.inner is None or self._remote:
             return
         inner = self.inner

@@ -52,13 +52,6 @@ _AFTER_CTRL_C = 2.0
 class Federation:
     """The processes of one run, from `with` to its end.
 
-    Parameters
-    ----------
-    prepared
-        The scenario.
-    federates
-        The choice of federates.
-
     Attributes
     ----------
     prepared
@@ -169,15 +162,7 @@ class Federation:
     # -- conversation ----------------------------------------------------------------------------
 
     def _receive(self, kind: bytes, seconds: float) -> bytes:
-        """The hub's answer.
-
-        Raises
-        ------
-        ComponentError
-            If a federate failed, or a process ended.
-        KeyboardInterrupt
-            After Ctrl-C, if the answer does not come soon.
-        """
+        """The hub's answer."""
         assert self._hub is not None
         deadline, asked = time.monotonic() + seconds, None
         interrupted = c_int.from_address(calls.asked_address)
@@ -222,13 +207,7 @@ class Federation:
                 self._look(time.monotonic() + _LOOK)
 
     def command(self, name: str, command: str, *arguments: Any) -> Any:
-        """See `Exchanges.command`.
-
-        Raises
-        ------
-        ComponentError
-            If the federate does not answer, or refuses.
-        """
+        """See `Exchanges.command`."""
         assert self._hub is not None
         self._asked += 1
         text = json.dumps({"number": self._asked, "command": command, "arguments": arguments})
@@ -342,13 +321,7 @@ class Federation:
         return own
 
     def begin(self, master: Master) -> None:
-        """Hand the initialised components over to their federates.
-
-        Raises
-        ------
-        ComponentError, InputError
-            If a federate cannot be brought to where its component is.
-        """
+        """Hand the initialised components over to their federates."""
         steps = round(self.prepared.stop_time / self.prepared.step_size)
         self._announce(f"{steps} steps over HELICS; the expected time follows after the first second")
         for name in self._parts:

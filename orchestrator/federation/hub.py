@@ -147,13 +147,7 @@ class Hub:
         )  # fmt: skip
 
     def _published(self, part: dict[str, Any]) -> dict[str, Any]:
-        """What a federate publishes of its component.
-
-        Raises
-        ------
-        _FederationError
-            If it publishes not all that others are connected to.
-        """
+        """What a federate publishes of its component."""
         name = part["name"]
         published = list(ask(self._federate, name, "publications") or ())
         for variable in part["needed"]:
@@ -207,13 +201,7 @@ class Hub:
         return json.dumps({p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}).encode()
 
     def _values(self, part: dict[str, Any]) -> list[float]:
-        """What a federate has just published.
-
-        Raises
-        ------
-        _FederationError
-            If it published a fault, or not every output.
-        """
+        """What a federate has just published."""
         helics, name = library(), part["name"]
         if helics.helicsInputIsUpdated(self._faults[name]) and (
             text := helics.helicsInputGetString(self._faults[name])

@@ -25,21 +25,7 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One component that is a federate.
-
-    Attributes
-    ----------
-    inputs, outputs
-        Variables that gfor publishes, and Real outputs that it can subscribe to.
-    needed
-        Those outputs that other components are connected to.
-    start
-        Numbers that the component is given before its start, by variable.
-    units
-        Of all of them.
-    slot
-        Number of its slot.
-    """
+    """One component that is a federate."""
 
     name: str
     inputs: tuple[str, ...]

@@ -10,13 +10,7 @@ _LOOK = 1.0
 
 
 class Pace:
-    """An observer that tells the expected time of a run once, unless the run is over before.
-
-    Parameters
-    ----------
-    announce
-        Takes the sentence.
-    """
+    """An observer that tells the expected time of a run once, unless the run is over before."""
 
     every = 10
 

@@ -12,13 +12,7 @@ _TO_CONNECT = 5.0
 
 
 def broker_port(wanted: int | None) -> int:
-    """The port of a broker that is about to be started; the one after it is free as well, which HELICS takes too.
-
-    Raises
-    ------
-    InputError
-        If the wanted port is taken.
-    """
+    """The port of a broker that is about to be started; the one after it is free as well, which HELICS takes too."""
     if wanted is not None:
         taken = _taken(wanted, "")
         if taken is not None:
@@ -47,13 +41,7 @@ def _taken(port: int, host: str) -> int | None:
 
 
 def require_broker(broker: str) -> None:
-    """Try whether anything listens at a broker's address.
-
-    Raises
-    ------
-    InputError
-        If nothing does.
-    """
+    """Try whether anything listens at a broker's address."""
     host, port = address_of(broker)
     try:
         socket.create_connection((host, port), timeout=_TO_CONNECT).close()

@@ -20,15 +20,7 @@ class NotAnAnswerError(ValueError):
 
 
 def content_of(answer: Any, component: str) -> Any:
-    """The result that an answer brings.
-
-    Raises
-    ------
-    ComponentError, UnsupportedFmuError, InputError
-        As the other process caught it.
-    NotAnAnswerError
-        If it has not the form of an answer.
-    """
+    """The result that an answer brings."""
     if not isinstance(answer, dict) or len(answer) != 1:
         raise _not("an answer", answer)
     ((kind, content),) = answer.items()

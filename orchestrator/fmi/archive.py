@@ -54,13 +54,7 @@ _ON_WINDOWS = os.name == "nt"
 
 
 def read_model_description_text(path: Path) -> bytes:
-    """The bytes of an FMU's modelDescription.xml, well-formed and without a document type.
-
-    Raises
-    ------
-    FmuFileError
-        If the file is missing, no zip archive, damaged, hostile, or has no such document.
-    """
+    """The bytes of an FMU's modelDescription.xml, well-formed and without a document type."""
     with _opened(path) as archive:
         try:
             entry = archive.getinfo(MODEL_DESCRIPTION)
@@ -81,11 +75,6 @@ def read_model_description_text(path: Path) -> bytes:
 
 def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
     """The bytes of another file in an archive; None where there is no such file.
-
-    Parameters
-    ----------
-    kind
-        What the archive should be.
 
     Raises
     ------
@@ -130,11 +119,6 @@ def extract(path: Path, folder: Path | None = None) -> Path:
     ----------
     folder
         Where to; by default a new temporary folder.
-
-    Returns
-    -------
-    pathlib.Path
-        The folder; the caller removes it.
 
     Raises
     ------

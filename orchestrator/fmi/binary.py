@@ -32,13 +32,7 @@ _UNDEFINED = re.compile(r"undefined symbol: (\w+)")
 
 
 def binary_path(description: FmuDescription, directory: Path) -> Path:
-    """Where an extracted FMU has its binary for this platform.
-
-    Raises
-    ------
-    FmuFileError
-        If it is not there.
-    """
+    """Where an extracted FMU has its binary for this platform."""
     newer, ending = description.fmi_version == "3.0", fmpy.sharedLibraryExtension
     if runs_under_wine(description):
         library: Path = directory.resolve() / "binaries" / PLATFORM / f"{description.model_identifier}.dll"
@@ -55,15 +49,7 @@ def binary_path(description: FmuDescription, directory: Path) -> Path:
 
 
 def load(description: FmuDescription, directory: Path) -> ctypes.CDLL:
-    """The binary of an extracted FMU, loaded.
-
-    Raises
-    ------
-    UnsupportedFmuError
-        If this machine lacks what it needs.
-    FmuFileError
-        If it is not there, or cannot be loaded anywhere.
-    """
+    """The binary of an extracted FMU, loaded."""
     library, before = binary_path(description, directory), os.getcwd()
     os.chdir(library.parent)  # where some binaries look for what they depend on
     try:
@@ -141,15 +127,7 @@ class _Absent:
 
 
 class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
-    """fmpy's instance, which does without functions that nobody needs; its name begins as fmpy wants it.
-
-    Parameters
-    ----------
-    absent
-        Names of functions that are not there.
-    refuse
-        Raises an error that names such a function.
-    """
+    """fmpy's instance, which does without functions that nobody needs; its name begins as fmpy wants it."""
 
     def __init__(self, absent: set[str], refuse: Callable[[str], Any], **arguments: Any) -> None:
         self._absent_functions, self._refuse_call = absent, refuse

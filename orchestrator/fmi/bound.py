@@ -67,13 +67,7 @@ def compiled_adapter() -> Any:
 
 
 class BoundComponent(Derived):
-    """An instance behind a binding.
-
-    Parameters
-    ----------
-    inner
-        The instance of the FMU itself; it is closed with this one.
-    """
+    """An instance behind a binding."""
 
     def __init__(self, inner: Component, description: BoundDescription) -> None:
         self.name, self.description, self.inner = inner.name, description, inner

@@ -18,13 +18,7 @@ _import = builtins.__import__
 
 
 class BroughtModules:
-    """The modules under an FMU's resources, for as long as it is loaded.
-
-    Parameters
-    ----------
-    resources
-        The folder that its wrapper puts on the search path.
-    """
+    """The modules under an FMU's resources, for as long as it is loaded."""
 
     def __init__(self, resources: str) -> None:
         self.root, self._users = resources, 0

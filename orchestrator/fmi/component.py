@@ -79,15 +79,7 @@ class Component(Protocol):
     # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool]) -> None:
-        """Set variables of any numeric type by name.
-
-        Raises
-        ------
-        InputError
-            If a name does not exist or is of type String.
-        ComponentError
-            If the FMU refuses.
-        """
+        """Set variables of any numeric type by name."""
 
     def read(self, batch: "RealBatch") -> None:
         """Read a batch, and take the FMU at its log's word: after new parameters it may have to refuse."""
@@ -105,11 +97,6 @@ class Component(Protocol):
         -------
         ndarray
             Shape (unknowns, knowns).
-
-        Raises
-        ------
-        ComponentError
-            If the FMU refuses, or this kind of component gives no derivatives.
         """
 
     # -- state -----------------------------------------------------------------------------------

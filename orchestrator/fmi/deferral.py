@@ -51,13 +51,7 @@ def _is_ours(frame: FrameType) -> bool:
 
 
 class Deferral:
-    """At most one exception that waits for the next line of our code, in the main thread.
-
-    Parameters
-    ----------
-    deliver
-        Raises it.
-    """
+    """At most one exception that waits for the next line of our code, in the main thread."""
 
     def __init__(self, deliver: Callable[[], None]) -> None:
         self._deliver, self._number = deliver, 0

@@ -188,17 +188,7 @@ class FmuDescription:
 
 
 def read_description(path: Path | str) -> FmuDescription:
-    """Read and check an FMU, or that of a vendor's DLL or device's file, which is built first.
-
-    Raises
-    ------
-    InputError
-        If there can be no FMU of a DLL.
-    FmuFileError
-        If the file is missing, not a zip archive, or without (or with an unreadable) modelDescription.xml.
-    UnsupportedFmuError
-        If it is of another FMI version, not for co-simulation, or without a binary for this platform.
-    """
+    """Read and check an FMU, or that of a vendor's DLL or device's file, which is built first."""
     described = read_declared(path)
     if missing := missing_binary(described):
         raise UnsupportedFmuError(f"{described.path}: {missing[0]}", "another platform", missing[1])
@@ -240,15 +230,6 @@ def read_declared(path: Path | str) -> FmuDescription:
 
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     """The description in a modelDescription.xml.
-
-    Parameters
-    ----------
-    path
-        The .fmu file, which need not be there yet.
-    text
-        Of its modelDescription.xml.
-    names
-        Of the archive's members, by which the platforms are known.
 
     Raises
     ------

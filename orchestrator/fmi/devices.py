@@ -23,13 +23,6 @@ def is_controller_alone(description: FmuDescription) -> bool:
 def as_device(path: Path, binding: Path | None) -> Path:
     """The FMU of what is to stand at a bus: of an FMU, of a DLL, or of a device's file.
 
-    Parameters
-    ----------
-    path
-        Of the file.
-    binding
-        What maps its variables to our port, if anything does.
-
     Raises
     ------
     InputError

@@ -31,13 +31,7 @@ def is_ours(path: Path) -> bool:
 
 
 def compile_adapters(description: FmuDescription) -> None:
-    """Compile what an FMU runs behind, or find it compiled: a process with limits neither sees the cache nor fills it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be compiled here.
-    """
+    """Compile what an FMU runs behind, or find it compiled: a process with limits does not see the cache."""
     if isinstance(description, BoundDescription):
         compiled_adapter()
         description = description.inner
@@ -70,13 +64,6 @@ def open_component(
         Where its archive is extracted; by default a new temporary folder of its own.
     isolated
         Whether it runs in a process of its own; by default all but our own FMUs do.
-
-    Raises
-    ------
-    ComponentError
-        If the FMU gives no instance.
-    InputError
-        If what it runs behind cannot be compiled.
     """
     compile_adapters(description)
     if isinstance(description, BoundDescription):

@@ -42,20 +42,7 @@ def _rights(version: int) -> int:
 
 
 def restrict(readable: Iterable[Path], writable: Sequence[Path]) -> None:
-    """Bind this thread, and what it starts, for good.
-
-    Parameters
-    ----------
-    readable
-        Folders and files that may be read and run; those that are missing are left out.
-    writable
-        Folders and files that may be changed as well.
-
-    Raises
-    ------
-    OSError
-        If the kernel refuses; nothing is bound then.
-    """
+    """Bind this thread, and what it starts, for good."""
     version = landlock_version()
     everything = _rights(version)
     asked = struct.pack("<QQQ", everything, _TCP if version >= 4 else 0, _SCOPES if version >= 6 else 0)

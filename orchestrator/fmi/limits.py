@@ -58,15 +58,7 @@ class Limits:
 
 
 def apply_limits(limits: Limits, folder: Path, *, own_users: bool) -> list[str]:
-    """Limit this process and what it starts; returns the names of limits that the system does not have.
-
-    Parameters
-    ----------
-    folder
-        In which it works.
-    own_users
-        Whether its user namespace is its own, so that the user's other processes do not count.
-    """
+    """Limit this process and what it starts; returns the names of limits that the system does not have."""
     os.chdir(folder)
     for name in ("TMPDIR", "TEMP", "TMP", "HOME", "USERPROFILE"):
         os.environ[name] = str(folder)

@@ -70,13 +70,7 @@ def linear_model_members(model: EmbeddedModel) -> dict[str, bytes]:
 
 
 def read_embedded_model(path: Path) -> EmbeddedModel | None:
-    """The linear model in an FMU; None where it has none.
-
-    Raises
-    ------
-    FmuFileError
-        If the file is no FMU, or the model in it cannot be read.
-    """
+    """The linear model in an FMU; None where it has none."""
     member = f"{FOLDER}/linear_model.json"
     try:
         text = read_member(path, member)

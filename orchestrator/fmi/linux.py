@@ -24,13 +24,7 @@ def libc() -> Any:
 
 
 def call(number: int, *arguments: Any) -> int:
-    """A system call by its number.
-
-    Raises
-    ------
-    OSError
-        As the kernel refuses it.
-    """
+    """A system call by its number."""
     found = int(libc().syscall(ctypes.c_long(number), *arguments))
     if found < 0:
         error = ctypes.get_errno()

@@ -84,13 +84,7 @@ class Served(ctypes.Structure):
 
 @cache
 def mailbox_library() -> Any:
-    """The compiled mailbox; its calls hold Python's lock, as those of an FMU in this process do.
-
-    Raises
-    ------
-    InputError
-        If it cannot be compiled here.
-    """
+    """The compiled mailbox; its calls hold Python's lock, as those of an FMU in this process do."""
     try:
         library = ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
@@ -144,17 +138,6 @@ class Mailbox:
     ----------
     memory
         As `shared_memory` gave it.
-
-    Attributes
-    ----------
-    head
-        Its first fields.
-    run
-        The fields of a question for many steps.
-    address
-        Of the shared structure.
-    client
-        The asking side's own memory; its address takes an instance's place in FMI calls.
     """
 
     def __init__(self, memory: int | str) -> None:
@@ -177,13 +160,7 @@ class Mailbox:
         return np.frombuffer(self._memory, kind, count, self._arrays[which])
 
     def write_text(self, value: Any) -> None:
-        """Leave a JSON value for the other side.
-
-        Raises
-        ------
-        ValueError
-            If it is longer than the mailbox.
-        """
+        """Leave a JSON value for the other side."""
         content = json.dumps(value).encode()
         if len(content) > _TEXT:
             raise ValueError(f"{len(content)} bytes do not fit into the mailbox of {_TEXT} bytes")
@@ -191,13 +168,7 @@ class Mailbox:
         self.head.text_length = len(content)
 
     def read_text(self) -> Any:
-        """What the other side left.
-
-        Raises
-        ------
-        ValueError
-            If it is not JSON, or nested too deep.
-        """
+        """What the other side left."""
         length = self.head.text_length
         if not 0 <= length <= _TEXT:
             raise ValueError("the length of the text is out of bounds")
@@ -233,13 +204,7 @@ class Mailbox:
 
 
 def _read(content: bytes) -> Any:
-    """A JSON value from a process that is not trusted.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """A JSON value from a process that is not trusted."""
     try:
         return json.loads(content)
     except RecursionError:

@@ -46,17 +46,7 @@ _guards: list[Callable[[Messages], None]] = []
 def on_message(
     most: int, steps: Callable[[], int], keep: Callable[[list[tuple[int, str]]], None] | None = None
 ) -> None:
-    """Watch what FMUs log in this process, and end it if one logs without end; for processes of foreign FMUs.
-
-    Parameters
-    ----------
-    most
-        Messages in one step.
-    steps
-        Tells how many steps were begun.
-    keep
-        Given the newest messages of an FMU whenever there is another one.
-    """
+    """Watch what FMUs log in this process, and end it if one logs without end; for processes of foreign FMUs."""
 
     def guard(messages: Messages) -> None:
         if messages.step != (now := steps()):

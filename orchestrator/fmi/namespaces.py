@@ -32,13 +32,7 @@ _SHARED = 16 * 1024**2
 
 
 def enter_namespaces() -> None:
-    """Go into new namespaces: users, network and System V's objects for this process, processes for its children.
-
-    Raises
-    ------
-    OSError
-        If the system forbids it; nothing has changed then.
-    """
+    """Go into new namespaces: users, network and System V's objects for this process, processes for its children."""
     user, group = os.geteuid(), os.getegid()
     unshare(NEW_USER | NEW_PROCESSES | NEW_NETWORK | NEW_IPC)
     own = Path("/proc/self")
@@ -58,16 +52,6 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
         What it may hold [bytes].
     more
         Folders in whose place there is an empty one in memory as well.
-
-    Returns
-    -------
-    list of str
-        What could not be done: "files", "processes".
-
-    Raises
-    ------
-    OSError
-        If there can be no view of one's own.
     """
     unshare(NEW_MOUNTS)
     mount(None, "/", None, _PRIVATE | _ALL_BELOW)

@@ -6,17 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """One protection.
-
-    Attributes
-    ----------
-    name
-        What it is for, in words.
-    in_force
-        Whether this machine has it.
-    how
-        By which means, or why not.
-    """
+    """One protection."""
 
     name: str
     in_force: bool

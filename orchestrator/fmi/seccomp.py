@@ -129,11 +129,6 @@ def filter_calls(*, attributes: bool, ipc: bool, own_process: int | None, signal
         Number of the only process whose limits and priority it may change: its own; None where it sees no other.
     signals
         Whether it may send signals to that process only: where they would reach others.
-
-    Raises
-    ------
-    OSError
-        If the kernel has no filters.
     """
     program = _program(own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc)
     buffer = ctypes.create_string_buffer(program, len(program))

@@ -11,13 +11,7 @@ from orchestrator.fmi.isolation import IsolatedComponent
 
 
 def silence(component: Component) -> None:
-    """Stop the processes of an isolated component, so that the limit on its answers ends it as it ends a hang.
-
-    Raises
-    ------
-    InputError
-        If the component has no process of its own, or this system cannot stop one.
-    """
+    """Stop the processes of an isolated component, so that the limit on its answers ends it as it ends a hang."""
     while isinstance(component, BoundComponent):
         component = component.inner
     if not isinstance(component, IsolatedComponent):

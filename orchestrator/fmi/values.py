@@ -12,13 +12,7 @@ _RULES = {
 
 
 def typed(text: str, fmi_type: str) -> Scalar:
-    """Read a value's text: a Real, Integer, Enumeration or Boolean is converted, any other type stays text.
-
-    Raises
-    ------
-    ValueError
-        If the text is no value of the type; the message gives the rule.
-    """
+    """Read a value's text: a Real, Integer, Enumeration or Boolean is converted, any other type stays text."""
     try:
         match fmi_type:
             case "Real":

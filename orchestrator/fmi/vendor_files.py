@@ -58,15 +58,7 @@ def is_vendor_file(path: Path) -> bool:
 
 
 def as_fmu(path: Path) -> Path:
-    """The FMU of a DLL or of a device's file; every other path stays as it is.
-
-    Raises
-    ------
-    InputError
-        If it is no such file, or its DLL declares what no host can run.
-    MissingLibraryError
-        If the extra that builds FMUs is not installed.
-    """
+    """The FMU of a DLL or of a device's file; every other path stays as it is."""
     if not is_vendor_file(path):
         return path
     require("building the FMU of a vendor's DLL", "casadi", "ziglang")

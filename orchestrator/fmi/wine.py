@@ -56,15 +56,7 @@ class NoWineError(RuntimeError):
 
 @dataclass(frozen=True)
 class Wine:
-    """An installation.
-
-    Attributes
-    ----------
-    loader, server
-        Its programs.
-    libraries
-        Folder of its own libraries for Windows of 64 bits.
-    """
+    """An installation."""
 
     loader: str
     server: str
@@ -73,13 +65,7 @@ class Wine:
 
 @cache
 def find_wine() -> Wine:
-    """The installation of this machine.
-
-    Raises
-    ------
-    NoWineError
-        If there is none, or not for 64-bit x86.
-    """
+    """The installation of this machine."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise NoWineError(
             f"Windows libraries run on Windows, or on Linux for x86_64 under Wine; this is {sys.platform}"
@@ -96,17 +82,7 @@ def find_wine() -> Wine:
 
 
 def runs_here(platforms: tuple[str, ...], own: str, fmi_version: str) -> bool:
-    """Whether an FMU is one for Wine: for Windows alone, of FMI 2.0, and Wine is there.
-
-    Parameters
-    ----------
-    platforms
-        That it has binaries for.
-    own
-        This machine's.
-    fmi_version
-        Of the FMU.
-    """
+    """Whether an FMU is one for Wine: for Windows alone, of FMI 2.0, and Wine is there."""
     if own in platforms or PLATFORM not in platforms or not fmi_version.startswith("2"):
         return False
     try:
@@ -196,16 +172,6 @@ class Server:
         Whether the kernel ends it, and its programs, with the thread that started them.
     programs
         How many can be started.
-
-    Attributes
-    ----------
-    shared
-        Files for memory that this process shares with each program.
-
-    Raises
-    ------
-    NoWineError
-        If it does not start.
     """
 
     def __init__(self, folder: Path, *, tied: bool, programs: int = 1) -> None:
@@ -241,13 +207,7 @@ class Server:
         return False
 
     def next_shared(self) -> Path:
-        """File for the memory of the next program.
-
-        Raises
-        ------
-        NoWineError
-            If that is one more than the server has connections for.
-        """
+        """File for the memory of the next program."""
         if not self.shared:
             raise NoWineError("this process has as many programs under Wine as it may; use fewer instances at once")
         return self.shared.pop()

@@ -63,13 +63,7 @@ def host_path() -> Path:
 
 
 def compile_programs() -> list[Path]:
-    """Compile both, or find them compiled; returns their paths.
-
-    Raises
-    ------
-    InputError
-        If they cannot be compiled here, or there is no Wine.
-    """
+    """Compile both, or find them compiled; returns their paths."""
     try:
         wine.find_wine()
         mailbox_library()
@@ -99,13 +93,6 @@ class WineProgram:
         Time for one answer [s].
     note
         Told when Wine has started, and the library is loaded.
-
-    Raises
-    ------
-    NoWineError
-        If Wine does not start.
-    ValueError
-        If the library cannot be loaded.
     """
 
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
@@ -165,16 +152,6 @@ class WineProgram:
             Its bytes.
         answer
             How many bytes are wanted.
-
-        Returns
-        -------
-        tuple of int and bytes
-            The result, and the bytes.
-
-        Raises
-        ------
-        WineEndedError
-            If the program has ended, or does not answer.
         """
         for k, value in enumerate(arguments):
             self._talk.a[k] = value
@@ -231,20 +208,7 @@ class WineProgram:
 
 
 class WineLibrary:
-    """A DLL for Windows under Wine, as `fmus.vendor_dll.memory.Library`.
-
-    Parameters
-    ----------
-    path
-        Its file.
-    note
-        Told what is done with it.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be loaded.
-    """
+    """A DLL for Windows under Wine, as `fmus.vendor_dll.memory.Library`."""
 
     def __init__(self, path: Path, note: Note = unheard) -> None:
         self._doing, self._note = "Wine starts", note

@@ -25,28 +25,12 @@ _OF_PLACE = ("S_n", "P_0", "Q_0", "v_0", "theta_0", "f_n", "connected")
 
 
 def stand_in_at(place: Place, model: str) -> ComponentTable:
-    """A model of the catalogue with its defaults, at a place.
-
-    Parameters
-    ----------
-    place
-        Where.
-    model
-        Its name.
-    """
+    """A model of the catalogue with its defaults, at a place."""
     return ComponentTable(model=model, bus=place.table.bus, parameters=_of_place(place))
 
 
 def vendors_device_at(place: Place, template: Place) -> ComponentTable:
-    """A vendor's device with its settings from another place, at a place.
-
-    Parameters
-    ----------
-    place
-        Where, which gives rating and operating point.
-    template
-        Where the vendor's device stands in the case.
-    """
+    """A vendor's device with its settings from another place, at a place."""
     own = settings_of(template)
     return template.table.model_copy(
         update={
@@ -63,17 +47,7 @@ def settings_of(place: Place) -> dict[str, Value]:
 
 
 def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]) -> ComponentTable:
-    """An FMU, a vendor's DLL or a device's file, at a place.
-
-    Parameters
-    ----------
-    place
-        Where, which gives rating and operating point.
-    file, binding
-        Of the device.
-    values
-        Of its own variables, by name.
-    """
+    """An FMU, a vendor's DLL or a device's file, at a place."""
     if wrong := [name for name in values if name in _OF_PLACE]:
         raise InputError(f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's")
     return ComponentTable(
@@ -114,13 +88,6 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
 
     What may name a variable of a device that is gone is left out: names of modes, plots, and events but those of the
     network, for which its FMU is made.
-
-    Parameters
-    ----------
-    case
-        The case.
-    exchanged
-        What takes the place of which component.
     """
     if not exchanged:
         return case

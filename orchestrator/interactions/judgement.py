@@ -25,15 +25,7 @@ SAME = 0.01
 
 @dataclass(frozen=True)
 class JudgedMode:
-    """A mode of the system as it is, with who takes part in it.
-
-    Attributes
-    ----------
-    groups
-        Participation of every group, largest first.
-    vendors
-        Vendors that take part by at least the threshold, largest first.
-    """
+    """A mode of the system as it is, with who takes part in it."""
 
     mode: SharedMode
     groups: dict[str, float]
@@ -51,17 +43,6 @@ class JudgedSystem:
 
     A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
     damped. A mode that grows counts in any case.
-
-    Attributes
-    ----------
-    name
-        Of the system.
-    record
-        What was found of it.
-    converters
-        Components that are converters of vendors, and no stand-ins.
-    threshold
-        Share that they have together in a mode that counts.
     """
 
     name: SystemName
@@ -106,17 +87,7 @@ class JudgedSystem:
 
 @dataclass(frozen=True)
 class JudgedPair:
-    """Two vendors together, and each alone.
-
-    Attributes
-    ----------
-    vendors
-        Their names.
-    joint
-        The system with the converters of both.
-    alone
-        The system with those of each.
-    """
+    """Two vendors together, and each alone."""
 
     vendors: tuple[str, str]
     joint: JudgedSystem
@@ -178,19 +149,7 @@ def place_of(mode: SharedMode) -> str:
 
 
 class JudgedInteractions:
-    """What a study's systems come to.
-
-    Attributes
-    ----------
-    result
-        All systems.
-    systems
-        The same, with the modes that count for their converters.
-    modes
-        Of the system as it is, least damped first.
-    pairs
-        All pairs of vendors, the worst first; those of which something is not known come last.
-    """
+    """What a study's systems come to."""
 
     def __init__(self, result: InteractionsResult) -> None:
         self.result = result

@@ -25,17 +25,7 @@ _OF_THE_GRID = ("external_grid", "static_generation")
 
 @dataclass(frozen=True)
 class Place:
-    """Where a converter stands.
-
-    Attributes
-    ----------
-    name
-        Of the component.
-    vendor
-        Whose converter it is.
-    table, plan
-        What the case says of the component, and its values before the power flow.
-    """
+    """Where a converter stands."""
 
     name: str
     vendor: str
@@ -47,18 +37,6 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
     """The converters of a scenario, by their component.
 
     A converter's vendor is the ``vendor`` of its table, else the name of its file, else its model.
-
-    Parameters
-    ----------
-    components
-        Tables and values of all components.
-    grid
-        Name of the network's component, if the case names one.
-
-    Raises
-    ------
-    InputError
-        If a vendor has the name of a group that is nobody's converter.
     """
     found = {}
     for name, (table, plan) in components.items():
@@ -96,17 +74,7 @@ def _is_machine(plan: ComponentPlan) -> bool:
 def groups_of(
     components: Mapping[str, tuple[ComponentTable, ComponentPlan]], places: Mapping[str, Place], grid: str | None
 ) -> dict[str, str]:
-    """The group of every component: its vendor, or what else it is.
-
-    Parameters
-    ----------
-    components
-        Tables and values of all components.
-    places
-        The converters among them.
-    grid
-        Name of the network's component, if the case names one.
-    """
+    """The group of every component: its vendor, or what else it is."""
 
     def group(name: str, table: ComponentTable, plan: ComponentPlan) -> str:
         if name in places:

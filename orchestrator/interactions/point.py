@@ -166,13 +166,7 @@ class SystemRecord:
 
 
 def compute_system(task: SystemTask) -> SystemRecord:
-    """Prepare, compare the power flow, find the modes; a failure becomes a record as well.
-
-    Raises
-    ------
-    InputError
-        If this worker's case file or code differs from those that the study was started with.
-    """
+    """Prepare, compare the power flow, find the modes; a failure becomes a record as well."""
     case = same_case(task.case, task.fingerprint, task.trust_fmus)
     with alone():
         try:

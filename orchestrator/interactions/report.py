@@ -21,15 +21,7 @@ _FULL = 20.0
 
 
 def write_page(judgement: JudgedInteractions, path: Path) -> None:
-    """Write the page as one file that needs no other.
-
-    Parameters
-    ----------
-    judgement
-        What was found.
-    path
-        Of the file.
-    """
+    """Write the page as one file that needs no other."""
     plan, figures = judgement.result.plan, Figures()
     shade = {True: "good", False: "bad", None: "soft"}[judgement.whole.stable]
     first, *rest = sentences(judgement)
@@ -111,17 +103,7 @@ def _swap(judgement: JudgedInteractions, figures: Figures) -> str:
 def heat_picture(
     name: str, rows: tuple[str, ...] | list[str], columns: tuple[str, ...] | list[str], cells: list[list[JudgedSystem]]
 ) -> str:
-    """A square for each system, coloured by its least damping; the figure, and U where it is unstable, stand in it.
-
-    Parameters
-    ----------
-    name
-        What a screen reader reads out.
-    rows, columns
-        What the system's row and column are of.
-    cells
-        The systems, by row and column.
-    """
+    """A square for each system, coloured by its least damping; the figure, and U where it is unstable, stand in it."""
     parts = []
     for k, label in enumerate(columns):
         parts.append(_text(_MARGIN + (k + 0.5) * _CELL, 20, label))

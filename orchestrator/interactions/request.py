@@ -16,17 +16,7 @@ frequency, as their network's frame turns with it."""
 
 @dataclass(frozen=True)
 class GivenDevice:
-    """A device that is tried at the places of a case.
-
-    Attributes
-    ----------
-    name
-        By which results call it.
-    file
-        An FMU, a vendor's DLL or a device's file.
-    values
-        Of its own variables, by name.
-    """
+    """A device that is tried at the places of a case."""
 
     name: str
     file: Path

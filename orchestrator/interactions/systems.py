@@ -30,15 +30,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class SystemName:
-    """A system: of which vendors it has the converters, or which device stands at each of the places that are swapped.
-
-    Attributes
-    ----------
-    kind
-        What it is.
-    names
-        Its vendors; of an assignment the device at each place, in the order of the places.
-    """
+    """A system: whose converters it has, or which device stands at each of the places that are swapped."""
 
     kind: Kind
     names: tuple[str, ...] = ()
@@ -63,13 +55,6 @@ Exchanged = dict[str, ComponentTable]
 
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
     """The case as it is, without any vendor, with each alone and with each pair.
-
-    Parameters
-    ----------
-    places
-        All converters.
-    model
-        What stands in at the places of the vendors that a system does without.
 
     Raises
     ------
@@ -96,15 +81,6 @@ def assignments(
     places: Mapping[str, Place], at: Sequence[str], given: Sequence[GivenDevice]
 ) -> dict[SystemName, Exchanged]:
     """Each device at each of some places, in all ways.
-
-    Parameters
-    ----------
-    places
-        All converters; those that are not swapped stay.
-    at
-        Names of the places that are swapped.
-    given
-        Devices beside those of the case.
 
     Raises
     ------

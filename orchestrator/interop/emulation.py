@@ -68,14 +68,6 @@ def emulate(
         the system.
     observers
         Further observers of the run, besides the recorder.
-
-    Raises
-    ------
-    InputError
-        If the stop time is no communication point, the order does not fit the master or the system, or a connection is
-        disturbed.
-    ComponentError
-        If an FMU fails.
     """
     disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
     if disturbed:

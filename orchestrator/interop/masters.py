@@ -129,13 +129,7 @@ MASTERS = {
 
 
 def master_rules(name: str) -> MasterRules:
-    """Rules by name.
-
-    Raises
-    ------
-    InputError
-        If no master of that name is known; the message lists those that are.
-    """
+    """Rules by name."""
     if name not in MASTERS:
         raise InputError(f"there is no master {name!r} to run like; known are: {', '.join(MASTERS)}")
     return MASTERS[name]

@@ -65,11 +65,6 @@ class PodLoop:
         ``pod_p`` or ``pod_q``.
     kept
         Figures that an earlier start of the same design has left.
-
-    Raises
-    ------
-    InputError
-        If a controller's parameters cannot be changed while its FMU runs.
     """
 
     def __init__(
@@ -92,13 +87,7 @@ class PodLoop:
         return self._model(setting)
 
     def examine(self, setting: PodSetting) -> Examination:
-        """The verdict on the whole system with this setting, at any frequency, with its warnings.
-
-        Raises
-        ------
-        InputError
-            If the communication step is so long that a slow mode is lost.
-        """
+        """The verdict on the whole system with this setting, at any frequency, with its warnings."""
         system = where_given(lambda: self._continuous_model(setting))
         model = self._model(setting)
         return examine(self._master, self._blocks, model, system)
@@ -115,13 +104,7 @@ class PodLoop:
         return model
 
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
-        """The continuous models with half the gain and with the gain. The state matrix is linear in the gain.
-
-        Raises
-        ------
-        AnalysisError
-            If a component does not give its derivatives.
-        """
+        """The continuous models with half the gain and with the gain. The state matrix is linear in the gain."""
         half, full = (self._continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
         return half, full
 
@@ -130,13 +113,7 @@ class PodLoop:
         return continuous(self._continuous_blocks)
 
     def opened(self) -> tuple[Master, LinearModel, Blocks]:
-        """The running system with the controllers off, its continuous model, and the blocks of which that is made.
-
-        Raises
-        ------
-        AnalysisError
-            If a component does not give its derivatives.
-        """
+        """The running system with the controllers off, its continuous model, and the blocks of which that is made."""
         model = self._continuous_model(PodSetting(0.0, NO_COMPENSATION))
         return self._master, model, self._continuous_blocks
 
@@ -157,11 +134,6 @@ class PodLoop:
             A setting with its known mode. It must have the same lead/lag, or a gain of 0.
         filters
             The lead/lag at the new gain; by default that of ``start``.
-
-        Raises
-        ------
-        AnalysisError
-            If the mode cannot be followed.
         """
         setting = PodSetting(gain, filters or start.setting.filters)
         if start.setting.gain and start.setting.filters != setting.filters:
@@ -179,17 +151,7 @@ class PodLoop:
         return {"eigenvalue": np.array(pair.eigenvalue), "left": pair.left, "right": pair.right}
 
     def figures(self, kind: str, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
-        """Figures of this loop, from the disk where an earlier start of the same design has left them.
-
-        Parameters
-        ----------
-        kind
-            What they are.
-        what
-            What they depend on.
-        compute
-            Gives them.
-        """
+        """Figures of this loop, from the disk where an earlier start of the same design has left them."""
         own = {"kind": kind, "components": self._components, "controller": self._controller}
         return self._kept.get({**own, **what}, compute)
 
@@ -213,11 +175,6 @@ def check_tunable(name: str, description: FmuDescription, controller: str) -> No
         Of the component.
     controller
         ``pod_p`` or ``pod_q``.
-
-    Raises
-    ------
-    InputError
-        If one of them cannot be changed while the FMU runs.
     """
     fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
     if fixed:

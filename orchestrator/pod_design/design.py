@@ -214,13 +214,6 @@ def design_pod(
         Keeps figures on the way as soon as they are there; those that are there already are not computed again.
     search
         Gives a refinement settings to try; by default it surveys all itself.
-
-    Raises
-    ------
-    InputError
-        If scenario, component, mode or requirement cannot be found or make no sense.
-    AnalysisError
-        If the mode has no sensitivity, the lead/lag would need more stages, or the mode cannot be followed.
     """
     report("preparing the case")
     target = find_target(

@@ -10,34 +10,13 @@ from orchestrator.points.store import Arrays, PointStore
 
 
 class KeptFigures:
-    """Arrays by all that they depend on.
-
-    Parameters
-    ----------
-    store
-        Where they are; without one, each is computed.
-    content
-        What all of them depend on, of JSON's types.
-    """
+    """Arrays by all that they depend on."""
 
     def __init__(self, store: PointStore | None = None, content: Mapping[str, Any] | None = None) -> None:
         self._store, self._content = store, dict(content or {})
 
     def get(self, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
-        """The arrays of something, computed where they are not there yet.
-
-        Parameters
-        ----------
-        what
-            All that they depend on beside the content.
-        compute
-            Gives them.
-
-        Raises
-        ------
-        InputError
-            If they cannot be written.
-        """
+        """The arrays of something, computed where they are not there yet."""
         if self._store is None:
             return compute()
         key = key_of({**self._content, **what})

@@ -62,13 +62,7 @@ def predicted_mode(required_damping: float, initial: complex) -> complex:
 
 
 def sensitivity(with_gain: complex, without: complex, gain: float) -> complex:
-    """Ŝ = (λ(ΔK) − λ_0)/ΔK, the eigenvalue sensitivity by finite difference [rad/s per pu].
-
-    Raises
-    ------
-    AnalysisError
-        If the controller does not move the mode at all.
-    """
+    """Ŝ = (λ(ΔK) − λ_0)/ΔK, the eigenvalue sensitivity by finite difference [rad/s per pu]."""
     moved = with_gain - without
     if abs(moved) <= 1e-9 * max(1.0, abs(without)):
         raise AnalysisError(

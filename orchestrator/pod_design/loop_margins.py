@@ -55,18 +55,7 @@ class LoopMargins:
 
 
 def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
-    """Margins of a loop that is closed with a gain.
-
-    Parameters
-    ----------
-    half, full
-        Continuous models of the same system with half the gain and with the gain.
-
-    Raises
-    ------
-    AnalysisError
-        If the gain changes nothing, or the system is not stable with it.
-    """
+    """Margins of a loop that is closed with a gain."""
     if full.step_size is not None or full.names != half.names:
         raise ValueError("the margins of a loop need two continuous models with the same states")
     if np.linalg.eigvals(full.A).real.max() > ZERO:

@@ -53,19 +53,7 @@ class Margins:
 
 
 def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -> Margins:
-    """Margins of a setting; see `Margins`.
-
-    Parameters
-    ----------
-    loop
-        The running system with the controller to be set.
-    off
-        The target with the controller off.
-    nominal
-        The target with the setting.
-    least
-        Least damping ratio; the limit is lower where a mode is already below it.
-    """
+    """Margins of a setting; see `Margins`."""
     weakest, fastest = _extremes(loop, nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 

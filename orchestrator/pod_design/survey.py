@@ -37,17 +37,7 @@ _HOPELESS = 1.0
 
 @dataclass(frozen=True)
 class Survey:
-    """The result of a survey.
-
-    Attributes
-    ----------
-    best
-        The best settings, best first.
-    damping
-        Damping ratio of the least damped mode that the best setting moves.
-    settings
-        Number of settings that were examined.
-    """
+    """The result of a survey."""
 
     best: tuple[PodSetting, ...]
     damping: float
@@ -69,11 +59,6 @@ def survey(
         N_S of the lead/lag, at least 1.
     bounds
         Of the gain [pu].
-
-    Raises
-    ------
-    AnalysisError
-        If a component does not give its derivatives, or no setting leaves the system stable.
     """
     ground = _Ground(loop, initial, np.array(others, dtype=complex), stages, bounds)
     turns = np.linspace(-0.95, 0.95, _TURNS).tolist()

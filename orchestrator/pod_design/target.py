@@ -60,11 +60,6 @@ def find_target(
         Values by ``component.variable``.
     parameters
         Parameter files; ``overrides`` go before them.
-
-    Raises
-    ------
-    InputError
-        If there is no such scenario or several, or no component that fits has the controller.
     """
     if scenario is not None and scenario not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")
@@ -113,26 +108,7 @@ def _components(
 def check_range(
     plan: Mapping[str, ComponentPlan], components: Sequence[str], variable: str, value: float, option: str
 ) -> None:
-    """A value must be one that every component's FMU takes.
-
-    Parameters
-    ----------
-    plan
-        Components of the scenario, by name.
-    components
-        Names of the components to check.
-    variable
-        Name of the variable inside a component.
-    value
-        In the variable's own unit.
-    option
-        Option of the command line, with which the error begins.
-
-    Raises
-    ------
-    InputError
-        If an FMU does not take the value.
-    """
+    """A value must be one that every component's FMU takes."""
     for name in components:
         info = plan[name].description.variables[variable]
         low = info.minimum if info.minimum is not None else -math.inf
@@ -156,13 +132,7 @@ def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
 
 
 def mode_name(case: Case, wanted: str | None) -> str:
-    """The name of the mode to design for: the requested one, or by default the first mode that the case names.
-
-    Raises
-    ------
-    InputError
-        If the case names no such mode.
-    """
+    """The name of the mode to design for: the requested one, or by default the first mode that the case names."""
     names = [table.name for table in case.table.analysis.modes]
     if not names:
         raise InputError(

@@ -42,11 +42,6 @@ class DaskCluster:
     tls
         Folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration says
         where they are.
-
-    Raises
-    ------
-    InputError
-        If a file is missing in the folder, or the address is not for TLS.
     """
 
     def __init__(self, address: str, tls: Path | None = None) -> None:

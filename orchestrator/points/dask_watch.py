@@ -26,11 +26,6 @@ class ClusterWatch:
         Of the scheduler, for messages.
     patience
         Seconds without any worker after which the run ends.
-
-    Raises
-    ------
-    InputError
-        If no worker has this project installed.
     """
 
     def __init__(self, client: Any, address: str, patience: float) -> None:

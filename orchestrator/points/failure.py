@@ -12,17 +12,7 @@ from orchestrator.errors import CaseError, CosimError, ErrorKind
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a point could not be computed.
-
-    Attributes
-    ----------
-    kind
-        What is wrong.
-    text
-        The message.
-    lasting
-        Whether the same would come out again, so that it need not be tried.
-    """
+    """Why a point could not be computed."""
 
     kind: ErrorKind
     text: str
@@ -63,11 +53,6 @@ def failure_kept(result: Failing) -> Iterator[None]:
     """Inside, an error ends the computation of one point and becomes part of its result.
 
     An interrupt goes through: it is to end them all.
-
-    Parameters
-    ----------
-    result
-        Takes the failure; what was computed before the error stays in it.
     """
     try:
         yield

@@ -75,11 +75,6 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
         Name or path of the case, and its fingerprint.
     trust_fmus
         As `load_case`.
-
-    Raises
-    ------
-    InputError
-        If its fingerprint is not the wanted one.
     """
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)

@@ -54,23 +54,7 @@ def kept_or_computed(
     store: PointStore,
     report: CountReport,
 ) -> Iterator[tuple[int, Point, bool]]:
-    """Yield, in any order, the index of each task, its point, and whether the point was already stored.
-
-    Parameters
-    ----------
-    kind
-        Of the points.
-    compute
-        The point of a task; it may run in another process.
-    tasks
-        One for each point.
-    executor
-        Where the points are computed that are not stored yet.
-    store
-        Holds the points of earlier starts. New lasting points are added to it.
-    report
-        Called with the number of points done and the total number.
-    """
+    """Yield, in any order, the index of each task, its point, and whether the point was already stored."""
     missing: list[int] = []
     for index, task in enumerate(tasks):
         found = store.load(task.key)

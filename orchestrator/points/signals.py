@@ -25,15 +25,7 @@ def signal_arrays(times: Numbers, signals: Mapping[str, Numbers]) -> Arrays:
 
 
 def take_signals(arrays: Arrays) -> tuple[Numbers, dict[str, Numbers]]:
-    """Times [s] and signals by name, which are taken out of the stored arrays.
-
-    Raises
-    ------
-    KeyError
-        If there are no times.
-    ValueError
-        If a signal has another length than the times.
-    """
+    """Times [s] and signals by name, which are taken out of the stored arrays."""
     times = arrays.pop(_TIMES)
     names = [name for name in arrays if name.startswith(_SIGNAL)]
     signals = {name.removeprefix(_SIGNAL): arrays.pop(name) for name in names}

@@ -39,13 +39,7 @@ class PointStore:
         return (header, arrays) if isinstance(header, dict) and header.pop("key", None) == key else None
 
     def save(self, key: str, header: Mapping[str, Any], arrays: Arrays) -> None:
-        """Write a point in one step: the file gets the name that `load` looks for only when it is complete.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written, for example because the disk is full.
-        """
+        """Write a point in one step: the file gets the name that `load` looks for only when it is complete."""
         text = json.dumps({**header, "key": key}).encode()
         try:
             with replacing(self._path(key)) as partial, partial.open("wb") as file:

@@ -18,13 +18,7 @@ def find_browser() -> str | None:
 
 
 def print_pdf(page: Path, target: Path) -> Path:
-    """Print an HTML file.
-
-    Raises
-    ------
-    InputError
-        If there is no browser, or it does not print.
-    """
+    """Print an HTML file."""
     browser = find_browser()
     if browser is None:
         raise InputError(

@@ -21,15 +21,7 @@ class PlainTable(Table):
     """
 
     def add_row(self, *cells: Any, **options: Any) -> None:
-        """Add a row; text in it is shown to the letter.
-
-        Parameters
-        ----------
-        cells
-            Text, or whatever else rich can show.
-        options
-            As rich's own.
-        """
+        """Add a row; text in it is shown to the letter."""
         super().add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
 

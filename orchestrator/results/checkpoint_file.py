@@ -33,22 +33,7 @@ class DamagedCheckpointError(CosimError):
 
 
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays) -> None:
-    """Write a checkpoint; the one that was there stays as ``.previous``, and a loss of power leaves one of both.
-
-    Parameters
-    ----------
-    path
-        Of the newest checkpoint.
-    header
-        Of JSON's types.
-    arrays
-        By name.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written; what was there is as it was.
-    """
+    """Write a checkpoint; the one that was there stays as ``.previous``, and a loss of power leaves one of both."""
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, **{_HEADER: text}, **arrays)
@@ -67,15 +52,7 @@ def previous(path: Path) -> Path:
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Header and arrays.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    DamagedCheckpointError
-        If a single bit is not as it was written.
-    """
+    """Header and arrays."""
     content = path.read_bytes()
     body = content[len(_MARK) + _DIGEST :]
     if not content.startswith(_MARK):

@@ -23,11 +23,6 @@ def held(folder: Path) -> Iterator[None]:
     """Hold a folder, which is made where it is missing; the lock ends with the process, whatever ends that.
 
     Windows, and network drives without locks, have no such lock: there nobody is refused.
-
-    Raises
-    ------
-    InputError
-        If another command holds it, or the folder or the file cannot be made.
     """
     made_folder(folder)
     if fcntl is None:

@@ -30,19 +30,7 @@ class WrittenFile:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a manifest says.
-
-    Attributes
-    ----------
-    folder
-        That it is of.
-    files
-        By name. Several commands may have written into one folder.
-    scenarios
-        Folders in it, by the run that says so: those of the last run.
-    scenario
-        That the folder is of; empty where it is no scenario's folder.
-    """
+    """What a manifest says."""
 
     folder: Path
     files: dict[str, WrittenFile]
@@ -56,11 +44,6 @@ class Manifest:
         ----------
         names
             Of the files; those that are not listed, and were written by nobody, are not looked at.
-
-        Raises
-        ------
-        InputError
-            If one is missing or was changed.
         """
         for name in names:
             if name in self.files:
@@ -111,11 +94,6 @@ def write_manifest(
         What an earlier command said of the files' place: its files that are not written anew stay listed.
     about
         Of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
     """
     paths = {name: folder / name for name in sorted(names)}
     files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}
@@ -127,13 +105,7 @@ def write_manifest(
 
 
 def read_manifest(folder: Path) -> Manifest | None:
-    """The manifest of a folder; None where there is none, as in those of older versions.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read.
-    """
+    """The manifest of a folder; None where there is none, as in those of older versions."""
     path = folder / MANIFEST
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -149,13 +121,7 @@ def read_manifest(folder: Path) -> Manifest | None:
 
 
 def checked(folder: Path, names: Collection[str]) -> Manifest | None:
-    """The manifest of a folder in which these files are as they were written; warns where there is none.
-
-    Raises
-    ------
-    InputError
-        If a file is missing or was changed.
-    """
+    """The manifest of a folder in which these files are as they were written; warns where there is none."""
     manifest = read_manifest(folder)
     if manifest is None or not manifest.files.keys() & {*names}:
         text = f"{folder}: there is no {MANIFEST} of these results, so nobody can check them"
@@ -166,22 +132,7 @@ def checked(folder: Path, names: Collection[str]) -> Manifest | None:
 
 
 def check_one_run(folder: Path, names: Iterable[str], inner: Iterable[str]) -> None:
-    """Compare the files of a run, and those in the folders of its scenarios, with what one run wrote.
-
-    Parameters
-    ----------
-    folder
-        Of the run.
-    names
-        Of its files, of which the first has to be there.
-    inner
-        Names of files in the folder of each scenario.
-
-    Raises
-    ------
-    InputError
-        If one is of another run, missing, or changed.
-    """
+    """Compare the files of a run, and those in the folders of its scenarios, with what one run wrote."""
     there = [name for name in names if (folder / name).exists()]
     manifest = checked(folder, there)
     if manifest is None:

@@ -76,21 +76,7 @@ def netcdf_image(
 def create_columns(
     file: Any, names: Sequence[str], rows: int, units: Mapping[str, Attributes], attributes: Attributes, chunk: int
 ) -> list[Any]:
-    """Empty columns of an HDF5 file, the time first, in the form that NetCDF-4 asks for.
-
-    Parameters
-    ----------
-    file
-        The h5py file.
-    names
-        Of the columns beside the time.
-    rows, chunk
-        Rows of the columns, and of a chunk of them.
-    units
-        Attributes of columns, by name.
-    attributes
-        Of the whole file.
-    """
+    """Empty columns of an HDF5 file, the time first, in the form that NetCDF-4 asks for."""
     form = {"shape": (rows,), "dtype": "<f8", "chunks": (chunk,), "maxshape": (rows or None,), "compression": "gzip",
             "compression_opts": LEVEL, "shuffle": True, "track_order": True}  # fmt: skip
     time = file.create_dataset("time", **form)
@@ -170,26 +156,7 @@ def _reserve(file: BinaryIO, size: int) -> None:
 def join_netcdf(
     parts: Sequence[Path], path: Path, names: Sequence[str], units: Mapping[str, Attributes], attributes: Attributes
 ) -> None:
-    """Join files of `netcdf_image`, of whole chunks but for the last, to one; chunks are copied as they are.
-
-    Parameters
-    ----------
-    parts
-        Files in their order, at least one.
-    path
-        The file to be written.
-    names
-        Of the columns.
-    units
-        Attributes of columns, by name.
-    attributes
-        Of the whole file.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
-    """
+    """Join files of `netcdf_image`, of whole chunks but for the last, to one; chunks are copied as they are."""
     import h5py  # noqa: PLC0415 - as above
 
     room = sum(part.stat().st_size for part in parts) + _SLACK

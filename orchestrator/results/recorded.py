@@ -27,13 +27,7 @@ _OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_FillValue"}
 
 
 def open_recording(folder: Path) -> xr.Dataset:
-    """What an unfinished recording holds, also while it grows; signals are read when they are used.
-
-    Raises
-    ------
-    InputError
-        If there is none, or a file of it is missing or cannot be read.
-    """
+    """What an unfinished recording holds, also while it grows; signals are read when they are used."""
     parts = parts_of(folder)
     if not parts:
         raise InputError(f"{folder}: nothing was recorded yet")

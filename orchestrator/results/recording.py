@@ -34,15 +34,6 @@ class RecordingFolder:
 
     Each is a NetCDF-4 file, written at once; the last one is replaced as it grows. So every moment leaves a recording
     that can be read, whatever ends the process.
-
-    Parameters
-    ----------
-    folder
-        Where the files go.
-    prepared
-        The scenario; what it was made from stands in each file.
-    further
-        More attributes of the files, such as the run's id.
     """
 
     def __init__(self, folder: Path, prepared: PreparedScenario, further: Attributes | None = None) -> None:
@@ -121,13 +112,7 @@ class RecordingFolder:
 
 
 def temporary_recording(prepared: PreparedScenario) -> RecordingFolder:
-    """A recording in the system's folder for temporary files; it is removed when the process ends.
-
-    Raises
-    ------
-    InputError
-        If there is no room for it.
-    """
+    """A recording in the system's folder for temporary files; it is removed when the process ends."""
     folder = Path(mkdtemp(prefix="gfor_recording_"))
     atexit.register(rmtree, folder, ignore_errors=True)
     require_room([prepared], folder, csv=False)

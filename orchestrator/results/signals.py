@@ -25,11 +25,6 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     """``"a.b"`` or ``"a.b - c.d"`` from a recorded dataset; None if a variable was not recorded.
 
     The name of a measured channel may hold `` - `` itself.
-
-    Raises
-    ------
-    InputError
-        If the expression has another form.
     """
     if expression in dataset:
         return dataset[expression]

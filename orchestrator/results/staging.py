@@ -55,11 +55,6 @@ class ScenarioFolder:
         ----------
         ended_early
             Why the run ended before its stop time; None where it reached that.
-
-        Raises
-        ------
-        ResultsError
-            If it cannot be; all stays where it is.
         """
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
@@ -131,22 +126,7 @@ def unfinished(folder: Path) -> list[Path]:
 
 @contextmanager
 def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Path]:
-    """A folder to write files to that are put into ``folder`` at the end, with a manifest of them.
-
-    Parameters
-    ----------
-    folder
-        Where the files go; others that are there stay.
-    run
-        The run's id.
-    scenarios
-        Folders in it that are of the same run.
-
-    Raises
-    ------
-    ResultsError
-        If they cannot be written; then none is put there.
-    """
+    """A folder to write files to that are put into ``folder`` at the end, with a manifest of them."""
     path = folder / f"{PARTIAL}{run}"
     rmtree(path, ignore_errors=True)  # a resumed run has the id of the one that was killed
     try:

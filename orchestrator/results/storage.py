@@ -110,13 +110,7 @@ def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dat
 
 
 def save_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write ``path``.nc and ``path``.csv of a recording in memory.
-
-    Raises
-    ------
-    ResultsError
-        If they cannot be written.
-    """
+    """Write ``path``.nc and ``path``.csv of a recording in memory."""
     names = [str(name) for name in dataset.data_vars]
     units = {name: dataset[name].attrs for name in ("time", *names)}
     values = np.column_stack([dataset[n].values for n in names]) if names else np.empty((dataset.sizes["time"], 0))
@@ -127,13 +121,7 @@ def save_dataset(dataset: xr.Dataset, path: Path) -> None:
 
 
 def save_csv(dataset: xr.Dataset, path: Path) -> None:
-    """Write recorded signals over the time as a table, some rows at a time.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
-    """
+    """Write recorded signals over the time as a table, some rows at a time."""
     names = [str(name) for name in dataset.data_vars]
     header = io.StringIO()
     csv.writer(header, lineterminator="\n").writerow(
@@ -159,13 +147,7 @@ def safe_cell(value: Any) -> Any:
 
 
 def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
-    """Write rows of equal keys as CSV.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
-    """
+    """Write rows of equal keys as CSV."""
     rows = list(rows)
     file = io.StringIO(newline="")
     writer = csv.writer(file)
@@ -176,24 +158,12 @@ def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
 
 
 def save_json(content: Any, path: Path) -> None:
-    """Write indented JSON.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
-    """
+    """Write indented JSON."""
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 
 def save_matrices(content: Mapping[str, Any], path: Path) -> None:
-    """Write matrices in MATLAB's format.
-
-    Raises
-    ------
-    ResultsError
-        If they cannot be written.
-    """
+    """Write matrices in MATLAB's format."""
     from scipy.io import savemat  # noqa: PLC0415 - a tenth of a second that only this format needs
 
     file = io.BytesIO()
@@ -202,12 +172,6 @@ def save_matrices(content: Mapping[str, Any], path: Path) -> None:
 
 
 def save_netcdf(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset of moderate size as NetCDF-3.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written.
-    """
+    """Write a dataset of moderate size as NetCDF-3."""
     kept = dataset.rename({name: stored_name(str(name)) for name in dataset.data_vars})
     write_bytes(path, bytes(kept.to_netcdf(engine="scipy")))

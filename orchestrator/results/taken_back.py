@@ -12,28 +12,7 @@ from orchestrator.results.recording import RecordingFolder, parts_of, rows_in
 def take_back(
     recording: RecordingFolder, names: tuple[str, ...], rows: int, block: int, whole: Iterable[Path], run: str
 ) -> bool:
-    """Make a recording hold at least so many rows, from files into which they were joined if need be.
-
-    Parameters
-    ----------
-    recording
-        Where the rows are to be.
-    names
-        Of the columns.
-    rows
-        How many are needed.
-    block
-        Most rows of a part.
-    whole
-        Files that may hold them, the likeliest first.
-    run
-        Id of the run; files of another one are left alone.
-
-    Returns
-    -------
-    bool
-        Whether it holds them now.
-    """
+    """Make a recording hold at least so many rows, from files into which they were joined if need be."""
     import h5py  # noqa: PLC0415 - a tenth of a second that only a resumed run needs
 
     if rows_in(parts_of(recording.folder)) >= rows:

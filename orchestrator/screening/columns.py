@@ -18,19 +18,7 @@ _SWITCHES = {"1": True, "true": True, "yes": True, "0": False, "false": False, "
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of a scenario's network that a column or an outage can name.
-
-    Attributes
-    ----------
-    grid
-        Name of the grid component.
-    units
-        Bus of every unit.
-    lines, loads, shunts
-        Those that can be switched or scaled.
-    slack
-        The bus that feeds what is left; "" where none is known.
-    """
+    """Elements of a scenario's network that a column or an outage can name."""
 
     grid: str
     units: Mapping[str, str]
@@ -41,13 +29,7 @@ class Elements:
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
-        """Those of a prepared scenario.
-
-        Raises
-        ------
-        InputError
-            If the case has no network that a power flow is computed of.
-        """
+        """Those of a prepared scenario."""
         network, table = prepared.network, prepared.case.table.power_flow
         if network is None or table is None:
             raise InputError(
@@ -106,13 +88,7 @@ Raises `ValueError` where the text has no meaning in this column.
 
 
 def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
-    """How the cells of a column are read.
-
-    Raises
-    ------
-    InputError
-        If the column means nothing in this scenario; the message has no place.
-    """
+    """How the cells of a column are read."""
     if column == "load":
         return lambda text: Setting(scale=_positive(column, text))
     if column == "generation":

@@ -41,11 +41,6 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
         ``line_1_2+sg3`` loses two elements together; None for none.
     elements
         Of the scenario.
-
-    Raises
-    ------
-    InputError
-        If there is no such element, or an outage is named twice.
     """
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
@@ -96,17 +91,7 @@ class Remains:
 
 
 def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
-    """What outages leave: of all parts with a unit in service, the one with the most load remains.
-
-    Parameters
-    ----------
-    prepared
-        With the values of the operating point.
-    elements
-        Of the scenario.
-    out
-        Elements out of service.
-    """
+    """What outages leave: of all parts with a unit in service, the one with the most load remains."""
     network, grid = prepared.network, prepared.system.components[elements.grid]
     assert network is not None
     values = grid.parameters

@@ -71,13 +71,7 @@ class _Result:
 
 
 def compute_stretch(task: StretchTask) -> StretchRecord:
-    """Compute all items of a stretch; failures become records as well.
-
-    Raises
-    ------
-    InputError
-        If this worker's case file or code differs from those that the screening was started with.
-    """
+    """Compute all items of a stretch; failures become records as well."""
     case = same_case(task.case, task.fingerprint, task.trust_fmus)
     with on_one_thread(), ScreeningBench() as bench:
         worker = _Worker(task, case, bench)

@@ -172,19 +172,7 @@ def lost_and_shared(
     dispatch: Dispatch,
     after: PreparedScenario,
 ) -> str:
-    """What an outage takes away, and who feeds most of it, in words.
-
-    Parameters
-    ----------
-    units, loads
-        That the outage takes.
-    before, after
-        The scenario with the values of the operating point, and at the item.
-    grid
-        Name of the grid component.
-    dispatch
-        What the units fed before.
-    """
+    """What an outage takes away, and who feeds most of it, in words."""
     plans, flow = before.system.components, after.power_flow
     assert flow is not None
     rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}

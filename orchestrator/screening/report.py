@@ -19,15 +19,7 @@ _MOST_MARKS = 4000
 
 
 def write_page(summary: Summary, path: Path) -> None:
-    """Write the page as one file that needs no other.
-
-    Parameters
-    ----------
-    summary
-        What was found.
-    path
-        Of the file.
-    """
+    """Write the page as one file that needs no other."""
     plan, figures = summary.result.plan, Figures()
     shade = {True: "good", False: "bad", None: "soft"}[summary.stable]
     findings = f'<p class="{shade}">{escape(verdict_sentence(summary))}</p><p>{escape(what_was_counted(summary))}</p>'

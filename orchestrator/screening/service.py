@@ -15,19 +15,7 @@ _DEAD_CHARGING = 1e-3
 
 
 def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str) -> dict[str, Value]:
-    """Values that take elements out of service in the power flow and in the grid, with all that is dead then.
-
-    Parameters
-    ----------
-    out
-        Elements out of service.
-    remains
-        What they leave.
-    prepared
-        With the values of the operating point.
-    grid
-        Name of the grid component.
-    """
+    """Values that take elements out of service in the power flow and in the grid, with all that is dead then."""
     opened = [name for name in (*out, *remains.units, *remains.shunts)
               if name not in remains.loads and name not in remains.ties]  # fmt: skip
     values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}

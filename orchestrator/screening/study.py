@@ -41,13 +41,7 @@ class Shard:
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
-        """Read ``2/8``.
-
-        Raises
-        ------
-        ValueError
-            If it is no part of a whole.
-        """
+        """Read ``2/8``."""
         found = re.fullmatch(r"(\d+)/(\d+)", text.strip())
         number, total = (int(part) for part in found.groups()) if found else (0, 0)
         if not 1 <= number <= total:
@@ -128,11 +122,6 @@ def plan_screening(
         Whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of stretches.
     sharing
         How units share an outage; as the case says where None.
-
-    Raises
-    ------
-    InputError
-        If the points, the outages or the scenario cannot be used.
     """
     name = scenario or next(iter(case.scenarios))
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)

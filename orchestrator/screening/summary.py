@@ -65,17 +65,7 @@ class ModeAt:
 
 @dataclass(frozen=True)
 class ScreenedMode:
-    """A mode that was followed over a screening.
-
-    Attributes
-    ----------
-    name
-        Its frequency and who takes part most, where it is damped least.
-    worst
-        Where that is.
-    at
-        Everywhere it was critical.
-    """
+    """A mode that was followed over a screening."""
 
     name: str
     worst: ModeAt
@@ -88,13 +78,7 @@ class ScreenedMode:
 
 
 class Summary:
-    """Figures of a screening.
-
-    Parameters
-    ----------
-    result
-        All items, or those of a part.
-    """
+    """Figures of a screening."""
 
     def __init__(self, result: ScreeningResult) -> None:
         self.result = result
@@ -187,13 +171,6 @@ def _likeness(known: Sequence[ModeAt], other: Sequence[ModeAt]) -> float:
 
 def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A damping-duration curve: for how long the damping is at most so much.
-
-    Parameters
-    ----------
-    mode
-        The mode.
-    outages
-        Whether the worst outage of each point counts, instead of the intact network.
 
     Returns
     -------

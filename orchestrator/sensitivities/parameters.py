@@ -66,11 +66,6 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
         tunable ones are taken.
     fixed
         Without patterns, take the fixed ones as well.
-
-    Raises
-    ------
-    InputError
-        If a pattern fits nothing that a mode can be differentiated by.
     """
     descriptions = {name: running.description for name, running in master.components.items()}
     return parameters_in(

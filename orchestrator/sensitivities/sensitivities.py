@@ -113,17 +113,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class SensitivityResult:
-    """The sensitivities of one mode, largest effect first.
-
-    Attributes
-    ----------
-    modes
-        Steady state, verdict and modes of the scenario.
-    held
-        Whether the operating point was held, instead of moving with the parameter.
-    warnings
-        What concerns all rows.
-    """
+    """The sensitivities of one mode, largest effect first."""
 
     modes: ModesResult
     mode: Mode
@@ -171,13 +161,6 @@ def find_sensitivities(
         In which the mode is [Hz].
     report
         Called with how many parameters are done, of how many.
-
-    Raises
-    ------
-    InputError
-        If there is no such mode or parameter.
-    AnalysisError
-        If no steady state is found, or the system cannot be linearised.
     """
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -240,13 +223,7 @@ class _Mode:
         self._exact = exact if same else None
 
     def shift(self, blocks: Blocks, master: Master) -> Shift:
-        """How far the mode moves in a system of these blocks.
-
-        Raises
-        ------
-        AnalysisError
-            If the changed system has other states.
-        """
+        """How far the mode moves in a system of these blocks."""
         varied = model_of(master, blocks)
         if varied.names != self._model.names:
             raise AnalysisError("with another value the outputs depend on other inputs, which changes the states")

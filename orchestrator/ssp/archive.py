@@ -16,18 +16,7 @@ _KIND = "SSP"
 
 
 class SspArchive:
-    """An .ssp file on disk.
-
-    Attributes
-    ----------
-    digest
-        SHA-256 of the file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or the file is not an SSP.
-    """
+    """An .ssp file on disk."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -37,13 +26,7 @@ class SspArchive:
             raise InputError(f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again")
 
     def member(self, source: str) -> str:
-        """Name of the member that a relative URI means.
-
-        Raises
-        ------
-        InputError
-            If the URI leads out of the archive, or the archive has no such member.
-        """
+        """Name of the member that a relative URI means."""
         uri = urlsplit(source)
         path = unquote(uri.path)
         if uri.scheme or uri.netloc or path.startswith("/") or "\\" in path or ".." in path.split("/"):
@@ -61,26 +44,14 @@ class SspArchive:
         return name
 
     def read(self, member: str) -> bytes:
-        """Contents of a member.
-
-        Raises
-        ------
-        InputError
-            If the archive is damaged.
-        """
+        """Contents of a member."""
         content = read_member(self.path, member, _KIND)
         if content is None:
             raise InputError(f"{self.path}: the archive has no {member!r}; export it again with all its resources")
         return content
 
     def xml(self, member: str) -> Element:
-        """Root element of a member.
-
-        Raises
-        ------
-        InputError
-            If the member is not XML, or is XML of a form that attacks its reader.
-        """
+        """Root element of a member."""
         text = self.read(member)
         check_xml(self.path, member, text)
         try:
@@ -89,12 +60,6 @@ class SspArchive:
             raise InputError(f"{self.path}: {member} is not XML: {error}; export it again") from error
 
     def unpack(self, member: str, folder: Path) -> Path:
-        """Copy a member into the cache, under its own path in a folder there; an intact copy stays.
-
-        Raises
-        ------
-        CacheError
-            If it cannot be written there.
-        """
+        """Copy a member into the cache, under its own path in a folder there; an intact copy stays."""
         target = folder / member
         return target if intact(target) else keep(target, self.read(member))

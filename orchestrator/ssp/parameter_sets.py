@@ -68,13 +68,7 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
 
 
 def read_parameter_set(root: Element) -> dict[str, SspValue]:
-    """Values of a parameter set by name.
-
-    Raises
-    ------
-    InputError
-        If the text is not a parameter set, or a value cannot be read.
-    """
+    """Values of a parameter set by name."""
     if root.tag != tag("ssv:ParameterSet"):
         raise InputError(f"{root.tag!r} is not a parameter set of SSP 1.0")
     values = {}
@@ -105,13 +99,7 @@ def _value(name: str, element: Element) -> float | bool | str:
 
 
 def read_parameter_mapping(root: Element) -> dict[str, str]:
-    """Target → source; several targets may have one source.
-
-    Raises
-    ------
-    InputError
-        If an entry transforms its value.
-    """
+    """Target → source; several targets may have one source."""
     if root.tag != tag("ssm:ParameterMapping"):
         raise InputError(f"{root.tag!r} is not a parameter mapping of SSP 1.0")
     mapping = {}

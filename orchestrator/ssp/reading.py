@@ -34,20 +34,7 @@ class SspCase:
 
 
 def read_ssp(path: Path, cache: Path) -> SspCase:
-    """Read an SSP and unpack its FMUs; nested systems are laid flat.
-
-    Parameters
-    ----------
-    cache
-        Folder for unpacked files; each archive gets its own folder inside it.
-
-    Raises
-    ------
-    InputError
-        If the file is not an SSP 1.0.
-    CaseError
-        With every part of the archive that is not supported.
-    """
+    """Read an SSP and unpack its FMUs; nested systems are laid flat."""
     archive = SspArchive(path)
     description = archive.xml(SYSTEM_FILE)
     version = description.get("version", "unknown")

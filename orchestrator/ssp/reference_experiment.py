@@ -40,11 +40,6 @@ def reference_members(path: Path) -> dict[str, bytes]:
     path
         The FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at least)
         higher.
-
-    Raises
-    ------
-    ComponentError
-        If the FMU does not run.
     """
     description = read_description(path)
     stimuli, references, state = _run(description)

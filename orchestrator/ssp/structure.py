@@ -25,17 +25,7 @@ _REFUSED = {
 
 @dataclass
 class Structure:
-    """Components and their connections, without the systems that they were nested in.
-
-    Attributes
-    ----------
-    sources
-        Member of the archive for each component, by the component's path.
-    connections
-        Pairs of an output and the input that it feeds.
-    values
-        Values of every component, by variable.
-    """
+    """Components and their connections, without the systems that they were nested in."""
 
     sources: dict[Owner, str] = field(default_factory=dict)
     connections: list[tuple[Node, Node]] = field(default_factory=list)
@@ -43,13 +33,7 @@ class Structure:
 
 
 def read_structure(archive: SspArchive, description: Element, note: Callable[[str, str], None]) -> Structure:
-    """Lay the systems of a description flat.
-
-    Parameters
-    ----------
-    note
-        Called with the place and the text of each problem.
-    """
+    """Lay the systems of a description flat."""
     systems = children(description, "ssd:System")
     if len(systems) != 1:
         note("ssd:System", "there must be exactly one system at the top; export the SSP again")

@@ -61,11 +61,6 @@ def study_of(
         Events of the scenario, whose order is kept.
     tables
         Tables of the case file that only this project knows.
-
-    Raises
-    ------
-    InputError
-        If an event is a fault, which is no value of a variable.
     """
     if faults := faults_among(events):
         raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")

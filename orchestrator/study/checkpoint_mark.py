@@ -86,18 +86,7 @@ def _entries(content: Any, keys: Keys = ()) -> Iterator[tuple[Keys, str]]:
 def differences(
     then: Mapping[str, str], now: Mapping[str, str], texts: tuple[str, str] | None = None, file: Path | None = None
 ) -> str:
-    """What is not as it was, in words; empty where all is.
-
-    Parameters
-    ----------
-    then, now
-        Marks of a run.
-    texts
-        Of the case, then and now; what differs there is named first, as the rest may come of it. A text that is not
-        the mark's is left out.
-    file
-        Of the case, as it is now.
-    """
+    """What is not as it was, in words; empty where all is."""
     found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
     if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
         found = [*(_in_the_case(*texts, file) or [f"{_CASE} has its tables in another order"]), *found[1:]]

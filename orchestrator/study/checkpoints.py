@@ -64,11 +64,6 @@ class Checkpoints:
         Go on from the newest that is there, instead of beginning anew.
     say
         Told, in one line each, what a user should know.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
     """
 
     def __init__(
@@ -120,17 +115,7 @@ class Checkpoints:
         return found
 
     def take_back(self, recording: RecordingFolder, whole: Sequence[Path], run: str) -> None:
-        """Have a recording hold the rows that the run has recorded where it goes on; without them, begin anew.
-
-        Parameters
-        ----------
-        recording
-            Of the run.
-        whole
-            Files into which the rows may have been joined, the likeliest first.
-        run
-            Id of the run.
-        """
+        """Have a recording hold the rows that the run has recorded where it goes on; without them, begin anew."""
         positions = () if self._kept is None else self._kept.observers
         position = next((p for p in positions if "block" in p and "times" not in p), None)
         if position is None:
@@ -195,13 +180,7 @@ class Checkpoints:
     # -- what was left ---------------------------------------------------------------------------
 
     def _found(self) -> RunState | None:
-        """The newest state that is whole.
-
-        Raises
-        ------
-        InputError
-            If all are damaged, or belong to a run that is made of something else.
-        """
+        """The newest state that is whole."""
         damaged = []
         for path in (self._path, previous(self._path)):
             try:

@@ -48,11 +48,6 @@ def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes
 
     The other run's values are those that it recorded at these times. Where it lacks one of these times, its values are
     interpolated: between two times of the shorter interval, and never between two of the longer one.
-
-    Raises
-    ------
-    InputError
-        If fewer than two times lie within the time that both runs have.
     """
     both = (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
     noise = _NOISE * min(map(_interval, both))

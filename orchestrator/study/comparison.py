@@ -68,11 +68,6 @@ def open_trajectory(path: Path) -> xr.Dataset:
     -----
     ResultsWarning
         If the folder has no manifest, or its run did not end or still goes on.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is not as its run wrote it.
     """
     if is_comtrade(path):
         return read_comtrade(path)
@@ -108,13 +103,7 @@ def _hint(path: Path) -> str:
 
 
 def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
-    """Refuse a signal that is not all numbers.
-
-    Raises
-    ------
-    InputError
-        If a value is NaN or infinite.
-    """
+    """Refuse a signal that is not all numbers."""
     bad = np.flatnonzero(~np.isfinite(curve.values))
     if len(bad):
         times = curve["time"].values
@@ -125,13 +114,7 @@ def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
 
 
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
-    """A signal of a run.
-
-    Raises
-    ------
-    InputError
-        If it was not recorded.
-    """
+    """A signal of a run."""
     found = signal(dataset, expression)
     if found is None:
         known = list(map(str, dataset.data_vars))
@@ -238,11 +221,6 @@ def most_different(
         Most signals to be named.
     labels
         Names of the two runs for errors.
-
-    Raises
-    ------
-    InputError
-        If they have no time in common.
     """
     times = common_times(a["time"].values, b["time"].values, labels)
 

@@ -15,11 +15,6 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
 
     It is made of the FMU's own directional derivatives where it gives them, else by perturbation. Its inputs and
     outputs are all that the FMU has of type Real.
-
-    Raises
-    ------
-    AnalysisError
-        If no steady state is found, or the FMU gives no derivatives.
     """
     plan = prepared.system.components[name]
     info = plan.description.variables

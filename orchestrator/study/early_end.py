@@ -7,19 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class EarlyEnd:
-    """Where a study ended before its time, and what is not there because of that.
-
-    Attributes
-    ----------
-    scenario
-        Title of the one in which it ended.
-    interrupted
-        Whether Ctrl-C or SIGTERM ended it; else something failed.
-    kept
-        Whether results of that scenario are there.
-    not_begun
-        Those that never began: titles by name.
-    """
+    """Where a study ended before its time, and what is not there because of that."""
 
     scenario: str
     interrupted: bool

@@ -30,13 +30,7 @@ _LEAST_PARTICIPATION = 1e-3
 
 
 def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -> None:
-    """Write what belongs to one scenario beside its recording, as soon as it is there, and put it in its place.
-
-    Raises
-    ------
-    ResultsError
-        If it cannot be written; what was recorded stays.
-    """
+    """Write what belongs to one scenario beside its recording, as soon as it is there, and put it in its place."""
     if csv:
         save_csv(result.dataset, scenario.path / "trajectory.csv")
     if result.linear is not None:
@@ -69,17 +63,7 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
 
 
 def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd | None = None) -> list[Path]:
-    """Write what concerns all scenarios together; return the plots.
-
-    Parameters
-    ----------
-    results
-        Of the scenarios that ran.
-    folder
-        For the files.
-    early_end
-        Where the study ended before its last scenario.
-    """
+    """Write what concerns all scenarios together; return the plots."""
     case = results[0].modes.prepared.case
     write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")

@@ -72,13 +72,6 @@ def linear_model(
         Names ``component.variable``.
     as_continuous
         A model in continuous time instead of the map over one communication step.
-
-    Raises
-    ------
-    InputError
-        If there is no such variable, or an input is none that can be perturbed.
-    AnalysisError
-        If no steady state is found, or for a continuous model a component gives no derivatives.
     """
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -100,11 +93,6 @@ def linear_model(
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals.
-
-    Parameters
-    ----------
-    master
-        At the operating point; it is left as it was.
 
     Raises
     ------

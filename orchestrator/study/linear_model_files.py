@@ -20,21 +20,7 @@ def save_linear_model(
     prepared: PreparedScenario,
     folder: Path,
 ) -> list[Path]:
-    """Write A, B, C, D with names, operating point and verdict: ``linear_model.mat`` for MATLAB, one CSV a matrix.
-
-    Parameters
-    ----------
-    model
-        The matrices, with their names.
-    point
-        Gives the states' values; NaN is written for a state that it does not have.
-    stability
-        The verdict.
-    prepared
-        The scenario, for where all of it comes from.
-    folder
-        Where the files go; it is made where it is missing.
-    """
+    """Write A, B, C, D with names, operating point and verdict: ``linear_model.mat`` for MATLAB, one CSV a matrix."""
     matrices = {"A": model.A, "B": model.B, "C": model.C, "D": model.D}
     names = {"states": model.states, "inputs": model.inputs, "outputs": model.outputs}
     operating_point = [point.states.get(name, math.nan) for name in model.states]

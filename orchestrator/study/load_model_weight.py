@@ -23,15 +23,7 @@ class Choosable(Protocol):
 
 
 def load_model_weight(scenario: Choosable, result: ModesResult) -> str | None:
-    """The least damped mode with both load models; None where the model is not open, or the system is large.
-
-    Parameters
-    ----------
-    scenario
-        The first of a study.
-    result
-        Its modes, with loads of constant impedance.
-    """
+    """The least damped mode with both load models; None where the model is not open, or the system is large."""
     if result.model.number_of_states > _MOST_STATES:
         return None
     try:

@@ -35,18 +35,6 @@ def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[Identifie
 
     Where samples are dense they are averaged before they are thinned out, so that a faster oscillation does not appear
     as a slower one. An average over equal times leaves the eigenvalues of a free response as they are.
-
-    Parameters
-    ----------
-    window
-        The part of the signal that is a free response.
-    coarser
-        Factor of what is taken for noise.
-
-    Raises
-    ------
-    AnalysisError
-        If samples are missing or uneven, or the signal is an instantaneous voltage or current.
     """
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))

@@ -38,17 +38,7 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
 
 
 def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) -> None:
-    """Eigenvalue map with rays of equal damping; other people's figures as open circles.
-
-    Parameters
-    ----------
-    axis
-        Matplotlib Axes; where it shows a map already, the modes are added to that.
-    results
-        One for each scenario.
-    first
-        Index of the first scenario's colour: the number of scenarios that the Axes show already.
-    """
+    """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
     named = [m.frequency_hz for r in results for m in r.named.values()]
     highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
     if first:
@@ -171,19 +161,7 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
 
 
 def draw_mode_shape(axis: Any, result: ModesResult, name: str, shade: str) -> None:
-    """Arrows of the states that swing in a named mode, on polar Matplotlib Axes.
-
-    Parameters
-    ----------
-    axis
-        Polar Matplotlib Axes.
-    result
-        The modes of a scenario.
-    name
-        Of the mode; no arrow is drawn where the scenario has none of that name.
-    shade
-        Colour of the arrows.
-    """
+    """Arrows of the states that swing in a named mode, on polar Matplotlib Axes."""
     axis.set_ylim(0, 1.08)
     axis.spines["polar"].set_visible(False)
     axis.set_yticks([0.5, 1.0], [])

@@ -157,11 +157,6 @@ def running(prepared: PreparedScenario, federation: Federation | None = None, th
         The federates that take part.
     threads
         As `orchestrator.coupling.master.Master`.
-
-    Raises
-    ------
-    CaseError
-        If a component refuses to initialise, with its place.
     """
     opener = open_plan if federation is None else federation.open
     try:
@@ -304,13 +299,7 @@ class Linearised:
         return find_spectrum(self._model, first, max(last, HIGHEST_SWING_HZ)), []
 
     def finished(self, known: Mapping[str, NamedSystem] = MappingProxyType({})) -> ModesResult:
-        """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on.
-
-        Parameters
-        ----------
-        known
-            Scenarios that are finished, by name: modes are followed from there.
-        """
+        """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
         prepared, model = self._prepared, self._model
         low, high = self._range
         spectrum, critical_modes = self._found.result()
@@ -438,15 +427,7 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
 
 
 def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) -> Mapping[str, Any]:
-    """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step.
-
-    Parameters
-    ----------
-    results
-        Of the scenarios.
-    questions
-        Those that only the modes raise.
-    """
+    """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step."""
     first = results[0].prepared
     asked = [str(question) for result in results for question in result.prepared.questions]
     facts = facts_of(first)

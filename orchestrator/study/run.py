@@ -174,15 +174,7 @@ def _run(
     threads: int | None,
     federation: Federation | None = None,
 ) -> RunResult:
-    """See `run_scenario`.
-
-    Parameters
-    ----------
-    prepared, frequency_range, observers, linear, recording, checkpoints, threads
-        As there.
-    federation
-        The federates that take part.
-    """
+    """See `run_scenario`."""
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None

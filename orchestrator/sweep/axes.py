@@ -124,13 +124,7 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
 
 
 def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) -> None:
-    """Refuse two axes that vary one variable.
-
-    Raises
-    ------
-    InputError
-        If there are such two; at no point of their grid would both have their values.
-    """
+    """Refuse two axes that vary one variable."""
     names = [*dict.fromkeys(name for s in scenarios for name in s.system.components)]
     for one, other in itertools.combinations(axes, 2):
         (pattern, _, variable), (second, _, same) = one.key.partition("."), other.key.partition(".")

@@ -161,13 +161,7 @@ def make_task(
 
 
 def compute_point(task: SweepPointTask) -> PointRecord:
-    """Prepare, find the steady state, linearise, find the modes; a failure becomes a record as well.
-
-    Raises
-    ------
-    InputError
-        If this worker's case file or code differs from those that the sweep was started with.
-    """
+    """Prepare, find the steady state, linearise, find the modes; a failure becomes a record as well."""
     case = same_case(task.case, task.fingerprint, task.trust_fmus)
     with alone():
         try:

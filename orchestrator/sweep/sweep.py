@@ -168,11 +168,6 @@ def plan_sweep(
         Modes of these frequencies are followed [Hz].
     parameters
         Parameter files whose values hold at every point; a later one goes before an earlier one.
-
-    Raises
-    ------
-    InputError
-        If a mistake concerns the sweep as a whole, such as an unknown scenario or parameter.
     """
     prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))

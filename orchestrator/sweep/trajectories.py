@@ -29,15 +29,7 @@ class Beginning(IntEnum):
 
 @dataclass(frozen=True)
 class TrajectoryPoint:
-    """A trajectory at one point of the grid.
-
-    Attributes
-    ----------
-    mode
-        Index in the point's record.
-    similarity
-        Least similarity on the way from the previous grid point; NaN where the trajectory begins.
-    """
+    """A trajectory at one point of the grid."""
 
     mode: int
     similarity: float

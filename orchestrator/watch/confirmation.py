@@ -48,29 +48,13 @@ def rms(signal: Numbers) -> float:
 
 
 def rises(signal: Numbers, *, extents: bool = False) -> bool:
-    """Whether a swing grows from quarter to quarter, to far above its beginning.
-
-    Parameters
-    ----------
-    signal
-        The signal.
-    extents
-        Whether it is the extent of a swing, and does not swing itself.
-    """
+    """Whether a swing grows from quarter to quarter, to far above its beginning."""
     sizes = [float(part.mean()) if extents else rms(part) for part in np.array_split(signal, 4)]
     return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
 
 
 def doubt(swing: Swing, oscillation: Oscillation) -> str:
-    """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it.
-
-    Parameters
-    ----------
-    swing
-        The signal that shows it.
-    oscillation
-        As the end of the response shows it.
-    """
+    """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it."""
     grows = change(swing, oscillation.rate) > STEADY
     if swing.turns_hz is not None:
         first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
@@ -97,13 +81,7 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
 
 
 def irregular_doubt(swing: Swing) -> str:
-    """Why a swing of any shape, which seems to last, may decay; empty where its sizes from piece to piece do not fall.
-
-    Parameters
-    ----------
-    swing
-        The signal that shows it.
-    """
+    """Why a swing of any shape, which seems to last, may decay; empty where its sizes do not fall."""
     sizes = np.array([rms(piece) for piece in np.array_split(swing.signal, _PIECES)])
     if not (sizes > 0).all():
         return ""

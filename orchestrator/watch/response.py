@@ -91,20 +91,6 @@ def unsettled_response(
     If an oscillation is faster than the looks, only such oscillations are reported, because the looks would show it as
     a slower one. In a stretch with unnoticed events, only oscillations that continue over all of these events are
     reported.
-
-    Parameters
-    ----------
-    seen
-        What was seen of the run.
-    system
-        What ran.
-    stretch
-        The judged part of the run.
-    units
-        Components that feed the grid. A finding names one of them rather than the grid if both swing.
-    noisy
-        Whether to report only what noise or quantisation does not explain: one clean oscillation, or a swing that grows
-        to far above its beginning.
     """
     seen = seen.until(stretch.end)
     first = int(np.searchsorted(seen.times, stretch.begin))
@@ -151,17 +137,6 @@ def _told(
 ) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
     swing in doubt only where there is no finding.
-
-    Parameters
-    ----------
-    swings
-        In the order in which they are tried.
-    system, stretch
-        What ran, and the judged part of the run.
-    irregular_as_well
-        Whether a swing without a single frequency is a finding.
-    clean
-        Whether only swings count that are one oscillation and nothing else.
     """
     told: dict[Kind, Finding] = {}
     irregular, doubtful = list[Finding](), list[Finding]()

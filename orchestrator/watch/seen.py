@@ -128,13 +128,7 @@ class Watcher:
         """Do nothing: the collected data stay."""
 
     def position(self) -> dict[str, Any]:
-        """All that was seen so far, for `resume`: numbers, and arrays by name.
-
-        Raises
-        ------
-        InputError
-            If no run has begun.
-        """
+        """All that was seen so far, for `resume`: numbers, and arrays by name."""
         if self._run is None:
             raise InputError("the watch has seen nothing yet; ask for its position after the run began")
         rows = {f"rows_{name}": value for name, value in self._recorder.position().items()}

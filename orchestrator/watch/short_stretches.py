@@ -34,13 +34,7 @@ def is_short(stretch: Stretch) -> bool:
 
 
 def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
-    """One remark on stretches whose end shows a motion, or has too few looks to show any, and which are too short.
-
-    Parameters
-    ----------
-    stretches
-        In the order of their beginning.
-    """
+    """One remark on stretches whose end shows a motion, or has too few looks to show any, and which are too short."""
     if not stretches:
         return []
     spans = " and ".join(
@@ -60,13 +54,6 @@ def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) ->
     """One remark on the first stretch at whose end a signal moves more than before, whatever its motion is.
 
     A growth that shows fewer than two periods, or none, has no frequency, so that no other check tells it.
-
-    Parameters
-    ----------
-    seen, system
-        What was seen of the run, and what ran.
-    stretches
-        Those without a finding, in the order of their beginning.
     """
     for stretch in stretches:
         if not stretch.last and stretch.end - stretch.begin < SHORTEST_BETWEEN:

@@ -32,17 +32,7 @@ def _since(swing: Swing, frequency: float | None) -> float:
 
 
 def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    """An oscillation that grows.
-
-    Parameters
-    ----------
-    swing, oscillation
-        The signal that shows it, and what it shows.
-    unit
-        Of the signal.
-    stretch
-        The judged part of the run.
-    """
+    """An oscillation that grows."""
     message = (
         f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "

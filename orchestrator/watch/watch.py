@@ -32,20 +32,6 @@ class Watch:
 
     Coupled outputs are watched at every communication step: whether they are finite, their extremes and their turns.
     Recorded signals, limits and angles are watched at looks, some milliseconds apart.
-
-    Parameters
-    ----------
-    prepared
-        The scenario.
-    sink
-        Where all recorded rows go; the recorder then keeps only those of the looks.
-
-    Attributes
-    ----------
-    observers
-        Observers for the run, in this order.
-    recorder
-        The recorder of the scenario.
     """
 
     def __init__(self, prepared: PreparedScenario, sink: RowSink | None = None) -> None:
@@ -130,17 +116,7 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
 
 class _Responses:
-    """Findings stretch by stretch.
-
-    Attributes
-    ----------
-    masked
-        The stretches whose motion may come from noise, with its sources.
-    short
-        The stretches whose motion may decay after they end.
-    clear
-        The stretches without a finding and without noise.
-    """
+    """Findings stretch by stretch."""
 
     def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances

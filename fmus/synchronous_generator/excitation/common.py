@@ -30,15 +30,7 @@ def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | N
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]; where it may be 0, 0 leaves its block out.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
-    """
+    """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
     if minimum == 0:
         m.require(
@@ -113,19 +105,7 @@ def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", l
 def rate_feedback(
     m: ModelBuilder, u: ca.SX, initial: Scalar, K_F: float = 0.0, T_F: float = 1.0, name: str = "feedback"
 ) -> tuple[ca.SX, ca.SX]:
-    """s·K_F/(1 + s·T_F) of a signal, and K_F.
-
-    Parameters
-    ----------
-    m
-        The model.
-    u, initial
-        The signal, and its value in steady state.
-    K_F, T_F
-        Defaults.
-    name
-        Of the state.
-    """
+    """s·K_F/(1 + s·T_F) of a signal, and K_F."""
     gain_F = gain(m, "K_F", K_F, "Rate feedback; 0 leaves it out", 0)
     lag = m.parameter("T_F", T_F, "s", "Lag of the rate feedback", minimum=1e-3, source=SOURCE)
     x = m.state(name, initial, "pu", "rate feedback, slow part of the signal", base=E_FD)
@@ -156,15 +136,7 @@ def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, na
 
 
 def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":
-    """Declare two points (E, S_E(E)) of the exciter's saturation curve.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    E_1, S_E1, E_2, S_E2
-        Defaults of the two points, in either order.
-    """
+    """Declare two points (E, S_E(E)) of the exciter's saturation curve."""
     E = [
         m.parameter(f"E_{k}", value, "pu", f"Point {k} of the saturation curve", base=E_FD, minimum=0, source=SOURCE)
         for k, value in ((1, E_1), (2, E_2))

@@ -22,15 +22,7 @@ def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | N
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a time constant [s]; 0 leaves its block out.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text
-        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
-    """
+    """Declare a time constant [s]; 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=0, source=SOURCE)
     m.require(
         ca.if_else(T <= 0, 1, T - m.internal_step / 2), f"pss.{name} must be 0 or longer than half of internal_step"

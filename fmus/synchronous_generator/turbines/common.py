@@ -21,15 +21,7 @@ def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | 
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]; where it may be 0, 0 leaves its block out.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter; one with the minimum 0 is 0 or longer than half of the internal step.
-    """
+    """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
     if minimum == 0:
         m.require(

@@ -82,15 +82,7 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Check:
-    """One question to an FMU.
-
-    Attributes
-    ----------
-    question
-        What it asks, for the report.
-    needs
-        Checks whose failure leaves this one without a meaning.
-    """
+    """One question to an FMU."""
 
     name: str
     question: str
@@ -124,19 +116,7 @@ def passed(name: str, evidence: str, **figures: Any) -> CheckResult:
 
 
 def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResult:
-    """A check that found something to ask about, which is no fault.
-
-    Parameters
-    ----------
-    name
-        Of the check.
-    evidence
-        What was seen.
-    remedy
-        What to ask for or to do.
-    figures
-        What was measured, for the report: plain values by name.
-    """
+    """A check that found something to ask about, which is no fault."""
     return CheckResult(name, Verdict.REMARK, evidence, remedy=remedy, figures=figures)
 
 

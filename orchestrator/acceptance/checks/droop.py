@@ -70,21 +70,7 @@ class Way:
 
 @dataclass(frozen=True)
 class DroopAnswer:
-    """Half the difference of what a change up and the same one down bring [pu, S_n], early and settled.
-
-    Attributes
-    ----------
-    i
-        Current in the end, in the frame of the voltage.
-    early_power, power
-        In the first cycle, and in the end.
-    moving
-        How much P and Q still move in the end.
-    far
-        How far they go away at most.
-    ways
-        What the change down brings, and the one up.
-    """
+    """Half the difference of what a change up and the same one down bring [pu, S_n], early and settled."""
 
     i: complex
     early_power: complex
@@ -96,11 +82,6 @@ class DroopAnswer:
 
 def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> float | None:
     """Fall of the voltage behind an impedance per reactive power [pu, S_n]; None where no such law is seen.
-
-    Parameters
-    ----------
-    found
-        At some operating points what lower voltage and what lower frequency bring.
 
     Notes
     -----

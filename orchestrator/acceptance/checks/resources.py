@@ -30,15 +30,7 @@ _TOOL = 65536.0
 
 @dataclass(frozen=True)
 class _Unknown:
-    """A growth that was not measured.
-
-    Attributes
-    ----------
-    why
-        The cause, in words.
-    refused
-        Whether it should have been possible: then nobody may take the check for passed.
-    """
+    """A growth that was not measured."""
 
     why: str
     refused: bool = True

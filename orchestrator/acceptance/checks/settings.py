@@ -14,13 +14,7 @@ Setting = Mapping[str, float | bool]
 
 
 def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | bool]:
-    """Other values of the tunable parameters, within their bounds; flags and counts move by 1, where bounds allow that.
-
-    Parameters
-    ----------
-    switches
-        Booleans as well, and whole numbers with declared bounds.
-    """
+    """Other values of the tunable parameters, within their bounds; flags and counts move by 1 where they can."""
     found: dict[str, float | bool] = {}
     for name, info in subject.description.variables.items():
         if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
@@ -76,11 +70,6 @@ def with_each_setting(subject: Subject, look: Callable[[Setting], Look]) -> Iter
     """What a look gives with one setting after another, and the setting in words.
 
     A setting with which the FMU does not work is passed over.
-
-    Raises
-    ------
-    ComponentError
-        Where the FMU does not work with its parameters as they are.
     """
     for setting in _settings(subject):
         try:

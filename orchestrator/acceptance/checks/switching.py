@@ -30,13 +30,7 @@ Interval = tuple[Numbers, float]
 
 
 def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Interval, Interval]]) -> list[str]:
-    """Names of signals that switch at other moments in runs that are otherwise alike; empty where more differs.
-
-    Parameters
-    ----------
-    pairs
-        Two runs from the same start with other steps.
-    """
+    """Names of signals that switch at other moments in runs that are otherwise alike; empty where more differs."""
     found: dict[str, None] = {}
     for first, second in pairs:
         relays = _elsewhere(first, second)

@@ -21,15 +21,7 @@ _HEAD = 64 * 1024
 
 
 def load_cgmes(path: Path) -> Any:
-    """The network of a CGMES model, as pypowsybl holds it.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pypowsybl is not installed.
-    InputError
-        If there is no such file, it holds no CGMES, a profile is missing, or pypowsybl refuses it.
-    """
+    """The network of a CGMES model, as pypowsybl holds it."""
     if not path.exists():
         raise InputError(f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV")
     profiles = _profiles(path)

@@ -55,13 +55,6 @@ def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
         Of a zip, or of a folder.
     leaving_out
         Kinds of `LEFT_OUT` that the user lets go.
-
-    Raises
-    ------
-    MissingLibraryError
-        If pypowsybl is not installed.
-    InputError
-        If the model cannot be read or used.
     """
     unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
     if unknown:
@@ -87,11 +80,6 @@ def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNe
         pypowsybl's network.
     leaving_out
         Kinds of `LEFT_OUT` that may go.
-
-    Raises
-    ------
-    InputError
-        If it holds what our network does not have.
     """
     return _Reading(place, source).network(leaving_out)
 

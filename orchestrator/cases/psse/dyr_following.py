@@ -41,22 +41,10 @@ def followed(
 ) -> tuple[Mapping[str, float], list[tuple[int, str]]]:
     """The approximation of a grid-following converter by its records.
 
-    Parameters
-    ----------
-    records
-        Of one machine.
-    left
-        Names of records that are left out.
-
     Returns
     -------
     tuple
         Parameters of the model, and what it leaves out, with the lines that say it.
-
-    Raises
-    ------
-    InputError
-        If a record stands twice or is not complete, or there is no approximation.
     """
     own = [record for record in records if record.name in FIELDS and record.name not in left]
     values: dict[str, dict[str, float]] = {}

@@ -72,22 +72,7 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
 
 
 def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
-    """Values of a record by the names of its fields.
-
-    Parameters
-    ----------
-    record
-        With its values as text.
-    fields
-        Those of its kind, in order.
-    known
-        Names of records; one among the values is the next record, before which a slash is missing.
-
-    Raises
-    ------
-    InputError
-        If it has another number of values, or one is no number.
-    """
+    """Values of a record by the names of its fields."""
     following = next((text for text in record.values[2:] if text.upper() in known), None)
     if following is not None:
         raise InputError(

@@ -13,20 +13,7 @@ from orchestrator.cases.unit_row import UnitRow, checked
 
 
 def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
-    """A unit for each machine, in their order, without what it is made of.
-
-    Parameters
-    ----------
-    machines
-        In service.
-    place
-        Path of the DYR file.
-
-    Raises
-    ------
-    InputError
-        If a machine's figures cannot be.
-    """
+    """A unit for each machine, in their order, without what it is made of."""
     at_bus: dict[int, list[Machine]] = {}
     for machine in machines:
         at_bus.setdefault(machine.bus, []).append(machine)

@@ -22,22 +22,7 @@ _CONDENSER = 0.01
 
 
 def with_choices(rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]) -> list[UnitRow]:
-    """The units with the parts that ``[units]`` chooses: the machine's variant, and what has no record.
-
-    Parameters
-    ----------
-    rows
-        With their records.
-    replaced
-        Labels of units that are converters of the case alone.
-    chosen
-        Part of each kind that the table names.
-
-    Raises
-    ------
-    InputError
-        If a choice acts on no machine.
-    """
+    """The units with the parts that ``[units]`` chooses: the machine's variant, and what has no record."""
     found, acted = [], set[str]()
     for row in rows:
         own = {} if row.label in replaced or row.converter else {k: n for k, n in chosen.items() if _fits(k, n, row)}

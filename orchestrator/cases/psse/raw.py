@@ -67,23 +67,7 @@ class RawNetwork:
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
-    """Read the network of a RAW file.
-
-    Parameters
-    ----------
-    path
-        Of the file.
-    leaving_out
-        Kinds of elements that may be left out.
-    keep_load_parts
-        Whether parts of loads stay of constant current and of constant impedance; else the first are noted as changed,
-        and the second are shunts.
-
-    Raises
-    ------
-    InputError
-        If a record cannot be used; file, line and field are named.
-    """
+    """Read the network of a RAW file."""
     raw = read_records(path)
     return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
 

@@ -116,13 +116,7 @@ class RawFile:
 
 
 def read_records(path: Path) -> RawFile:
-    """Read a RAW file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is no RAW file, or its revision is unknown.
-    """
+    """Read a RAW file."""
     lines = _numbered(_text_of(path))
     first = next(lines, None)
     if first is None:

@@ -28,11 +28,6 @@ def code_for(key: str, given: Mapping[str, object]) -> GridCode:
         As ``--code`` takes it.
     given
         Declared values by name.
-
-    Raises
-    ------
-    InputError
-        If a declared value is missing, unknown or out of its range.
     """
     if key in CODES:
         checked((), given, key)

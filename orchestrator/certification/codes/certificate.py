@@ -168,29 +168,7 @@ def certify_code(
     rows: Sequence[str] = (),
     report: CountReport = lambda done, total: None,
 ) -> CodeCertificate:
-    """Run a code's rows and judge them.
-
-    Parameters
-    ----------
-    request
-        The converter, its binding and its values.
-    code
-        The code.
-    executor
-        Where the rows are computed.
-    folder
-        For the rows' case files, the FMU, its binding, and every row as soon as it is computed. Rows that are there
-        are not computed again.
-    rows
-        Names of the rows to run; all of them where empty.
-    report
-        Called with the number of rows done and the total number.
-
-    Raises
-    ------
-    InputError
-        If the FMU or a value cannot be used.
-    """
+    """Run a code's rows and judge them."""
     request.check()
     f_n = rated_frequency(request, code.f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]

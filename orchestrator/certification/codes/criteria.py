@@ -75,15 +75,7 @@ def holds_together() -> Judge:
 
 
 def settles(events: tuple[int, ...] = (), name: str = "settles") -> Judge:
-    """Power and voltage stand still at the end of the hold after each event.
-
-    Parameters
-    ----------
-    events
-        Numbers of the events; all of them where empty.
-    name
-        Of the criterion.
-    """
+    """Power and voltage stand still at the end of the hold after each event."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         worst, at = 0.0, row.times[0]
@@ -209,15 +201,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
 
 
 def follows_droop(event: int, sign: int) -> Judge:
-    """The settled power after a ramp lies on the side that a droop asks for.
-
-    Parameters
-    ----------
-    event
-        Number of the event with which the hold begins.
-    sign
-        +1 where the power has to be higher than at the start: the frequency is lower.
-    """
+    """The settled power after a ramp lies on the side that a droop asks for."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         time = row.events[event]

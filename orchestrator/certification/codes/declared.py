@@ -27,22 +27,7 @@ class Declaration:
 
 
 def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: str) -> dict[str, float]:
-    """The declared values, each a number within its range.
-
-    Parameters
-    ----------
-    wanted
-        What the code needs.
-    given
-        By name, as the command line read it.
-    code
-        Whose declarations they are.
-
-    Raises
-    ------
-    InputError
-        With the first value that is missing, unknown or out of its range.
-    """
+    """The declared values, each a number within its range."""
     names = [declaration.name for declaration in wanted]
     if unknown := [name for name in given if name not in names]:
         takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"

@@ -94,11 +94,6 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
         What was measured.
     f_n
         Rated frequency [Hz].
-
-    Raises
-    ------
-    ValueError
-        If no frequency of the band was measured.
     """
     Z = jumps(SCR, POWER, ()).impedance
     asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
@@ -117,13 +112,6 @@ def measure_stiffness(request: CertificationRequest, f_n: float, report: Callabl
         Rated frequency [Hz].
     report
         Called with a sentence before each run.
-
-    Raises
-    ------
-    InputError
-        If it has no port, or a value cannot be used.
-    AnalysisError
-        If it does not come to rest or its response does not settle.
     """
     description = bound_fmu(request.fmu, request.binding)
     values = _values(description, request, f_n)

@@ -32,17 +32,7 @@ _READING = (
 
 
 def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) -> list[Path]:
-    """Write ``sensitivities.html`` and ``sensitivities.json`` beside the certificate.
-
-    Parameters
-    ----------
-    plan
-        What was run.
-    needs
-        What came out.
-    folder
-        Of the certificate.
-    """
+    """Write ``sensitivities.html`` and ``sensitivities.json`` beside the certificate."""
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **needs_json(plan, needs)}
     write_text(folder / NEEDS_JSON, json.dumps(content, indent=1, ensure_ascii=False) + "\n")

@@ -75,15 +75,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Bounded:
-    """A criterion whose limits can be drawn.
-
-    Attributes
-    ----------
-    judge
-        The criterion.
-    bands
-        The limits of a response.
-    """
+    """A criterion whose limits can be drawn."""
 
     judge: Judge
     bands: Callable[[MeasuredRow], Sequence[Band]]

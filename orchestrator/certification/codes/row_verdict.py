@@ -13,13 +13,7 @@ NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
 
 @dataclass(frozen=True)
 class RowVerdict:
-    """A row's findings.
-
-    Attributes
-    ----------
-    unknown
-        Why the row is not judged; empty where it is.
-    """
+    """A row's findings."""
 
     row: CodeRow
     findings: tuple[RowFinding, ...] = ()

@@ -40,11 +40,6 @@ def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: b
         chance draws, so that nobody knows them beforehand.
     every
         Take all of them.
-
-    Raises
-    ------
-    InputError
-        If the certificate has no such row.
     """
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
     if unknown := [name for name in wanted if name not in known]:
@@ -68,21 +63,7 @@ def verify_rows(
     executor: Executor,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Verification:
-    """Compute rows anew, from the code's table and the FMU in the folder, and compare them with what was certified.
-
-    Parameters
-    ----------
-    folder
-        Of the certificate.
-    content
-        Contents of the certificate's JSON file.
-    names
-        Of the rows.
-    executor
-        Where they are computed.
-    report
-        Called with the number of rows done and their total.
-    """
+    """Compute rows anew, from the code's table and the FMU in the folder, and compare them with what was certified."""
     found = Verification()
     code = code_for(content["code"], content["declared"])
     rows = {row.name: row for row in code.rows}

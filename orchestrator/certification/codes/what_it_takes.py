@@ -77,19 +77,7 @@ class ConfirmedChange:
 
 @dataclass
 class CriterionNeeds:
-    """A failed criterion, and how each parameter moves its margin.
-
-    Attributes
-    ----------
-    row
-        Name of the row.
-    criterion
-        With the converter as it is.
-    sensitivities
-        Largest effect first.
-    confirmed
-        The most effective change, if that was asked for and there is one.
-    """
+    """A failed criterion, and how each parameter moves its margin."""
 
     row: str
     criterion: ChangedCriterion
@@ -99,23 +87,7 @@ class CriterionNeeds:
 
 @dataclass(frozen=True)
 class ChangePlan:
-    """What is to be run.
-
-    Attributes
-    ----------
-    folder
-        Of the certificate.
-    rows
-        The failed rows.
-    parameters
-        That are changed.
-    left_out
-        Parameters of the converter that are not changed, with the reason.
-    change
-        Relative, to either side.
-    tasks
-        A changed row for each row, parameter and side that the declared bounds allow.
-    """
+    """What is to be run."""
 
     certificate: CodeCertificate
     folder: Path
@@ -150,11 +122,6 @@ def plan_changes(
         Without patterns, take the fixed ones as well.
     change
         By which part of itself a parameter is changed to either side.
-
-    Raises
-    ------
-    InputError
-        If a pattern fits no parameter of the converter, or one that the rows give it.
     """
     rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
     if not rows:
@@ -197,17 +164,7 @@ def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
 def run_changes(
     plan: ChangePlan, executor: Executor, report: CountReport = lambda done, total: None
 ) -> list[CriterionNeeds]:
-    """Run the changed rows and work out the slopes; runs are kept as they come.
-
-    Parameters
-    ----------
-    plan
-        What is run.
-    executor
-        Where it is computed.
-    report
-        Called with the number of runs done and the total number.
-    """
+    """Run the changed rows and work out the slopes; runs are kept as they come."""
     results = _computed(plan, plan.tasks, executor, report)
     found = []
     for v in plan.rows:
@@ -234,17 +191,6 @@ def confirm_changes(
 
     Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to
     move least.
-
-    Parameters
-    ----------
-    plan
-        What was run.
-    needs
-        The slopes; each takes its confirmed change.
-    executor
-        Where it is computed.
-    report
-        Called with the number of runs done and the total number.
     """
     wanted: dict[int, tuple[MarginSensitivity, float]] = {}
     tasks: dict[int, ChangeTask] = {}

@@ -13,17 +13,7 @@ def colour(index: int) -> str:
 
 
 def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """A table.
-
-    Parameters
-    ----------
-    caption, columns
-        Text, which is escaped here.
-    rows
-        Cells as HTML already.
-    left
-        So many columns at the left hold text; the others hold numbers.
-    """
+    """A table."""
 
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values))

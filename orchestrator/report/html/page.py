@@ -21,11 +21,6 @@ def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = 
         Folders or files with sweeps and designs that belong to it.
     path
         By default ``report.html`` in the folder.
-
-    Raises
-    ------
-    InputError
-        If there is nothing to report on.
     """
     results = read_results(folder, others)
     target = path or folder / "report.html"

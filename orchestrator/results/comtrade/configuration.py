@@ -128,13 +128,6 @@ class _Lines:
 def read_configuration(text: str, place: str) -> Configuration:
     """Read the text of a ``.cfg``.
 
-    Parameters
-    ----------
-    text
-        Of the whole file.
-    place
-        Path of the file, for errors.
-
     Raises
     ------
     InputError

@@ -59,11 +59,6 @@ def read_comtrade(path: Path) -> xr.Dataset:
     -----
     ResultsWarning
         If time stamps contradict the sampling rates, or a channel's skew exceeds a tenth of a sample.
-
-    Raises
-    ------
-    InputError
-        If a file is missing, too large, or not as the standard says.
     """
     text, content, places = _joint(path) if path.suffix.lower() == ".cff" else _apart(path)
     configuration = read_configuration(text, places[0])

@@ -36,25 +36,11 @@ _NO_FLOAT = 3.4e38
 def read_samples(content: bytes, configuration: Configuration, place: str) -> tuple[Numbers, Matrix]:
     """Time stamps and values of all channels.
 
-    Parameters
-    ----------
-    content
-        Of the whole file.
-    configuration
-        Of the recording.
-    place
-        Path of the file, for errors.
-
     Returns
     -------
     tuple
         Time stamps [s], shape (n,), NaN where missing; values, shape (n, channels), the analog ones first and scaled,
         NaN where missing.
-
-    Raises
-    ------
-    InputError
-        If the file holds other columns or another number of samples than the configuration says.
     """
     read = _text if configuration.form == "ASCII" else _binary
     numbers, stamps, values = read(content, configuration, place)

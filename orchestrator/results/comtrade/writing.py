@@ -45,13 +45,6 @@ def write_comtrade(
         One of `FORMS`.
     frequency
         Rated frequency [Hz].
-
-    Raises
-    ------
-    InputError
-        If the form is unknown, the times are uneven, or a signal is not finite.
-    ResultsError
-        If a file cannot be written.
     """
     if form not in FORMS:
         raise InputError(f"the form {form!r} is unknown; choose one of {', '.join(FORMS)}")
