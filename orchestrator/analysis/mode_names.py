@@ -24,6 +24,9 @@ CLEAR = 0.8
 CONTESTED = 0.5
 """From this part on it is worth asking which of both the mode was, before something was changed."""
 
+NO_RESONANCE = 1 / np.sqrt(2)
+"""From this damping ratio on a mode amplifies no frequency, and is no rival of one that does."""
+
 LEFT_OVER = 0.5
 """A name takes a mode that is not its best one, because that has another name, only from this part of the best one's
 measure on."""
@@ -119,7 +122,7 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             reasons[name] = _taken(name, modes[best], names[_owner(column, best)])
             continue
         fits[name] = (modes[k], measures[name])
-        free = [j for j in range(len(modes)) if j != k and j not in column.values()]
+        free = [j for j in range(len(modes)) if j != k and j not in column.values() and _swings_as(modes[j], modes[k])]
         rival = max(free, key=lambda j: fit[row, j], default=None)
         if np.delete(fit[row], k).max(initial=0.0) >= CONTESTED * fit[row, k]:
             contested.append(name)
@@ -132,6 +135,11 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             continue
         named[name] = modes[k]
     return Naming(named, reasons, tuple(contested), fits)
+
+
+def _swings_as(rival: Mode, mode: Mode) -> bool:
+    """Whether a mode can be taken for the other: one without resonance for none that has it."""
+    return bool(rival.damping_ratio < NO_RESONANCE or mode.damping_ratio >= NO_RESONANCE)
 
 
 def _assigned(fit: np.ndarray) -> dict[int, int]:

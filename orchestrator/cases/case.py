@@ -108,9 +108,10 @@ class Case(CaseDefinition):
         parameters: Sequence[ParameterFile],
         name: str,
         plain: bool,
+        further: Mapping[str, Value] | None = None,
     ) -> PreparedScenario | None:
         if not plain:
-            return self.prepare([name], overrides, step_size, None, parameters)[0]
+            return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, None, parameters)[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
     @cached_property

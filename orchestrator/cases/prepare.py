@@ -101,7 +101,7 @@ class PreparedScenario:
     told: frozenset[str] = frozenset()
     network: Network | None = None
     source_slack: str | None = None
-    beside: "Callable[[str, bool], PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
+    beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""

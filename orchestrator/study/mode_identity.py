@@ -19,6 +19,9 @@ from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import CosimError
 from orchestrator.fmi.instance import is_isolated
 
+DAMPING_CONTROLLERS = ("pod_p", "pod_q")
+"""Parts of converters that act by a gain ``K`` and have no effect at rest."""
+
 _STAYS = 1e-6
 """A state that changes by less than this part of max(1, |value|) stays where it is."""
 
@@ -144,15 +147,39 @@ class _Others:
         """Earlier scenarios with the names that they have got. Of all others only those count that are clear by shape,
         and they are worth their time only where no mode would get the name.
         """
-        wanted = [(name, False) for name in self._earlier]
-        if far:
-            wanted += [*((name, False) for name in self._later[:1]), (self._system.prepared.name, True)]
-            wanted += [(name, True) for name in self._earlier[:1]]
+        yield from self._computed_of([(name, False) for name in self._earlier])
+        if not far:
+            return
+        if (undamped := self._undamped()) is not None:
+            yield "without its damping controllers", undamped
+        plain = [(name, True) for name in (self._system.prepared.name, *self._earlier[:1])]
+        yield from self._computed_of([*((name, False) for name in self._later[:1]), *plain])
+
+    def _computed_of(self, wanted: Sequence[tuple[str, bool]]) -> Iterator[tuple[str, NamedSystem]]:
         for name, plain in wanted:
             if (name, plain) not in self._kept:
                 self._kept[name, plain] = self._other(name, plain=plain)
             if (found := self._kept[name, plain]) is not None:
                 yield f"in {name!r}" + (" with the values of its file" if plain else ""), found
+
+    def _undamped(self) -> NamedSystem | None:
+        """The scenario itself with the gains of all damping controllers at 0, where any is on."""
+        prepared = self._system.prepared
+        gains = {
+            f"{component}.{controller}.K": 0.0
+            for component, plan in prepared.system.components.items()
+            for controller in DAMPING_CONTROLLERS
+            if {f"{controller}.K", f"{controller}.enabled"} <= plan.description.variables.keys()
+            and plan.value(f"{controller}.K")
+            and plan.value(f"{controller}.enabled")
+        }
+        if not gains or prepared.beside is None:
+            return None
+        try:
+            other = prepared.beside(prepared.name, False, gains)
+            return None if other is None or not _runs_beside(other) else self._computed(other)
+        except CosimError:  # a gain of 0 need not be allowed
+            return None
 
     def _other(self, name: str, *, plain: bool) -> NamedSystem | None:
         if not plain and name in self._known:

@@ -13,6 +13,7 @@ from orchestrator.analysis.modes import Mode, find_modes, make_mode
 from orchestrator.api.results import Modes
 from orchestrator.cases.case import load_case
 from orchestrator.cases.schema import ScenarioTable
+from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError
 from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.mode_identity import NamedSystem, settled
@@ -38,7 +39,9 @@ def scenario(name, A, *, modes=None, names=STATES, flow=None, states=None, other
     found = find_modes(model, 0.1, 5.0) if modes is None else modes
     table = SimpleNamespace(scenarios={"off": ScenarioTable(), "on": ScenarioTable()})
     schedule = SimpleNamespace(name="gauss-seidel")
-    prepared = SimpleNamespace(name=name, case=table, power_flow=flow, schedule=schedule, beside=others)
+    prepared = SimpleNamespace(
+        system=System(), name=name, case=table, power_flow=flow, schedule=schedule, beside=others
+    )
     point = SimpleNamespace(states=states or dict.fromkeys(names, 0.0))
     return NamedSystem(prepared, point, model, found, name_modes(found, measures))
 

@@ -204,8 +204,8 @@ def test_outputs_and_derivatives_depend_on_what_they_list_and_on_nothing_else(na
 
 def test_no_two_fmus_bundle_modules_of_the_same_name(fmu_path):
     own = [{n for n in member_names(fmu_path(name)) if re.fullmatch(r"resources/[^/]+\.py", n)} for name in NAMES]
-    assert all(len(modules) == 2 for modules in own)
-    assert len(set.union(*own)) == 2 * len(NAMES)
+    assert all(len(modules) == 3 for modules in own)
+    assert len(set.union(*own)) == 3 * len(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
