@@ -357,8 +357,11 @@ def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, start
     words = ["federate", str(ready.case.path), "--component", "load", "--broker", f"tcp://127.0.0.1:{port}"]
     late = "import time, sys; time.sleep(3); from orchestrator.cli import main; sys.exit(main(sys.argv[1:]))"
     with subprocess.Popen([sys.executable, "-c", late, *words], stdout=subprocess.PIPE) as process:
-        result = run_scenario(ready, federates=Federates(external=("load",), port=port))
-        assert process.wait(30) == 0
+        try:
+            result = run_scenario(ready, federates=Federates(external=("load",), port=port))
+            assert process.wait(60) == 0
+        finally:
+            process.kill()  # else a failure would wait for it for ever
         assert process.stdout is not None
         assert b"federate 'load' at tcp://127.0.0.1" in process.stdout.read()
     assert result.failure is None
