@@ -208,7 +208,7 @@ def test_values_may_be_numpys_and_have_units():
             lambda: face.load("infinite_bus").scenario("dip").modes(critical=0.2),
             "is read in percent, at least 1; write 20",
         ),
-        (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 0.2), "begin above 0 Hz"),
+        (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 20), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0), "workers = 0; it must be"),
         (

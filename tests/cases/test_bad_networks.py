@@ -432,7 +432,7 @@ BAD = [
         CASE,
         '"load_change"',
         '"load_chnge"',
-        "line 26, events.0: type 'load_chnge' is unknown; choose from 'load_change', 'load_trip', 'load_recon",
+        "line 26, events.0: type 'load_chnge' is unknown; did you mean load_change or ",
         id="kind of event",
     ),
 ]

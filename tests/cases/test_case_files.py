@@ -240,7 +240,11 @@ EVENT = '[[events]]\ntype = "parameter_change"\ntime = 0.01\ncomponent = "k"\npa
         ('"K"', '"Q"', "line 17, events.0: component 'k' has no variable 'Q' for this event to set"),
         ('"K"', '"y"', "line 17, events.0: k.y is "),
         ("value = 2", "value = 200", "line 17, events.0: K = 200; it must be at most 100"),
-        ('"parameter_change"', '"explosion"', "line 17, events.0: type 'explosion' is unknown; choose from"),
+        (
+            '"parameter_change"',
+            '"explosion"',
+            "line 17, events.0: type 'explosion' is unknown; did you mean line_reclosing? choose from",
+        ),
         ("value = 2\n", "", "line 17, events.0.value: this key is missing; add it"),
     ],
 )

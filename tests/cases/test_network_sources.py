@@ -133,7 +133,9 @@ def test_a_matpower_file_has_the_voltages_of_the_same_network_in_pandapower(tmp_
     compare(solved(data), reference(as_pandapower()))
     tables = {"version": "2", "baseMVA": 200.0} | {n: matrix(n) for n in ("bus", "gen", "branch")}
     savemat(tmp_path / "small.mat", {"mpc": tables})
-    assert network_data(NetworkTable(matpower="small.mat"), tmp_path) == data
+    again = network_data(NetworkTable(matpower="small.mat"), tmp_path)
+    assert [change.text for change in again.changes] == [change.text for change in data.changes]
+    assert replace(again, changes=data.changes) == data
 
 
 def matrix(name):

@@ -283,7 +283,7 @@ def test_a_question_is_put_once_on_the_terminal_and_stands_in_the_json(gfor, tmp
     assert code == 0
     assert err.count("machine.H = 6500") == 1
     assert err.startswith(f"question: line {H_LINE}, ")
-    assert out.count("machine.H = 6500") == 2  # one for each scenario
+    assert out.count("machine.H = 6500") == 3  # among all questions, and with each scenario
 
 
 # -- what is refused ---------------------------------------------------------------------------------

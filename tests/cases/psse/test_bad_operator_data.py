@@ -66,7 +66,12 @@ CASES = {
     "a name of CGMES for RAW": (
         CASE.replace("stray_B", 'leave_out = ["hvdc line"]\nstray_B'), r"leave_out: 'hvdc line' is unknown; choose"),
     "text for a truth value": (
-        CASE.replace("stray_B", 'keep_load_parts = "yes"\nstray_B'), r"line 6, network.keep_load_parts: .*'yes'"),
+        CASE.replace(
+            "stray_B",
+            'keep_load_parts = "yes"\nload_model = { active = "impedance", reactive = "impedance" }\nstray_B',
+        ),
+        r"line 6, network.keep_load_parts: .*'yes'",
+    ),
 }  # fmt: skip
 ALL = (
     {name: (text, DYR, CASE, words) for name, (text, words) in RAWS.items()}
