@@ -261,6 +261,7 @@ model = "grid"
 [network]
 pandapower = "case39"
 stray_B = 0.05
+load_model = { active = "impedance", reactive = "impedance" }
 [units]
 file = "units.csv"
 generator = "synchronous_generator_ac4a"
@@ -272,7 +273,7 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     (prepared,) = load_case(tmp_path / "case.toml").prepare()
     common, own = sorted(map(str, prepared.questions), key=lambda text: "machine.H" in text)
-    assert re.match(r"line 14, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
+    assert re.match(r"line 15, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
     assert re.match(r".*units.csv, line 5, sg33.machine.H: sg33: machine.H = 6500 s", own)
 
 

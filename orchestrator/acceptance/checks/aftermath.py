@@ -40,8 +40,8 @@ _STILL, _ELSEWHERE, _NOTHING = 1e-4, 0.01, 0.01
 _LATCHED = 0.9
 """Part of the current limit, or of the rating, from which a device at rest may be held by its limit."""
 
-_LEAST = 4.0
-"""Bytes kept by each step of a dip that count as a leak."""
+_LEAST = 32.0
+"""Bytes kept by each step of a dip that count as a leak; over some hundred steps one new page of the heap is up to 12."""
 
 _BLOCKS = 5
 """Parts of a disturbance, between which the memory is read."""
