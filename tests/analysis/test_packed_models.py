@@ -186,7 +186,7 @@ def test_the_honest_model_is_used_and_said_to_be_packed(system_with, folder, cap
     result = compute_modes(prepared)
     others = dict.fromkeys(("sg1", "sg2", "grid"), "perturbed")
     assert result.linearised == {"gfor": "packed", **others}
-    assert result.electromechanical.damping_percent == pytest.approx(23.91, abs=0.01)
+    assert min(abs(mode.damping_percent - 23.91) for mode in result.modes) < 0.01
     assert main(["modes", str(system_with())]) == 0
     assert "Linear models: gfor from the model packed in its FMU, which was compared" in capsys.readouterr().out
     assert main(["modes", str(system_with()), "--json"]) == 0

@@ -91,10 +91,10 @@ class Latency:
         return compose(self.blocks, self.master.schedule)
 
     def damping(self, delay: float) -> dict[str, complex]:
-        """The case's named modes [rad/s]."""
+        """The modes that fit the case's names best [rad/s], also where another one fits about as well."""
         model = self.model(delay)
         modes = [mode for mode in find_spectrum(model, *_EM_HZ).modes if mode.is_oscillation]
-        return {name: mode.eigenvalue for name, mode in named_modes(self.case, model, modes).named.items()}
+        return {name: mode.eigenvalue for name, (mode, _) in named_modes(self.case, model, modes).fits.items()}
 
     def mode(self, delay: float) -> complex:
         """The first of them."""

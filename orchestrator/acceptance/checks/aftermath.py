@@ -41,7 +41,7 @@ _LATCHED = 0.9
 """Part of the current limit, or of the rating, from which a device at rest may be held by its limit."""
 
 _LEAST = 32.0
-"""Bytes kept by each step of a dip that count as a leak; over some hundred steps one new page of the heap is up to 12."""
+"""Bytes kept by each step of a dip that count as a leak; a new page of the heap is up to 12 in some hundred steps."""
 
 _BLOCKS = 5
 """Parts of a disturbance, between which the memory is read."""
