@@ -263,7 +263,8 @@ def test_a_mode_that_is_pushed_down_is_harm(planned, store):
     assert all(not one.worth(strong).allowed for one, grows in zip(rated, harmed, strict=True) if grows)
 
 
-def test_a_mode_that_is_named_counts_alone(planned, store):
+def test_a_mode_that_is_named_counts_alone(planned, points, store):
+    points.write_text(LINES.replace("long,0.5", "long,0.7"))
     plan = planned("pod_p", modes=("electromechanical",))
     found = modes_at(plan, plan.off, plan.candidates, Serial(), store)
     for one in found:
