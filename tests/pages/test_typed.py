@@ -2,6 +2,7 @@
 
 Guides that `test_guides.py` follows, and notebooks, are executed there. What needs others' data, another machine or
 tool, or many minutes is named in ``typed.toml`` with its reason, or has there a shorter form of the same command.
+`.ci/package` runs them with the wheel's ``gfor``, whose folder GFOR_SCRIPTS names.
 """
 
 import os
@@ -58,10 +59,12 @@ def examples() -> list[str]:
 PAGES = every_page()
 
 
+@pytest.mark.wheel
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_each_command_of_a_page_works_as_it_is_typed(page, tmp_path):
-    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    scripts = os.environ.get("GFOR_SCRIPTS") or sysconfig.get_path("scripts")
+    path = os.pathsep.join([scripts, os.environ["PATH"]])
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTEST_CURRENT_TEST")}
     environment |= {"PATH": path, "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"}
     for name, text in page.files:
