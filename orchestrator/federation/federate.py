@@ -53,6 +53,7 @@ class OwnFederate:
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
         self.name, self._description, self._broker, self._to_join = name, description, broker, to_join
         self._lock, self._configured = threading.Lock(), threading.Event()
+        self._ended = False
         self._setting: dict[str, Any] = {}
         self._component: Component | None = None
 
@@ -122,7 +123,7 @@ class OwnFederate:
         while True:
             wanted = index * period + offset
             granted = helics.helicsFederateRequestTime(self._federate, wanted * 1e-9)
-            if round(granted * 1e9) != wanted:
+            if self._ended or round(granted * 1e9) != wanted:
                 return  # gfor has left
             written.values[:] = [helics.helicsInputGetDouble(handle) for handle in handles]
             try:
@@ -172,6 +173,10 @@ class OwnFederate:
     def do_begin(self) -> None:
         """Ask for the first time."""
         self._configured.set()
+
+    def do_end(self) -> None:
+        """Leave at the next time that is granted."""
+        self._ended = True
 
     def do_replay(self, calls: list[list[Any]]) -> None:
         """Make the calls that were made to the same FMU elsewhere."""

@@ -29,6 +29,7 @@ from orchestrator.federation.helics_calls import (
     text_of,
 )
 
+_END = json.dumps({"number": 0, "command": "end", "arguments": []})
 _LOOK = 0.02
 """Between two looks at who has joined [s]."""
 
@@ -52,6 +53,7 @@ class Hub:
         self._federate: Any = None
         self._broker: Any = None
         self._now = 0
+        self._ours: list[str] = []
         self.ended = False
 
     def serve(self) -> None:
@@ -132,6 +134,7 @@ class Hub:
         self._wait_for("all federates to enter the initialisation", self._request["to_join"])
         helics.helicsFederateEnterInitializingMode(self._federate)
         joined = {part["name"]: self._published(part) for part in self._parts}
+        self._ours = [name for name, found in joined.items() if found["ours"]]
         self._refuse_unknown_names()
         for handle, value in self._start:
             helics.helicsPublicationPublishDouble(handle, value)
@@ -294,6 +297,8 @@ class Hub:
 
     def _leave(self, helics: ModuleType, reason: str) -> None:
         with suppress(helics.HelicsException):
+            for name in () if reason else self._ours:  # a broker that ends before they leave may not reach them
+                helics.helicsFederateSendCommand(self._federate, name, _END)
             if self._federate is not None and reason:
                 helics.helicsFederateGlobalError(self._federate, 1, reason)
                 time.sleep(0.1)
