@@ -78,6 +78,8 @@ class PreparedScenario:
     beside
         Prepares another scenario of the case with the same values, or with those of its file alone where that is asked
         for; None where nothing but the file gave values.
+    given
+        What the scenario, parameter files and the command line give, as it is written; a later source goes first.
     """
 
     case: CaseDefinition
@@ -102,6 +104,7 @@ class PreparedScenario:
     network: Network | None = None
     source_slack: str | None = None
     beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
+    given: Mapping[str, Value] = field(default_factory=dict, repr=False)
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""
@@ -209,6 +212,7 @@ class Preparer:
             told=told,
             network=draft.network,
             source_slack=draft.data.slack if draft.data else None,
+            given={key: value for layer in draft.layers for key, value in layer.given.items()},
         )
 
     def _add_component(self, name: str, table: ComponentTable) -> None:

@@ -5,8 +5,7 @@ leaves the running system where it stands is changed in its running FMU, and thi
 any other one the case is started anew, from the power flow on, as `gfor modes --set` starts it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +27,7 @@ from orchestrator.fmi.component import RealBatch
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
 from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
-from orchestrator.study.modes import ModesResult, modes_from, running
+from orchestrator.study.modes import ModesResult, changed, modes_from, running
 
 CRITICAL = "critical"
 """Stands for the least damped mode of the range."""
@@ -241,20 +240,6 @@ def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
 # -- in the running system ---------------------------------------------------------------------------
 
 
-@contextmanager
-def _changed(master: Master, parameter: Parameter, value: float) -> Iterator[None]:
-    """Inside, a running FMU has another value of a parameter; it is put back with its state."""
-    component = master.components[parameter.component]
-    saved = component.save_state()
-    try:
-        component.set({parameter.variable: value})
-        yield
-    finally:
-        component.restore_state(saved)
-        component.free_state(saved)
-        component.set({parameter.variable: parameter.value})
-
-
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
     of it a period [communication steps] later where sampled controllers make the steps differ.
@@ -267,7 +252,7 @@ def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     before = answer()
     for value in (parameter.value + sign * change for sign in (1, -1) if parameter.allows(sign * change)):
         try:
-            with _changed(master, parameter, value):
+            with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
                 after = answer()
         except CosimError:  # it will not have the value while it runs; perhaps at a start
             return False
@@ -308,7 +293,7 @@ def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter)
     """Shifts by linearising the parameter's own component again."""
 
     def shift(value: float) -> Shift:
-        with _changed(master, parameter, value):
+        with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
             return at.shift(blocks.with_component(master, parameter.component), master)
 
     return shift

@@ -4,7 +4,7 @@ Everything here can be sent to another process or another machine.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
@@ -166,6 +166,7 @@ def compute_point(task: SweepPointTask) -> PointRecord:
     with alone():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
+            prepared = replace(prepared, beside=None)  # a sweep follows modes from point to point itself
             return _record(compute_modes(prepared, task.frequency_range))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
             return PointRecord(failure=Failure.of(error))
