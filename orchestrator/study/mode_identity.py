@@ -275,16 +275,11 @@ class _Others:
     def _differs_in_foreign(self) -> bool:
         """Whether a value of somebody else's FMU is another than in the scenario before, or in the case's file."""
         b = self._system.prepared
-        plans = b.system.components
-        if all(is_ours(plan.description.path) for plan in plans.values()):
-            return False
-        places = [(name, False) for name in self._earlier[:1]] or [(b.name, True)]
-        for key in places:
-            a = self._beside(*key)
-            values = None if a is None else _differing(a, b)
-            if values and any(not is_ours(plans[k.partition(".")[0]].description.path) for k in values):
-                return True
-        return False
+        paths = {name: plan.description.path for name, plan in b.system.components.items()}
+        foreign = {path for path in set(paths.values()) if not is_ours(path)}
+        a = self._beside(*((self._earlier[0], False) if self._earlier else (b.name, True))) if foreign else None
+        values = {} if a is None else _differing(a, b) or {}
+        return any(paths[name.partition(".")[0]] in foreign for name in values)
 
     def _systems(self, *, contested: bool, tied: bool, far: bool) -> Iterator[tuple[str, NamedSystem, bool]]:
         """Earlier scenarios with the names that they have got; of all others those names that are clear by shape.

@@ -134,10 +134,6 @@ def compute_modes(
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    frequency_range
-        [Hz]
     critical
         Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
         knows too little to give modes their names.
@@ -149,17 +145,7 @@ def compute_modes(
 
 
 def running(prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1) -> Master:
-    """The scenario's FMUs, initialised; those of a federation still in this process.
-
-    Parameters
-    ----------
-    prepared
-        The scenario.
-    federation
-        The federates that take part.
-    threads
-        As `orchestrator.coupling.master.Master`.
-    """
+    """The scenario's FMUs, initialised; those of a federation still in this process."""
     opener = open_plan if federation is None else federation.open
     try:
         return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener, threads)
@@ -175,21 +161,7 @@ def modes_of(
     *,
     directional: bool = False,
 ) -> ModesResult:
-    """Steady state and modes of a running system; see `compute_modes`.
-
-    Parameters
-    ----------
-    prepared
-        The scenario that runs.
-    master
-        Its FMUs, initialised; afterwards they stand at the operating point.
-    frequency_range
-        Modes of these frequencies are shown [Hz].
-    critical
-        Damping ratio below which a sparse search looks for modes; None computes the whole spectrum.
-    directional
-        Linearise with the FMUs' own directional derivatives.
-    """
+    """`compute_modes` of a running system, whose FMUs stand at the operating point afterwards."""
     return _computed(linearised(prepared, master, frequency_range, critical, directional=directional))
 
 
@@ -201,13 +173,7 @@ def linearised(
     *,
     directional: bool = False,
 ) -> "Linearised":
-    """A running system at its operating point, before its eigenvalues are computed.
-
-    Parameters
-    ----------
-    prepared, master, frequency_range, critical, directional
-        As `modes_of`.
-    """
+    """The same before its eigenvalues are computed."""
     said = start_warnings(master)
     point = find_operating_point(master)
     said += settled_warnings(master)
@@ -224,22 +190,8 @@ def modes_from(
     critical: float | None = None,
     black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
 ) -> ModesResult:
-    """The modes of components that were linearised at an operating point.
-
-    Parameters
-    ----------
-    prepared, master
-        The scenario, and its FMUs at the operating point.
-    point
-        The operating point.
-    blocks
-        The linearised components.
-    frequency_range, critical
-        As for `modes_of`.
-    black_boxes
-        As `identified`.
-    """
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, black_boxes=black_boxes))
+    """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
+    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, (), black_boxes))
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -250,17 +202,7 @@ def _computed(system: "Linearised") -> ModesResult:
 
 
 class Linearised:
-    """A linearised scenario, whose eigenvalues other threads compute meanwhile.
-
-    Parameters
-    ----------
-    prepared, master, point, blocks, frequency_range, critical
-        As `modes_from`.
-    said
-        Warnings that come before those of the modes.
-    black_boxes
-        As `identified`.
-    """
+    """A linearised scenario, whose eigenvalues other threads compute meanwhile; ``said`` are earlier warnings."""
 
     def __init__(
         self,
@@ -280,13 +222,7 @@ class Linearised:
         self.named: NamedSystem | None = None
 
     def begin(self, pool: Executor) -> None:
-        """Submit the eigenvalues.
-
-        Parameters
-        ----------
-        pool
-            As `side_by_side` gives it.
-        """
+        """Submit the eigenvalues."""
         if self._system is not None and len(self._model.names) <= ALL_VECTORS:
             # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
             # its way, in NumPy's `eigvals`, before that begins.
@@ -392,12 +328,8 @@ def identified(
 
     Parameters
     ----------
-    prepared, point, model
-        The scenario, its operating point, and its linear model there.
     modes
         That can bear a name.
-    frequency_range
-        That is shown [Hz].
     known
         Other scenarios of the same case and values that have their names.
     at_gains
@@ -430,15 +362,7 @@ def identified(
 
 @contextmanager
 def changed(master: Master, values: Mapping[str, float], before: Mapping[str, float]) -> Iterator[None]:
-    """Inside, running FMUs have other values of tunable parameters; they are put back with their states.
-
-    Parameters
-    ----------
-    master
-        Of the running system.
-    values, before
-        By ``component.variable``, inside and afterwards.
-    """
+    """Inside, running FMUs have other values of tunable parameters; they are put back with their states."""
     saved = {name: master.components[name].save_state() for name in {key.partition(".")[0] for key in values}}
     try:
         for key, value in values.items():

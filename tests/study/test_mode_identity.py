@@ -191,7 +191,8 @@ def moved():
     return off, on
 
 
-def test_a_clear_shape_that_a_damping_controller_made_leaves_the_name_free():
+def test_a_clear_shape_that_a_damping_controller_made_leaves_the_name_free(monkeypatch):
+    monkeypatch.setattr(mode_identity, "is_ours", lambda _: True)
     off, on = moved()
     asked = []
     found = settled(with_part(on, 100.0), never, {}, undamped=lambda gains: asked.append(gains) or off)
