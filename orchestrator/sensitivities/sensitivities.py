@@ -189,10 +189,12 @@ def find_sensitivities(
     for parameter in anew:
         rows[parameter] = _row(parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional))
         report(len(rows), len(parameters))
+    unknown_name = next((text for text in found.unnamed.values() if mode is None and not found.named), None)
+    about_mode = (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
     warnings = _neighbour(found.model, chosen)
     ordered = sorted(rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name))
     doubted = (_limited(_doubted(row, warnings), acting) for row in ordered)
-    return SensitivityResult(found, chosen, tuple(doubted), held, warnings)
+    return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:
@@ -203,6 +205,8 @@ def _chosen(found: ModesResult, name: str | None) -> Mode:
         if name in found.named:
             return found.named[name]
         known = ", ".join([*found.named, CRITICAL])
+        if name in found.unnamed:
+            raise InputError(f"--mode {name}: {found.unnamed[name]}; there are: {known}")
         raise InputError(f"--mode {name}: scenario {found.prepared.name!r} has no mode of this name; it has: {known}")
     swinging = [mode for mode in found.modes if mode.is_oscillation]
     if not swinging:
