@@ -20,10 +20,12 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Numbers
+from orchestrator.cases.idle_values import why_idle
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, CaseError, CosimError, InputError
 from orchestrator.fmi.component import RealBatch
+from orchestrator.report.tables import first_few
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
 from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
@@ -190,11 +192,22 @@ def find_sensitivities(
         rows[parameter] = _row(parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional))
         report(len(rows), len(parameters))
     unknown_name = next((text for text in found.unnamed.values() if mode is None and not found.named), None)
-    about_mode = (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
+    about_mode: tuple[str, ...] = (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
+    if patterns:
+        about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
     ordered = sorted(rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name))
     doubted = (_limited(_doubted(row, warnings), acting) for row in ordered)
     return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
+
+
+def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> tuple[str, ...]:
+    """What was asked for by name and cannot act, with the reason."""
+    names: dict[str, list[str]] = {}
+    for parameter, row in rows.items():
+        why = "" if row.derivative else why_idle(prepared.system, parameter.component, parameter.variable)
+        names.setdefault(why, []).append(parameter.name)
+    return tuple(f"{first_few(found, str)} cannot act: {why}" for why, found in names.items() if why)
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:

@@ -27,14 +27,12 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.mode_names import LEFT_OVER, Naming
 from orchestrator.analysis.modes import Mode, damping_percent
 from orchestrator.analysis.steady_state import OperatingPoint
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.fmi.instance import is_isolated, is_ours
-
-DAMPING_CONTROLLERS = ("pod_p", "pod_q")
-"""Parts of converters that act by a gain ``K`` and have no effect at rest."""
 
 _STAYS = 1e-6
 """A state that changes by less than this part of max(1, |value|) stays where it is."""

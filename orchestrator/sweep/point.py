@@ -166,8 +166,10 @@ def compute_point(task: SweepPointTask) -> PointRecord:
     with alone():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
-            prepared = replace(prepared, beside=None)  # a sweep follows modes from point to point itself
-            return _record(compute_modes(prepared, task.frequency_range))
+            asked = tuple(question for question in prepared.questions if question not in prepared.idle.values())
+            # A sweep follows modes from point to point itself, and asks of all scenarios together.
+            alone_here = replace(prepared, beside=None, questions=asked)
+            return _record(compute_modes(alone_here, task.frequency_range))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
             return PointRecord(failure=Failure.of(error))
 
