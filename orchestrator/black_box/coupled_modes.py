@@ -145,14 +145,20 @@ def modes_with_boxes(
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)
     require_fitting()
-    residual = _check_still(master, boxes)
-    known = {}
-    for name in boxes:
-        response, moved = _respond(master, name, excitation or Excitation(), report=report)
-        known[name] = _as_component(name, fit(response))
-        residual = max(residual, moved)
-    point = OperatingPoint(residual, residual / master.clock.step_size, residual, 0, {})
-    return modes_from(prepared, master, point, Blocks(master, known=known), frequency_range, critical)
+    most = 0.0
+
+    def identified(master: Master) -> dict[str, ComponentLinearization]:
+        nonlocal most
+        most, known = max(most, _check_still(master, boxes)), {}
+        for name in boxes:
+            response, moved = _respond(master, name, excitation or Excitation(), report=report)
+            known[name] = _as_component(name, fit(response))
+            most = max(most, moved)
+        return known
+
+    blocks = Blocks(master, known=identified(master))
+    point = OperatingPoint(most, most / master.clock.step_size, most, 0, {})
+    return modes_from(prepared, master, point, blocks, frequency_range, critical, identified)
 
 
 def _respond(

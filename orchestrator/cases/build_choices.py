@@ -118,6 +118,8 @@ class Layer:
         Converters' shares; the one for all units comes first, so that those for one unit override it.
     place
         Where a value is written.
+    given
+        All of them, as they are written.
     """
 
     values: Mapping[str, Value]
@@ -125,6 +127,7 @@ class Layer:
     parts: tuple[PartChoice, ...]
     shares: tuple[ShareChoice, ...]
     place: Place
+    given: Mapping[str, Value]
 
 
 def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
@@ -154,4 +157,4 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
         else:
             values[key] = value
     shares.sort(key=lambda choice: choice.label != "")
-    return Layer(values, tuple(natives), tuple(parts), tuple(shares), place)
+    return Layer(values, tuple(natives), tuple(parts), tuple(shares), place, given)

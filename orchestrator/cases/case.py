@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.contradictions import contradictions
 from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.names import close_names
@@ -99,7 +100,9 @@ class Case(CaseDefinition):
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         beside = partial(self._beside, overrides, step_size, parameters)
-        return [replace(p, beside=beside) for p in prepared if p is not None]
+        ready = [p for p in prepared if p is not None]
+        idle = idle_everywhere([p.idle for p in ready])
+        return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
 
     def _beside(
         self,

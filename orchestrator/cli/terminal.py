@@ -31,7 +31,7 @@ def make_errors() -> Console:
 def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
     reference = results[0].prepared.case.table.reference
-    if any(r.electromechanical for r in results):
+    if any(r.named or r.unnamed for r in results):
         title = reference.title if reference else None
         console.print(tables.named_modes(results, title))
         if reference and any(r.references for r in results):

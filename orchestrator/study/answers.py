@@ -74,7 +74,18 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
         because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
         remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
         remark += f"; {swing}" if swing and not where else ""
-    return ScenarioAnswer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short(remark))
+    told = [remark] if remark else []
+    told += [
+        f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %" for name, m in _named_elsewhere(result, mode)
+    ]
+    told += [f"which mode is {name!r} is not known" for name in result.unnamed]
+    return ScenarioAnswer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short("; ".join(told)))
+
+
+def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:
+    """The only mode that the case looks for, where another one is damped less."""
+    looked_for = list(result.named.items()) if len(result.prepared.case.table.analysis.modes) == 1 else []
+    return [(name, mode) for name, mode in looked_for if mode is not least]
 
 
 def of_run(result: RunResult) -> ScenarioAnswer:
