@@ -47,7 +47,7 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("", "cannot be read as CSV"),
     ):
         path.write_text(text)
-        with pytest.raises(InputError, match="ring.csv: ") as caught:
+        with pytest.raises(InputError, match=r"ring\.csv: ") as caught:
             read_csv(path)
         assert words in str(caught.value)
     (tmp_path / "ring.txt").write_text("no recording")

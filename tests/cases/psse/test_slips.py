@@ -52,14 +52,14 @@ DYRS = [
 CASES = [
     ('[units]', '[units]\nalpha = 30', "alpha: it must be less than or equal to 1 (value seen: 30); it is a part"),
     ('name = "wscc"', 'name = "wscc"\n[solver]\nstep_size = 5', "must be less than or equal to 0.1 s (value seen: 5"),
-    ("stray_B", "frequency = 50\nstray_B", "grid.raw, line 1: BASFRQ is 60 Hz, and the case's frequency = 50 Hz counts"),
+    ("stray_B", "frequency = 50\nstray_B", "line 1: BASFRQ is 60 Hz, and the case's frequency = 50 Hz counts"),
     ("[power_flow]", "[powerflow]", "powerflow: this key is unknown; did you mean power_flow?"),
     ('grid = "grid"', 'grid = "grid"\nslack = 3', ""),
     ('grid = "grid"', 'grid = "grid"\nslack = 7', "'7' is neither a unit of this scenario nor a bus with one"),
     ("[scenarios.plain]", f"[scenarios.plain]\n{LATE}", "scenario 'late', which was not asked for: the event at 60 s"),
-    ("[scenarios.plain]", f"[scenarios.plain]\n{UNKNOWN}", "scenario 'other', which was not asked for: component 'grid'"),
+    ("[scenarios.plain]", f"[scenarios.plain]\n{UNKNOWN}", "'other', which was not asked for: component 'grid'"),
     ("[scenarios.plain]", f"[scenarios.plain]\n{FAULT}", "has no bus '7'; did you mean bus_7?"),
-    ("stray_B", 'load_model = { active = "constant" }\nstray_B', "active: it must be 'impedance', 'current' or 'power'"),
+    ("stray_B", 'load_model = { active = "constant" }\nstray_B', "it must be 'impedance', 'current' or 'power'"),
 ]  # fmt: skip
 
 
