@@ -260,7 +260,7 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
                 if not (known and detail["type"] == "missing"):  # missing because it was wrong and removed
                     problem = Problem(place_in(text, location), _schema_message(detail, location))
                     problems += [] if problem in problems else [problem]
-                removed |= _take_out(raw, location, detail["type"])
+                removed |= _take_out(raw, _location(raw, detail["loc"]), detail["type"])  # others may be gone
             if not removed:
                 break
     raise CaseError(str(path), problems)
@@ -322,10 +322,11 @@ def _tables(of: type[Table]) -> set[type[Table]]:
 
 
 def _schema_message(detail: Any, location: Sequence[str | int]) -> str:
+    key = str(location[-1]) if location else ""
     match detail["type"]:
         case "extra_forbidden":
-            known = {key for table in _tables(Table) for key in table.model_fields}
-            near = difflib.get_close_matches(str(location[-1]), sorted(known), 1, 0.75)
+            known = {name for table in _tables(Table) for name in table.model_fields}
+            near = [] if key in known else difflib.get_close_matches(key, sorted(known), 1, 0.75)
             return f"this key is unknown; did you mean {near[0]}?" if near else fault_of(detail)
         case "missing":
             return fault_of(detail)
@@ -337,8 +338,8 @@ def _schema_message(detail: Any, location: Sequence[str | int]) -> str:
             return "the key 'type' is missing; it says what kind of event this is"
         case _:
             seen = detail.get("input")
-            in_seconds = location[-1] in _TIMES and isinstance(seen, int | float)
+            in_seconds = key in _TIMES and type(seen) in (int, float)
             shown = f" (value seen: {seen!r}{' s' if in_seconds else ''})" if not isinstance(seen, dict | list) else ""
             said = fault_of(detail) + (" s" if in_seconds else "") + shown
-            remedy = (_TIMES | _SHARES).get(str(location[-1]), "")
+            remedy = (_TIMES | _SHARES).get(key, "")
             return f"{said}; {remedy}" if remedy else said
