@@ -59,5 +59,11 @@ def fault_of(detail: Any) -> str:
             return "this key is unknown; check its spelling, or remove it"
         case "missing":
             return "this key is missing; add it"
+        case "string_type":
+            return "it must be a text; write it in quotes"
+        case "dict_type" | "model_type" | "model_attributes_type":
+            return "it must be a table: keys with values, in braces or below a heading of their own"
+        case "list_type" | "tuple_type":
+            return "it must be a list; write it in square brackets"
         case _:
-            return str(detail["msg"]).removeprefix("Value error, ")
+            return str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "it must be")

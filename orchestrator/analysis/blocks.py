@@ -1,6 +1,7 @@
 """Linearised components of a running system, with what connects them."""
 
 import copy
+import difflib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -278,7 +279,10 @@ def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
     for full in names:
         component, _, variable = full.partition(".")
         if component not in found or variable not in master.components[component].description.variables:
-            raise InputError(f"linear model: there is no variable {full!r}; `gfor info` lists the variables of an FMU")
+            known = [f"{name}.{own}" for name, one in master.components.items() for own in one.description.variables]
+            near = difflib.get_close_matches(full, known, 3)
+            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor info` lists the variables of an FMU"
+            raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found
 

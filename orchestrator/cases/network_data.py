@@ -158,13 +158,17 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
             f"{raw.tables.name}: BASFRQ, the sixth value of the first record, is missing or 0, so the frequency is not "
             'known; write it in [network]: frequency = "50 Hz" or frequency = "60 Hz"'
         )
+    own, changes = raw.tables.frequency, list(raw.changes)
+    if table.frequency is not None and own is not None and own != table.frequency:
+        text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
+        changes.append(Problem(f"{raw.tables.name}, line 1", text))
     imported = import_network(raw.tables)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), raw.changes, raw.machines, raw.idle, raw.solved)
+    return _Source(replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, raw.solved)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:

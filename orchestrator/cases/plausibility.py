@@ -139,7 +139,7 @@ def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> Non
     if larger is None or smaller is None or rule.holds(larger, smaller):
         return
     texts = [
-        f"{v} = {x:g} {unit_of(plan, v)}{'' if v in plan.parameters else ' (the default)'}"
+        f"{v} = {x:g}{f' {unit_of(plan, v)}'.removesuffix(' 1')}{'' if v in plan.parameters else ' (the default)'}"
         for v, x in ((rule.larger, larger), (rule.smaller, smaller))
     ]
     draft.note(place_of(draft, name, rule.smaller, rule.larger), rule.text(*texts))

@@ -39,15 +39,18 @@ Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int
 FileName = Annotated[str, AfterValidator(file_name)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
+LONGEST_STEP = 0.1
+"""Between two communication points [s]."""
+
 
 class SolverTable(Table):
     """Communication step, schedule and recording."""
 
-    step_size: Seconds = Field(default=1e-4, gt=0, le=0.1)
+    step_size: Seconds = Field(default=1e-4, gt=0, le=LONGEST_STEP)
     stop_time: Seconds = Field(default=20.0, gt=0)
     record_interval: Seconds = Field(default=0.005, gt=0)
     schedule: ScheduleName = "gauss-seidel"
-    micro_step: Seconds | None = Field(default=None, gt=0, le=0.1)
+    micro_step: Seconds | None = Field(default=None, gt=0, le=LONGEST_STEP)
     tolerance: Number | None = Field(default=None, ge=TOLERANCES[0], le=TOLERANCES[1])
     groups: list[list[str]] | None = None
     record: list[str] = ["*"]
@@ -86,7 +89,7 @@ class PowerFlowTable(Table):
     """
 
     grid: str
-    slack: str | None = None
+    slack: Bus | None = None
     reactive_limits: Annotated[bool | None, Field(strict=True)] = None
     sharing: Literal["droop", "rating", "slack"] = "droop"
 

@@ -31,14 +31,16 @@ class UnitRow:
         Parts of the generator that the row itself chooses.
     partial
         Whether a record of it was left out, for which the case says what stands there.
-    q_min_mvar, q_max_mvar
-        Limits of reactive power [Mvar]; infinite without.
+    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
+        Limits of reactive and of active power; infinite without.
     converter
         Model of the converter that the whole unit is by its record.
     doubts
         Questions about the generator's data: parameter, place and text.
     replaced
         Lines of records for which the converter's model stands, each with what it leaves out.
+    lines
+        Lines of the records that give parameters, by parameter.
     """
 
     label: str
@@ -56,6 +58,9 @@ class UnitRow:
     converter: str | None = None
     doubts: tuple[tuple[str, str, str], ...] = ()
     replaced: tuple[tuple[int, str], ...] = ()
+    lines: Mapping[str, int] = field(default_factory=dict)
+    p_min_mw: float = -math.inf
+    p_max_mw: float = math.inf
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "exponentials. '?' marks a mode in doubt, with the reasons below the table."
     )
     parser.add_argument("run", type=Path, metavar="RUN",
-                        help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
+                        help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
     parser.add_argument(
         "--start", type=seconds_or_none, default=2.0, metavar="T", help="beginning of the free response [s] (2)"

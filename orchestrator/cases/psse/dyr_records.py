@@ -33,13 +33,7 @@ class DynamicRecord:
 
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
-    """Records of a DYR file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is too large, or a record is not of that form.
-    """
+    """Records of a DYR file."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
     if (size := path.stat().st_size) > MOST_BYTES:

@@ -50,13 +50,7 @@ class Record:
         return (self.fields[index] if index < len(self.fields) else "") or default
 
     def number(self, index: int, name: str, default: float | None = None) -> float:
-        """A field as a number.
-
-        Raises
-        ------
-        InputError
-            If it is none, or is left out and has no default.
-        """
+        """A field as a number."""
         text = self.text(index)
         if not text and default is not None:
             return default
@@ -69,13 +63,7 @@ class Record:
         return value
 
     def whole(self, index: int, name: str, default: int | None = None) -> int:
-        """A field as a whole number.
-
-        Raises
-        ------
-        InputError
-            As `number`.
-        """
+        """A field as a whole number."""
         value = self.number(index, name, default)
         if value != int(value):
             raise self.error(f"{name} is {self.text(index)!r}; it must be a whole number")

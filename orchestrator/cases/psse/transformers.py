@@ -64,11 +64,6 @@ def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transf
         The file.
     voltages
         Bus → base voltage [kV]; 0 where the file leaves it open.
-
-    Raises
-    ------
-    InputError
-        If a record is cut short, names a bus that is not there, or has a code that is not known.
     """
     lines = iter(raw.of("transformer"))
     for first in lines:

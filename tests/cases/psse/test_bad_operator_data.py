@@ -51,7 +51,7 @@ DYRS = {
         DYR.replace("2,'GENROU','1'", "2,'GENROU','7'"), CASE,
         r"(?s)GENROU is of machine '7' at bus 2, which has '1'; .*machine '1' at bus 2 has no record of a machine"),
     "no number": (DYR.replace("9.55", "nan"), CASE, r"grid.dyr, line 2: GENROU has H = 'nan'; it must be a number"),
-    "no inertia": (DYR.replace("9.55", "0.0"), CASE, r"grid.dyr, sg1.machine.H: machine.H = 0 s; it must be at least"),
+    "no inertia": (DYR.replace("9.55", "0.0"), CASE, r"grid.dyr, line 2, sg1.machine.H: machine.H = 0 s; it must be"),
     "a phasor model among others": (MACHINES, CASE, r"bus 3 is the phasor model regfm_a1_phasor, and the generator"),
     "a time constant of zero": (
         MACHINES.replace("0.02 0.03 0.04", "0 0.03 0.04"), PHASORS, r"gfor3.TPf: TPf = 0 s; it must be at least 0.001"),
