@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -252,7 +253,7 @@ class _Reader:
             raise ValueError('[bridge]: give one of modulation = ["m_a", "m_b", "m_c"] and voltage = [...], and a unit')
         (kind,) = kinds
         names = part[kind]
-        if not isinstance(names, list) or len(names) != 3 or len({str(name) for name in names}) != 3:
+        if not isinstance(names, list) or [type(name) for name in names] != [str] * 3 or len({*names}) != 3:
             raise ValueError(f"[bridge] {kind}: three different outputs of the DLL are needed, for phases a, b and c")
         places = {place.name: place for place in layout(self._interface.outputs).places if place.type.kind != "String"}
         routes = []
@@ -316,7 +317,7 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _finite(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
         raise ValueError(f"{where} = {value!r}; it must be a finite number")
     return float(value)
 
@@ -338,7 +339,7 @@ def _sign(where: str, entry: Mapping[str, Any]) -> float:
 
 
 def _factor(where: str, kind: str, unit: str) -> float:
-    if unit not in _PARTS[kind]:
+    if not isinstance(unit, str) or unit not in _PARTS[kind]:
         known = ", ".join([*_PARTS[kind], "pu"])
         raise ValueError(
             f"{where}: the unit {unit!r} is none of a {kind}; say what it is with unit = ..., one of: {known}"

@@ -184,6 +184,8 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
     """The lines of a file, each with its place."""
     lines = []
     for row in rows_of(path, ("from", "to", "R", "X", "B")):
+        if not (row["from"] and row["to"]):
+            raise InputError(f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end")
         circuit = (row.get("circuit") or "").strip()
         if circuit and not (circuit.isascii() and circuit.isalnum()):
             raise InputError(

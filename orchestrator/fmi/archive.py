@@ -180,11 +180,11 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
 def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
     """The archive, with harmless names and sizes; whatever zipfile raises becomes one error."""
     ending = f".{kind.lower()}"
-    if path.is_dir():
-        raise FmuFileError(f"{path}: it is a folder; give the path of an {ending}")
-    if not path.is_file():
-        raise FmuFileError(f"{path}: there is no such file; give the path of an {ending}")
     try:
+        if path.is_dir():
+            raise FmuFileError(f"{path}: it is a folder; give the path of an {ending}")
+        if not path.is_file():
+            raise FmuFileError(f"{path}: there is no such file; give the path of an {ending}")
         if not zipfile.is_zipfile(path):
             raise FmuFileError(
                 f"{path}: it is not an {kind}: an {ending} is a zip archive and this file is not; export it again"
@@ -197,7 +197,7 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
             f"{path}: the archive is damaged ({told(error)}); export it again, or get the file anew"
         ) from error
     except OSError as error:
-        raise FmuFileError(f"{path}: the file cannot be unpacked: {error.strerror or error}") from error
+        raise FmuFileError(f"{path}: the file cannot be read: {error.strerror or error}") from error
 
 
 def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:

@@ -27,7 +27,10 @@ class SspArchive:
 
     def member(self, source: str) -> str:
         """Name of the member that a relative URI means."""
-        uri = urlsplit(source)
+        try:
+            uri = urlsplit(source)
+        except ValueError as error:
+            raise InputError(f"the source {source!r} is not a URI: {error}; export it again") from error
         path = unquote(uri.path)
         if uri.scheme or uri.netloc or path.startswith("/") or "\\" in path or ".." in path.split("/"):
             raise InputError(

@@ -87,7 +87,7 @@ def _value(name: str, element: Element) -> float | bool | str:
         match kind:
             case "Real":
                 return float(text)
-            case "Integer":
+            case "Integer" if len(text) <= 20:
                 return int(text)
             case "Boolean" if text in ("true", "false", "1", "0"):
                 return text in ("true", "1")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fmus.synchronous_generator.dyr_fields import DyrField
 from orchestrator.errors import InputError
+from orchestrator.units import LARGEST
 
 MOST_BYTES = 100_000_000
 """Of a file."""
@@ -85,6 +86,6 @@ def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
         value = float(text.upper().replace("D", "E"))
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) < LARGEST:
         raise InputError(f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number")
     return value

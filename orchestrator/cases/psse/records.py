@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.units import LARGEST
 
 REVISIONS = (33, 34, 35, 36)
 """Revisions whose records are known."""
@@ -58,7 +59,7 @@ class Record:
             value = float(text.replace("D", "E").replace("d", "e"))
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        if not abs(value) < LARGEST:
             raise self.error(f"{name} is {text!r}; it must be a number")
         return value
 

@@ -120,6 +120,9 @@ static void initialise(double *z, double *m) {
 #ifdef FAULT_DRIFT
     drift = FAULT_DRIFT;
 #endif
+#ifdef FAULT_SMALL_ANGLE
+    drift += sin(t) - t; /* as if the bus's angle were small */
+#endif
     const phasor e = {bus.re + R_PU * m[I_RE] - X_PU * m[I_IM], bus.im + R_PU * m[I_IM] + X_PU * m[I_RE]};
     m[DELTA] = atan2(e.im, e.re) + drift;
     m[E_0] = hypot(e.re, e.im);
