@@ -99,7 +99,11 @@ def _shows_omega(subject: Subject) -> bool:
 
 def _rated(subject: Subject) -> float:
     described = subject.description
-    return described.port.f_n if isinstance(described, BoundDescription) else 50.0
+    if isinstance(described, BoundDescription):
+        return described.port.f_n
+    own = described.variables.get("f_n")
+    known = 50.0 if own is None or own.start is None else own.start_number
+    return float(subject.use.values.get("f_n", known))
 
 
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
