@@ -70,7 +70,8 @@ class Acceptance:
 
     def _verdict(self) -> str:
         if self.trusted:
-            return "no check failed"
+            left = self.report.not_judged
+            return f"no check failed; not judged: {', and '.join(left)}" if left else "no check failed"
         if not self.report.failures:
             return f"not supported here: {', '.join(self.report.not_supported)}"
         if self.report.binding_fails:

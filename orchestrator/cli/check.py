@@ -116,7 +116,8 @@ def _print(report: AcceptanceReport) -> None:
     if lacking := missing(report.protections):
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
     if report.trusted:
-        console.print(f"{escape(report.fmu.name)}: no check failed.")
+        left = f"; not judged: {', and '.join(report.not_judged)}" if report.not_judged else ""
+        console.print(f"{escape(report.fmu.name)}: no check failed{left}.")
     elif not report.failures:
         console.print(
             f"[bold yellow]{escape(report.fmu.name)}: not supported here: {', '.join(report.not_supported)}; "
