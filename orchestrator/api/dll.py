@@ -46,7 +46,7 @@ def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[
     folder
         Where the FMU is written.
     texts
-        Value of parameters that are text, by name; they cannot be changed later. A file that one names goes into the FMU.
+        Value of parameters that are text, by name, for good. A file that one names goes into the FMU.
 
     Raises
     ------
