@@ -19,6 +19,7 @@ BEFORE_IT_STARTS = 300.0
 _OWN_DOING = 0.5
 """Processor time, as a part of the time it had, from which a DLL counts as one that never comes back."""
 
+_START = tuple(f"Model_{call} runs" for call in ("FirstCall", "CheckParameters", "Initialize"))
 _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGXCPU", "SIGSTOP"))
 """Signals by which others end a process: the system that lacks memory, a person."""
 
@@ -37,12 +38,15 @@ class Answer:
         What that means, and the remedy.
     passing
         The reason lies in this machine, so that another call may find more.
+    in_its_start
+        The DLL's own code ended it before the first sample.
     """
 
     found: dict[str, Any] = field(default_factory=dict)
     end: str = ""
     why: str = ""
     passing: bool = False
+    in_its_start: bool = False
 
 
 def note_beside(answer: Path) -> Path:
@@ -166,7 +170,7 @@ def _out_of_time(doing: str, longest: float, used: float) -> Answer:
 
 
 def _ended(doing: str, code: int) -> Answer:
-    name = f"exit code {code}"
+    name, started = f"exit code {code}", doing in _START
     with contextlib.suppress(ValueError):
         name = signal.Signals(-code).name if code < 0 else name
     end = f"ends with {name}" + (f" while {doing}" if doing else "")
@@ -179,5 +183,6 @@ def _ended(doing: str, code: int) -> Answer:
     elif doing.startswith("what"):
         why = "its structures are of another layout; ask its author for a DLL of the interface's layout"
     else:
-        why = "it crashes there or ends its own process; ask its author for a DLL that does not"
-    return Answer(end=end, why=why)
+        why = "it crashes there or ends its own process, in which no file is seen but those that its text parameters "
+        why += "name; name the one that it needs, or ask its author for a DLL that does not"
+    return Answer(end=end, why=why, in_its_start=started)

@@ -118,14 +118,6 @@ class Device:
         changed = [replace(p, start=self.circuit[p.name]) if p.name in self.circuit else p for p in made.parameters]
         return replace(made, parameters=tuple(changed))
 
-    def with_parameters(self, interface: DllInterface) -> DllInterface:
-        """The DLL's interface with these values as defaults."""
-        rows = [
-            replace(row, default=self.parameters[row.name]) if row.name in self.parameters else row
-            for row in interface.parameters
-        ]
-        return replace(interface, parameters=tuple(rows))
-
 
 def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
     """The DLL that a device's file names, and the whole table."""

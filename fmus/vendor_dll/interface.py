@@ -4,8 +4,8 @@ Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of 
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 Number = int | float
@@ -138,6 +138,11 @@ class DllInterface:
         rows = {"parameters": tuple(DllParameter(**row) for row in data["parameters"])}
         plain = {name: tuple(data[name]) for name in ("interface_version", "states", "calls")}
         return cls(**data | signals | rows | plain)
+
+    def with_defaults(self, values: Mapping[str, Number | str]) -> "DllInterface":
+        """The same with other defaults of parameters, by name."""
+        rows = tuple(replace(row, default=values.get(row.name, row.default)) for row in self.parameters)
+        return replace(self, parameters=rows)
 
     def faults(self) -> list[str]:
         """What the DLL declares that no host can run, in words; empty for a sound one."""

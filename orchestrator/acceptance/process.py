@@ -21,7 +21,7 @@ from orchestrator.fmi import answers
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
-from orchestrator.fmi.limits import TO_BEGIN, Limits
+from orchestrator.fmi.limits import TO_BEGIN, Limits, crowded
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
@@ -212,8 +212,8 @@ class FmuProcess:
                 raise self._died(call)
             if box.head.steps != steps:
                 steps, begin = box.head.steps, now
-            if now - begin > self._patience:
-                raise self._given_up(f"no answer within {self._patience:g} s in {self._where(call)}")
+            if now - begin > self._patience and now - begin > (allowed := self._patience * crowded()):
+                raise self._given_up(f"no answer within {allowed:.3g} s in {self._where(call)}")
             if now > self.deadline:
                 raise self._given_up(f"it takes too long, last in {self._where(call)}")
         if answered < 0:

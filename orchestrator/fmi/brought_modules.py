@@ -132,13 +132,16 @@ class BroughtModules:
         self._shown ^= {top}
 
 
+_known: dict[str, BroughtModules] = {}
 _living: dict[str, BroughtModules] = {}
 _loading: list[BroughtModules] = []
 
 
 def brought_by(resources: Path) -> BroughtModules:
-    """The modules of an FMU that lies in this folder; instances that share the folder share them."""
-    return _living.get(str(resources)) or BroughtModules(str(resources))
+    """The modules of an FMU that lies in this folder, for all its instances: a class made for each would never go."""
+    for place in [place for place in _known.keys() - _living.keys() if not Path(place).exists()]:
+        del _known[place]
+    return _known.setdefault(str(resources), BroughtModules(str(resources)))
 
 
 def _modules_in(place: str) -> set[str]:

@@ -1,7 +1,9 @@
 """Whether a converter answers voltage and frequency with the right signs, and rests at its frequency."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +65,7 @@ _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
+_DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
 """Of the changes of voltage and frequency."""
 
@@ -99,7 +102,11 @@ def _shows_omega(subject: Subject) -> bool:
 
 def _rated(subject: Subject) -> float:
     described = subject.description
-    return described.port.f_n if isinstance(described, BoundDescription) else 50.0
+    if isinstance(described, BoundDescription):
+        return described.port.f_n
+    own = described.variables.get("f_n")
+    known = 50.0 if own is None or own.start is None else own.start_number
+    return float(subject.use.values.get("f_n", known))
 
 
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
@@ -116,15 +123,14 @@ def signs(subject: Subject) -> CheckResult:
     places = [POINT]
     if subject.starts:
         places += [p for p in (subject.use.point, ABSORBING, CHARGING) if p is not None]
-    first: CheckResult | None = None
-    refused = []
+    seen, refused = list[CheckResult](), []
     for point in places:
         if point is CHARGING and cannot_import(subject, point):
             continue  # which 'power_balance' tells
         try:
             result = _at(subject, steps, point)
-            if point is CHARGING and first is not None and not result.fault:
-                result = _evenly(first, result)
+            if point is CHARGING and seen and not result.fault:
+                result = _evenly(_summary(seen), result)
         except ComponentError as error:
             if point is CHARGING:
                 continue
@@ -132,13 +138,20 @@ def signs(subject: Subject) -> CheckResult:
             continue
         if result.fault:
             return result
-        if first is None or (first.verdict == "pass" and result.verdict == "remark"):
-            first = result
-    if first is None:
+        seen.append(result)
+    if not seen:
         return remarked("signs", refused[0], "ask why")
+    first = _summary(seen)
     if refused:
         return remarked("signs", "; ".join([first.evidence, *refused]), "ask why", **first.figures)
     return first
+
+
+def _summary(seen: list[CheckResult]) -> CheckResult:
+    """The first remark, or the first result, with what was not judged at any point."""
+    first = next((result for result in seen if result.verdict == "remark"), seen[0])
+    unknown = any("not_judged" in result.figures for result in seen)
+    return replace(first, figures=first.figures | ({"not_judged": _DROOP_OF_Q} if unknown else {}))
 
 
 def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
@@ -158,7 +171,7 @@ def _named(point: OperatingAt) -> str:
 def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     """What small changes at one operating point say."""
     voltage, frequency = _answers(subject, steps, point)
-    figures = {
+    figures: dict[str, Any] = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
     }  # fmt: skip
@@ -170,7 +183,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if subject.starts:
         said += f", at {_named(point)}"
-    said += f"; {unknown}" if unknown else ""
+    if unknown:
+        said += f"; {unknown}"
+        figures["not_judged"] = _DROOP_OF_Q
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
@@ -184,6 +199,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     if late > _RINGS:
         says = f"its power still swings by {late:.2g} pu about its course ({said})"
         return remarked("signs", says, "ask how it is damped, and at which network impedance", **figures)
+    if lag := _lag(frequency):
+        remedy = "ask for its time constant: what is controlled or judged by omega comes so late"
+        return remarked("signs", f"{lag} ({said})", remedy, **figures)
     return passed("signs", said, **figures)
 
 
@@ -317,6 +335,15 @@ def _wrong_omega(frequency: DroopAnswer) -> tuple[str, str] | None:
     return None
 
 
+def _lag(frequency: DroopAnswer) -> str:
+    """How far an omega is behind that still moves where the power rests: where its angle rests, it has arrived."""
+    for sign, way in zip(_SIGNS, frequency.ways, strict=True):
+        network = 1 - sign * FREQUENCY
+        if way.omega is not None and way.moving < SETTLED and abs(way.omega - network) > _OMEGA_APART:
+            return f"omega is {way.omega:.6g} and still on its way to the network's {network:.6g}, and its power rests"
+    return ""
+
+
 def _wrong_droop(
     subject: Subject, steps: int, point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer
 ) -> tuple[tuple[str, str] | None, str]:
@@ -324,7 +351,7 @@ def _wrong_droop(
 
     A fault and what shows it, and why the droop of the reactive power could not be judged.
     """
-    not_judged = "the sign of its droop of reactive power was not judged: "
+    not_judged = f"{_DROOP_OF_Q} was not judged: "
     if voltage.power.imag < _MORE * voltage.early_power.imag:
         return None, ""
     if not subject.starts or not voltage.early_power.imag > 0:

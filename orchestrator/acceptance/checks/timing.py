@@ -1,11 +1,14 @@
 """Whether an FMU's answer depends on how a master steps it, and comes when it is due."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.comparing import scales
+from orchestrator.acceptance.checks.port import voltage_rows
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.acceptance.checks.subject import Running, Subject
 from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
@@ -25,6 +28,10 @@ _RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
 
 _DELAYS = 5
 """Communication steps of delay that are looked for."""
+
+
+_VOLTAGES = (1.08, 0.6)
+"""At which it is looked as well [pu]: a limit or an arrester may act there only."""
 
 
 @check("feedthrough", "Does what its outputs depend on at once agree with what it declares?", needs=("reading",))
@@ -52,25 +59,34 @@ def feedthrough(subject: Subject) -> CheckResult:
 
 
 def _observed(subject: Subject) -> dict[str, set[str]]:
-    """For each output the inputs that move it without a step, at a few points of a run."""
+    """For each output the inputs that move it without a step, at a few points of a run, and of the voltage."""
     seen: dict[str, set[str]] = {n: set() for n in subject.outputs}
     sizes, h = subject.amplitudes, subject.step_size
     with subject.running() as running:
         for count in (0, 3, 20):
             running.record(count, h, subject.steps(hold=5 * h))
-            here = np.zeros(len(sizes))
-            running.feed(here)
-            before = running.read()
-            for j, name in enumerate(subject.inputs):
-                moved = here.copy()
-                moved[j] = sizes[j]
-                running.feed(moved)
-                after = running.read()
-                for k, output in enumerate(subject.outputs):
-                    if abs(after[k] - before[k]) > 1e-10 * (abs(before[k]) + abs(sizes[j])):
-                        seen[output].add(name)
-            running.feed(here)
+            _note_direct(running, np.zeros(len(sizes)), seen)
+        if subject.port:
+            with suppress(ComponentError):  # it may refuse such a voltage
+                for here in voltage_rows(running, np.array(_VOLTAGES, complex)):
+                    _note_direct(running, here, seen)
     return seen
+
+
+def _note_direct(running: Running, here: Numbers, seen: dict[str, set[str]]) -> None:
+    """Move one input after another from one place, and note which outputs follow."""
+    subject, sizes = running.subject, running.subject.amplitudes
+    running.feed(here)
+    before = running.read()
+    for j, name in enumerate(subject.inputs):
+        moved = here.copy()
+        moved[j] += sizes[j]
+        running.feed(moved)
+        after = running.read()
+        for k, output in enumerate(subject.outputs):
+            if abs(after[k] - before[k]) > 1e-10 * (abs(before[k]) + abs(sizes[j])):
+                seen[output].add(name)
+    running.feed(here)
 
 
 @check("delay", "Do its outputs come when they are due?", needs=(*SAME, "reading"))
