@@ -538,4 +538,4 @@ def test_a_component_that_cannot_start_is_named_with_its_row(tmp_path):
         problem.text,
     )
     assert "fmi2" not in str(caught.value)
-    assert "raise" not in problem.text  # a rating is data, and no remedy
+    assert "rating_mva" not in problem.text  # a rating is data, and no remedy
