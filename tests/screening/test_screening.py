@@ -285,7 +285,12 @@ def test_an_unstable_point_fails_where_asked(gfor, tmp_path):
     code, out, _ = gfor("screen", "two_area", *options, "--fail-unstable")
     assert code == 1
     assert out.startswith("UNSTABLE: 1 item of 2; worst: out, intact")
+    assert "Least damping [%]" in out
     assert gfor("screen", "two_area", *options)[0] == 0
+    path.write_text("name,gfor.in_service\nin,1\n")
+    code, out, _ = gfor("screen", "two_area", *options)
+    assert code == 0
+    assert "Least damping [%]" not in out  # of one item the headline and the modes say all
 
 
 def test_reset_fmus_are_as_new(two_area):
@@ -354,6 +359,12 @@ def test_a_one_closes_what_the_case_has_open(two_area, tmp_path, monkeypatch):
     path.write_text("name,load_2.in_service\na,1\n")
     with pytest.raises(InputError, match="scale of 0"):
         read_points(path, prepared, elements)
+
+
+def test_growth_is_counted_at_both_ends_of_a_stretch(two_area, day, tmp_path, monkeypatch):
+    monkeypatch.setattr(modes, "DENSE", 0)
+    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    assert [item.record.counted for item in result.items] == [True, False, False, False, True]
 
 
 def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, tmp_path, monkeypatch):
