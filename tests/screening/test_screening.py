@@ -361,12 +361,6 @@ def test_a_one_closes_what_the_case_has_open(two_area, tmp_path, monkeypatch):
         read_points(path, prepared, elements)
 
 
-def test_growth_is_counted_at_both_ends_of_a_stretch(two_area, day, tmp_path, monkeypatch):
-    monkeypatch.setattr(modes, "DENSE", 0)
-    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
-    assert [item.record.counted for item in result.items] == [True, False, False, False, True]
-
-
 def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, tmp_path, monkeypatch):
     """Growth that only the count sees must not be lost behind items without modes."""
     monkeypatch.setattr(modes, "DENSE", 0)
