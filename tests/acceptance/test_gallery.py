@@ -39,6 +39,7 @@ def checked(path, binding=None, only=()):
         ("base_of_own_rating", "ratings"),
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
+        ("droop_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
         ("feedthrough_of_high_voltage", "feedthrough"),
