@@ -11,7 +11,6 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.similarity import similarity
@@ -111,6 +110,8 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
     """
     if not (len(a.eigenvalues) and len(b.eigenvalues)):
         return []
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     alike = similarities(a, b)
     sizes = np.abs(a.eigenvalues)[:, None] + np.abs(b.eigenvalues)[None, :]
     distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(sizes > 0, sizes, 1.0)

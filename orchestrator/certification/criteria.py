@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
@@ -149,8 +148,10 @@ def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
     threshold are left out. If each row took its largest similarity, one mode without the converter could excuse several
     modes with it.
     """
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     enough = np.where(alike >= THRESHOLD, alike, 0.0)
-    rows, columns = scipy.optimize.linear_sum_assignment(enough, maximize=True)
+    rows, columns = linear_sum_assignment(enough, maximize=True)
     return {int(k): int(j) for k, j in zip(rows, columns, strict=True) if enough[k, j] > 0}
 
 

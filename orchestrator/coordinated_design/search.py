@@ -11,7 +11,6 @@ from itertools import product
 
 import numpy as np
 import scipy.optimize
-import scipy.stats
 
 from orchestrator.arrays import Numbers
 from orchestrator.coordinated_design.objective import RatedPoint, Watched, Worth, together
@@ -130,7 +129,9 @@ class SettingSearch:
             x[2::3] = share
             yield self._space.clipped(x)
         if count > 1:
-            spread = scipy.stats.qmc.Sobol(3 * count, seed=0).random(min(_SPREAD * count, _MOST_SPREAD))
+            from scipy.stats.qmc import Sobol  # noqa: PLC0415 - a second to import
+
+            spread = Sobol(3 * count, seed=0).random(min(_SPREAD * count, _MOST_SPREAD))
             yield from self._space.lowest + spread * (self._space.highest - self._space.lowest)
 
     def _wanted_turns(self) -> list[float]:

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
@@ -188,6 +186,9 @@ def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> li
 
 
 def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
+    import matplotlib as mpl  # noqa: PLC0415 - a second to import
+    from matplotlib.figure import Figure  # noqa: PLC0415 - as above
+
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         size, phase, stiff = figure.subplots(3, 1, sharex=True)

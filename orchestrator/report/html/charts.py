@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 from orchestrator.arrays import Numbers
 
@@ -218,6 +217,8 @@ def _span(values: Numbers, margin: float) -> tuple[float, float]:
 
 
 def _ticks(limits: tuple[float, float]) -> list[tuple[float, str]]:
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - half a second to import
+
     low, high = limits
     values = [v for v in MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
     step = abs(values[1] - values[0]) if len(values) > 1 else abs(high - low) or 1.0
