@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.examination import examine
 from orchestrator.analysis.external_exciters import settled_warnings, start_warnings
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
@@ -29,6 +30,7 @@ from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
+from orchestrator.binding.misfits import Misfit
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
@@ -88,6 +90,7 @@ class ModesResult:
     system: LinearModel | None
     fit_errors: dict[str, float] = field(default_factory=dict)
     unnamed: Mapping[str, str] = field(default_factory=dict)
+    misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -206,11 +209,12 @@ def linearised(
     prepared, master, frequency_range, critical, directional
         As `modes_of`.
     """
-    said = start_warnings(master)
+    misfits = misfits_of(master)
+    said = (*sentences(misfits), *start_warnings(master))
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return Linearised(prepared, master, point, blocks, frequency_range, critical, said)
+    return Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits)
 
 
 def modes_from(
@@ -234,7 +238,10 @@ def modes_from(
     frequency_range, critical
         As for `modes_of`.
     """
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical))
+    misfits = misfits_of(master)
+    return _computed(
+        Linearised(prepared, master, point, blocks, frequency_range, critical, sentences(misfits), misfits)
+    )
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -253,6 +260,8 @@ class Linearised:
         As `modes_from`.
     said
         Warnings that come before those of the modes.
+    misfits
+        As `misfits_of`.
     """
 
     def __init__(
@@ -264,7 +273,9 @@ class Linearised:
         frequency_range: tuple[float, float],
         critical: float | None,
         said: tuple[str, ...] = (),
+        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
     ) -> None:
+        self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
         self._range, self._critical, self._said = frequency_range, critical, said
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
@@ -329,6 +340,7 @@ class Linearised:
             modes=shown,
             named=named,
             references=dict(prepared.references),
+            misfits=self._misfits,
             warnings=(
                 *self._said,
                 *map(str, prepared.questions),
