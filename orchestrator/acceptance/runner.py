@@ -241,7 +241,11 @@ def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -
         )
         report.results.append(replace(result, remedy=remedy, whose=Whose.BINDING))
         return None
-    report.results.append(passed("binding", "all variables are there, with the units that it says"))
+    unlike = [f"the binding has {text}" for text in bound.unlike_delivered().values()]
+    report.results.append(
+        remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered") if unlike
+        else passed("binding", "all variables are there, with the units that it says")
+    )  # fmt: skip
     return bound
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
@@ -108,15 +109,14 @@ def linearize_with_box(
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
     require_fitting()
+    misfits = sentences(misfits_of(master))
     residual = _check_still(master, [component])
     response, moved = _respond(master, component, excitation or Excitation(), restore=restore, report=report)
     identified = fit(response)
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
     doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
-    return BoxedSystem(
-        component, response, identified, model, max(moved, residual), tuple(str(doubt) for doubt in doubtful)
-    )
+    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)))
 
 
 def modes_with_boxes(

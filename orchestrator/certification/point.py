@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.analysis.device_start import misfits_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
@@ -154,6 +155,7 @@ def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> Non
     (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
     watch = Watch(prepared)
     with running(prepared) as master:
+        misfits = misfits_of(master)
         converter = master.components.get(CONVERTER)
         if converter is not None and (task.black_box or is_black_box(converter)):
             boxed = linearize_with_box(master, CONVERTER)
@@ -169,7 +171,7 @@ def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> Non
             master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:
             _keep_signals(result, watch.recorder, master, f_n)
-    result.findings = [finding.as_json() for finding in watch.findings()]
+    result.findings = [finding.as_json() for finding in watch.findings(misfits=misfits)]
 
 
 def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:

@@ -23,6 +23,7 @@ from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.report.tables import PlainTable
+from orchestrator.watch.finding import MISFIT
 
 
 def run_norm(options: argparse.Namespace, device: Device) -> int:
@@ -53,19 +54,21 @@ def certified_norm(
     return certified(
         options, request, folder, "orchestrator.certification.point",
         lambda executor, report: certify(request, executor, folder, report), partial(save, pdf=options.pdf), console,
-        (f"{device.name}, nts631", "points"),
+        (f"{device.name}, nts631: computing", "points"),
     )  # fmt: skip
 
 
 def show_norm(result: Certification, files: Sequence[Path], folder: Path, console: Console) -> None:
     """Print a certificate."""
+    good = result.passed and not result.refused
+    console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
+    misfits = [str(f["message"]) for p in result.points.values() for f in p.findings if f["kind"] == MISFIT]
+    for text in dict.fromkeys(misfits):
+        console.print(escape(text), soft_wrap=True, highlight=False)
     console.print(_table(result), "")
     for v in result.verdicts:
         if said := v.of_base_critical():
             console.print(f"X_L = {v.X_L:g} pu: {escape(said)}", soft_wrap=True, highlight=False)
-    console.print("")
-    good = result.passed and not result.refused
-    console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
     if result.stored:
         console.print(f"{result.stored} of {len(result.points)} points were there already")
     console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)

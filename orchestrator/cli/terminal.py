@@ -96,7 +96,7 @@ def print_findings(results: Sequence[RunResult]) -> None:
     console = make_errors()
     for result in results:
         for finding in result.findings:
-            if finding.message != str(result.failure):
+            if finding.message not in (str(result.failure), *result.modes.warnings):
                 name = result.modes.prepared.name
                 console.print(f"[bold yellow]found:[/bold yellow] {escape(f'scenario {name!r}: {finding.message}')}")
 

@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from fmus.toolchain.compiler import compile_here
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.errors import ComponentError, InputError, NotFiniteError
 from orchestrator.fmi.component import Component, Derived, RealBatch
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.port import PORT, START, BoundDescription, PhasorMap
@@ -129,7 +129,16 @@ class BoundComponent(Derived):
         return self.inner.one_thread
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
-        self.inner.check(status, call, time)
+        try:
+            self.inner.check(status, call, time)
+        except NotFiniteError:
+            raise
+        except ComponentError as error:
+            unlike = self.description.unlike_delivered()
+            if not unlike:
+                raise
+            said = f"{error.log}; likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]"
+            raise ComponentError(error.component, error.call, error.status, said, error.time, error.kind) from error
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self.inner.progress_of_step()

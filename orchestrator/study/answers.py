@@ -79,7 +79,9 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
         f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %" for name, m in _named_elsewhere(result, mode)
     ]
     told += [f"which mode is {name!r} is not known" for name in result.unnamed]
-    return ScenarioAnswer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short("; ".join(told)))
+    return ScenarioAnswer(
+        result.prepared.title, verdict.stable, verdict.verdict, mode, _with_misfits(result, "; ".join(told))
+    )
 
 
 def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:
@@ -97,7 +99,7 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
-        return ScenarioAnswer(title, False, "UNSTABLE", mode, what)
+        return ScenarioAnswer(title, False, "UNSTABLE", mode, _with_misfits(result.modes, what))
     if result.failure is not None:
         return ScenarioAnswer(title, False, "failed", mode, _short(str(result.failure)))
     if by_modes.good is False:
@@ -113,6 +115,12 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     rest = f"; {by_modes.remark}" if by_modes.remark else ""
     end = result.modes.prepared.stop_time
     return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+
+
+def _with_misfits(result: ModesResult, remark: str) -> str:
+    """A remark behind what does not fit between devices and their bindings."""
+    faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
+    return _short("; ".join([*faults, remark] if remark else faults))
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:

@@ -14,6 +14,7 @@ import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.examination import examine
 from orchestrator.analysis.external_exciters import settled_warnings, start_warnings
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
@@ -31,6 +32,7 @@ from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
+from orchestrator.binding.misfits import Misfit
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
@@ -90,6 +92,7 @@ class ModesResult:
     system: LinearModel | None
     fit_errors: dict[str, float] = field(default_factory=dict)
     unnamed: Mapping[str, str] = field(default_factory=dict)
+    misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -175,10 +178,12 @@ def linearised(
 ) -> "Linearised":
     """The same before its eigenvalues are computed."""
     said = start_warnings(master)
+    misfits = misfits_of(master)
+    said = (*sentences(misfits), *start_warnings(master))
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return Linearised(prepared, master, point, blocks, frequency_range, critical, said)
+    return Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits)
 
 
 def modes_from(
@@ -191,7 +196,9 @@ def modes_from(
     black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
 ) -> ModesResult:
     """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, (), black_boxes))
+    misfits = misfits_of(master)
+    said = sentences(misfits)
+    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits, black_boxes))
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -202,7 +209,10 @@ def _computed(system: "Linearised") -> ModesResult:
 
 
 class Linearised:
-    """A linearised scenario, whose eigenvalues other threads compute meanwhile; ``said`` are earlier warnings."""
+    """A linearised scenario, whose eigenvalues other threads compute meanwhile.
+
+    ``said`` are earlier warnings, ``misfits`` as `misfits_of`.
+    """
 
     def __init__(
         self,
@@ -213,8 +223,10 @@ class Linearised:
         frequency_range: tuple[float, float],
         critical: float | None,
         said: tuple[str, ...] = (),
+        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
         black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
     ) -> None:
+        self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
         self._range, self._critical, self._said = frequency_range, critical, said
         self._black_boxes = black_boxes
@@ -286,6 +298,7 @@ class Linearised:
             modes=shown,
             named=named,
             references=dict(prepared.references),
+            misfits=self._misfits,
             warnings=(
                 *self._said,
                 *map(str, prepared.questions),

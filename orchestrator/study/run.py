@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.external_exciters import start_warnings
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.linearization import Blocks, compose
@@ -181,9 +182,10 @@ def _run(
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
-        started = start_warnings(master) if reasons else ()
+        misfits = misfits_of(master)
+        started = (*sentences(misfits), *start_warnings(master)) if reasons else ()
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
-        modes = replace(modes, warnings=(*started, *modes.warnings))
+        modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
@@ -201,7 +203,7 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    findings = watch.findings(failure, master.late_starts)
+    findings = watch.findings(failure, master.late_starts, misfits)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"

@@ -24,6 +24,7 @@ from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
+from orchestrator.binding.misfits import of_frequency, omega_seen
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -85,11 +86,10 @@ def rated_frequency(subject: Subject) -> CheckResult:
         omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[
             :, subject.outputs.index("omega")
         ]
-    rest, f_n = float(np.median(omega[-max(1, steps // 10) :])), _rated(subject)
-    seen = f"omega is {rest:.6g} at rest, in a network of its rated frequency"
-    if abs(rest - 1) > 0.02:
-        known = f", so it is made for {rest * f_n:.4g} Hz where {f_n:g} Hz is bound" if f_n else ""
-        return failed("rated_frequency", "wrong rated frequency", f"{seen}{known}", omega=rest)
+    rest = float(np.median(omega[-max(1, steps // 10) :]))
+    seen = omega_seen(rest)
+    if found := of_frequency(rest, _rated(subject)):
+        return failed("rated_frequency", found.fault, found.evidence, **found.figures)
     if abs(rest - 1) > _OMEGA:
         return remarked("rated_frequency", seen, "let it settle, or ask what omega is", omega=rest)
     return passed("rated_frequency", seen, omega=rest)
