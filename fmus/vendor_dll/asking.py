@@ -34,8 +34,6 @@ class Answer:
         Its answer; empty where it gave none.
     end
         How it ended where it gave none, in words that follow "the process that reads it".
-    why
-        What that means, and the remedy.
     passing
         The reason lies in this machine, so that another call may find more.
     in_its_start
@@ -59,8 +57,6 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
 
     Parameters
     ----------
-    path
-        The DLL.
     reader
         Module that is run for it.
     longest
@@ -128,7 +124,6 @@ def _wait(process: "subprocess.Popen[bytes]", note: Path, longest: float) -> boo
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End it, and what it started."""
     with contextlib.suppress(OSError):
         if hasattr(os, "killpg"):
             os.killpg(process.pid, signal.SIGKILL)

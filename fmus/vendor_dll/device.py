@@ -43,14 +43,8 @@ class Route:
 
     Attributes
     ----------
-    place
-        In the DLL's inputs or outputs.
-    quantity
-        Of the circuit.
     base
         Parameter of the circuit with which it is multiplied; None for none.
-    factor
-        Of the unit, with its sign.
     """
 
     place: Place
@@ -65,18 +59,12 @@ class Device:
 
     Attributes
     ----------
-    filter_kind, bridge
-        As `converter_circuit`.
-    measured
-        What the DLL is told.
     driven
         The three signals of the bridge.
     constants
         Start values of inputs that the circuit does not give, by name.
     parameters
         Values of the DLL's parameters, instead of its defaults.
-    texts
-        Those of its parameters that are text.
     circuit
         Default values of the circuit's parameters.
     delay
@@ -106,7 +94,6 @@ class Device:
     voltage_per_q: float = 0.2
 
     def around(self, name: str) -> Model:
-        """The circuit, as a model of this name."""
         made = converter_circuit(name, self.filter_kind, self.bridge)
         known = {p.name: p for p in made.parameters if p.type == "Real"}
         for key, value in self.circuit.items():
@@ -137,7 +124,6 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
 
 
 def device_of(path: Path, table: Mapping[str, Any], interface: DllInterface) -> Device:
-    """Work out a device's file for the DLL that it names."""
     try:
         return _Reader(table, interface).device(path.parent / table["dll"])
     except ValueError as error:
@@ -300,7 +286,6 @@ class _Reader:
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Names with their dots, and values."""
     for name, value in table.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{name}.")

@@ -149,10 +149,6 @@ def dll_fmu(
 
     Parameters
     ----------
-    dll
-        The DLL, as it was read.
-    destination
-        The folder.
     texts
         Value of parameters that are text; by default the DLL's own.
     device

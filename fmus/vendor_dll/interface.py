@@ -19,8 +19,6 @@ class DataType:
     ----------
     name
         As the interface has it, such as ``real64``.
-    c
-        Type in C.
     size
         Of one value, which is also its alignment [bytes].
     kind
@@ -128,7 +126,6 @@ class DllInterface:
     calls: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """For another process."""
         return asdict(self)
 
     @classmethod
@@ -140,7 +137,6 @@ class DllInterface:
         return cls(**data | signals | rows | plain)
 
     def with_defaults(self, values: Mapping[str, Number | str]) -> "DllInterface":
-        """The same with other defaults of parameters, by name."""
         rows = tuple(replace(row, default=values.get(row.name, row.default)) for row in self.parameters)
         return replace(self, parameters=rows)
 
@@ -190,8 +186,6 @@ class Place:
     ----------
     name
         Of the signal or parameter, with its place in the array in brackets, from 1, where there is one.
-    row
-        The signal or parameter it belongs to.
     offset
         From the structure's start [bytes].
     """
@@ -202,7 +196,6 @@ class Place:
 
     @property
     def type(self) -> DataType:
-        """Of the value."""
         return DATA_TYPES[self.row.data_type]
 
 

@@ -68,7 +68,6 @@ class _ModelInfo(c.Structure):
 
 
 def read_interface(library: Library) -> DllInterface:
-    """What a loaded DLL declares."""
     if not library.has("Model_GetInfo"):
         raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL")
     found = library.call("Model_GetInfo")
@@ -154,17 +153,7 @@ def _noting(path: Path) -> Note:
 
 
 def answer_for(load: Callable[[Note], Library], answer: Path, texts: Mapping[str, str] | None) -> None:
-    """Write what `read` finds into a file, or the error.
-
-    Parameters
-    ----------
-    load
-        Loads the DLL, and notes what it does from then on.
-    answer
-        The file.
-    texts
-        As `read`.
-    """
+    """Write what `read` finds into a file, or the error."""
     found: dict[str, Any]
     try:
         found = read(load(_noting(note_beside(answer))), texts)

@@ -111,8 +111,6 @@ class FmuProcess:
 
         Parameters
         ----------
-        instance
-            Its number in the process.
         into, out
             Value references that are set before a step, and read after it.
         rows
@@ -244,7 +242,6 @@ class FmuProcess:
         return self._ended
 
     def close(self) -> None:
-        """End the process and remove what was written for it."""
         self._process.close()
         self._ended = self._ended or ProcessEndedError(ProcessFault.EXIT, "its process was closed")
 

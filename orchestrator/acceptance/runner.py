@@ -78,7 +78,6 @@ class AcceptanceReport:
 
     @property
     def failures(self) -> list[CheckResult]:
-        """Results of the checks that failed."""
         return [r for r in self.results if r.verdict is Verdict.FAIL]
 
     @property
@@ -149,10 +148,6 @@ def check_fmu(
 
     Parameters
     ----------
-    fmu
-        Its file.
-    binding
-        File of the binding; None where there is none.
     limits
         What the FMU may take; the usual limits where None.
     only

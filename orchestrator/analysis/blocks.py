@@ -54,12 +54,8 @@ class Blocks:
 
     Attributes
     ----------
-    parts
-        In how many parts a component does the communication step.
     period
         Communication steps after which the system repeats; 1 where each step is like every other.
-    sampled
-        Names of the sampled components among them.
     declared
         By component and output: the inputs that its FMU says it depends on directly.
     """
@@ -189,7 +185,6 @@ class Blocks:
 
     @property
     def how(self) -> dict[str, str]:
-        """How the linear model of every component was found."""
         return {name: c.source for name, c in self.components.items()}
 
     @property
@@ -240,14 +235,8 @@ def linearize_within(
     ----------
     master
         At the operating point; it is left as it was.
-    name
-        Of the component.
     step_size
         Communication step to linearise over [s].
-    inputs, observed, derivatives, idle
-        As `linearize_component`.
-    without_step, directional
-        As `Blocks`.
     """
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):

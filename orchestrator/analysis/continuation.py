@@ -74,7 +74,6 @@ def pairs_near(model: LinearModel, wanted: complex) -> list[Eigenpair]:
 
 
 def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
-    """The pair whose eigenvalue is nearest to a given one."""
     return min(pairs_near(model, eigenvalue), key=lambda pair: abs(pair.eigenvalue - eigenvalue))
 
 
@@ -88,8 +87,6 @@ class Strides:
         Least similarity with which a mode is taken for the same.
     rival
         Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
-    shortest
-        Length of the shortest stride, as a part of the path.
     """
 
     same: float = _SAME
@@ -117,12 +114,8 @@ def follow_along(
     ----------
     start
         The mode at ``begin``.
-    model_at
-        The linear model at any point of the path.
     begin, end
         Ends of the path; the end may be the smaller one.
-    strides
-        How it is walked.
     common
         States by which modes are recognised, where not all models have the same; the start's vectors hold these alone.
     """

@@ -92,8 +92,6 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
     ----------
     master
         The running system at the model's operating point; it is restored.
-    blocks
-        The linearised components.
     model
         The step map composed of the blocks.
     stability

@@ -25,7 +25,6 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
 
 
 def sentences(found: dict[str, list[Misfit]]) -> tuple[str, ...]:
-    """All in words."""
     return tuple(misfit.sentence(name) for name, misfits in found.items() for misfit in misfits)
 
 

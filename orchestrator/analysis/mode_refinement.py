@@ -55,8 +55,6 @@ def refine(
 
     Parameters
     ----------
-    model, equations
-        The model, and its equations.
     values, left, right
         As in `RefinedModes`, of a similar model with the same states.
     """

@@ -41,8 +41,6 @@ class ModeSet:
         λ [rad/s], shape (m,).
     left, right
         Eigenvectors as rows, shape (m, n), in any scaling.
-    names
-        Of the n states.
     """
 
     eigenvalues: Complex
@@ -134,8 +132,6 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
     Parameters
     ----------
-    a, b
-        The modes of both points.
     frequency_range
         In which modes were looked for [Hz].
     threshold
@@ -174,7 +170,6 @@ def number_trajectories(
     route: Iterable[tuple[At, Sequence[At]]],
     threshold: float = THRESHOLD,
 ) -> Followed[At]:
-    """Give every mode of every point the number of a trajectory."""
     result: Followed[At] = Followed()
     count = 0
     for place, origins in route:

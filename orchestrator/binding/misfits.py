@@ -42,7 +42,6 @@ class Misfit:
 
 
 def omega_seen(omega: float) -> str:
-    """What a device shows at rest."""
     return f"omega is {omega:.6g} at rest, in a network of its rated frequency"
 
 
@@ -76,7 +75,6 @@ def of_current(size: float, limit: float | None) -> Misfit | None:
 
 
 def power_seen(at: str, asked: complex, found: complex) -> str:
-    """Powers asked for and found."""
     return f"{at} S = {_text(found)} pu of the rating where {_text(asked)} is asked"
 
 

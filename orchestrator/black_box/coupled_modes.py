@@ -41,8 +41,6 @@ class BoxedSystem:
 
     Attributes
     ----------
-    component
-        The box.
     residual
         The larger of two changes: of a known component's state in one communication step, and of the box's current from
         its start to its rest at the ideal bus.
@@ -103,8 +101,6 @@ def linearize_with_box(
         Signals that excite the box; the usual signals where None.
     restore
         Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
-    report
-        As `measure`.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
@@ -133,13 +129,6 @@ def modes_with_boxes(
     ----------
     prepared, master, frequency_range, critical
         As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
-    excitation, report
-        As `linearize_with_box`.
-
-    Raises
-    ------
-    AnalysisError
-        As `linearize_with_box`.
     """
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:

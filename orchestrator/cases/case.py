@@ -49,13 +49,10 @@ _SHARES = {"alpha": "it is a part of the unit's rating: 30 % is 0.3"}
 
 
 def built_in_cases() -> tuple[str, ...]:
-    """Names of the cases that come with the package."""
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
 
 
 class Case(CaseDefinition):
-    """A case whose scenarios can be prepared."""
-
     def prepare(
         self,
         scenarios: Sequence[str] = (),
@@ -156,7 +153,6 @@ class Case(CaseDefinition):
     def placed(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
-        """The same with the table of each component, which says where it stands and what it is made of."""
         preparer = self._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
         if problems := [*self.problems, *preparer.problems]:

@@ -61,12 +61,10 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
 
 
 def place_of(row: Row) -> str:
-    """File and line of a row."""
     return row[PLACE]
 
 
 def number(row: Row, column: str) -> float:
-    """The number in a column."""
     try:
         value = float(row[column])
     except (TypeError, ValueError):

@@ -13,11 +13,9 @@ class Rule:
     may_be_equal: bool = False
 
     def holds(self, larger: float, smaller: float) -> bool:
-        """Whether two values obey the rule."""
         return larger > smaller or (self.may_be_equal and larger == smaller)
 
     def text(self, larger: str, smaller: str) -> str:
-        """The rule with the values seen, both as text."""
         must = "must not exceed" if self.may_be_equal else "must be less than"
         return f"{smaller} {must} {larger}: {self.why}"
 

@@ -54,26 +54,18 @@ class Draft:
         one.
     from_outside
         Variables, by ``component.variable``, that the command line or its parameter files set.
-    problems
-        All problems found so far.
     data
         Elements of the network, and the source's data of units; None if the case has no network of its own.
     network
         The network behind the grid component.
     known, tables
         Names of all possible components, and the tables of the components in this scenario.
-    system
-        Components and connections.
     places
         Place of the last assignment of each ``component.variable``.
-    origins
-        Origin of each component of the units table, by its name.
     reactive_limits
         Least and most reactive power of the units at a bus together [Mvar], by bus.
     active_limits
         Least and most active power of a unit in sharing [MW], by component.
-    questions
-        Questions about unusual data.
     parameter_files
         The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
     misfits
@@ -154,5 +146,4 @@ class Draft:
 
     @property
     def grid(self) -> str | None:
-        """Name of the grid component."""
         return self.case.power_flow.grid if self.case.power_flow else None

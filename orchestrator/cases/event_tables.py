@@ -262,5 +262,4 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
 
 
 def _elements(names: Iterable[str], variable: str) -> list[str]:
-    """Names of the elements that have a variable."""
     return [name.removesuffix(f".{variable}") for name in names if name.endswith(f".{variable}")]

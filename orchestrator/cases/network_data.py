@@ -40,8 +40,6 @@ class NetworkData:
         Rated frequency [Hz]; None leaves every model's own.
     places
         File and line of the lines that a file holds, by name.
-    changes
-        What the source holds and was taken over in another form, each with its place.
     machines, idle_machines
         Machines in service, one by one, where the source is of PSS/E; bus and identifier of those out of service.
     feeding, capacitors
@@ -181,7 +179,6 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
-    """The lines of a file, each with its place."""
     lines = []
     for row in rows_of(path, ("from", "to", "R", "X", "B")):
         if not (row["from"] and row["to"]):

@@ -105,7 +105,6 @@ def _reactive_limits(draft: Draft) -> dict[str, tuple[float, float]]:
 
 
 def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
-    """What is to be said of limits of reactive power."""
     kept = draft.case.power_flow.reactive_limits if draft.case.power_flow else None
     where = draft.place("power_flow", *(["reactive_limits"] if kept is not None else []))
     found = []

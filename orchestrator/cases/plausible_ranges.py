@@ -14,8 +14,6 @@ class Plausible:
     ----------
     unit
         Unit of the variable. The range does not apply to a variable of the same name in another unit.
-    why
-        Source of the range.
     or_zero
         Whether 0 is usual as well, because it switches a part off.
     slip
@@ -30,7 +28,6 @@ class Plausible:
     slip: str = ""
 
     def fits(self, value: float) -> bool:
-        """Whether a value lies in the range."""
         return self.low <= value <= self.high or (self.or_zero and value == 0)
 
 

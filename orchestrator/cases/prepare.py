@@ -50,8 +50,6 @@ class PreparedScenario:
 
     Attributes
     ----------
-    case
-        The case that the scenario is of.
     record
         Names ``component.variable`` of the signals that are recorded every ``record_every`` communication steps.
     about_rows

@@ -60,7 +60,6 @@ def checked_schedule(draft: Draft) -> Schedule:
 
 
 def _chosen(draft: Draft) -> Schedule:
-    """The schedule that the file names."""
     solver = draft.case.solver
     if solver.schedule == "jacobi":
         _check_unused_groups(draft, solver.groups or [])

@@ -77,8 +77,6 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 
     Parameters
     ----------
-    plan
-        Its values.
     reactive
         Reactive power that it feeds [pu, S_n]: the current that is left is active.
     """
@@ -114,8 +112,6 @@ def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
 
     Parameters
     ----------
-    reserves
-        The units that are left.
     change
         What they have to feed beside what they fed [MW].
     """
@@ -138,7 +134,6 @@ def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
 
 
 def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
-    """Which unit would need most of its limit, and what is missing."""
     able = [one for one in reserves if one.gain > 0] or list(reserves)
     step = change / (sum(one.gain for one in able) or 1.0)
     worst = max(able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0)

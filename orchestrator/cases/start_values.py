@@ -44,12 +44,8 @@ def start_from_power_flow(
     ----------
     system
         The coupled system. The plans of its grid and units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
-    network
-        Buses, lines and loads.
     grid
         The component that is the network.
-    units
-        Bus of every unit.
     slack
         The bus whose units feed the remaining power.
     limits

@@ -17,18 +17,12 @@ class UnitRow:
 
     Attributes
     ----------
-    label, bus
-        Name of the unit, and its bus.
     rating_mva, p_mw, v_pu
         Rating [MVA], active power [MW] and voltage [pu].
     alpha
         Share of the converter, if the row gives it; otherwise None.
-    parameters
-        Parameters of the generator and of the converter, by kind.
     place
         File and line of the row; empty where the unit comes from the network's source.
-    parts
-        Parts of the generator that the row itself chooses.
     partial
         Whether a record of it was left out, for which the case says what stands there.
     q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
@@ -64,7 +58,6 @@ class UnitRow:
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:
-    """The row itself."""
     if not row.rating_mva > 0:
         raise InputError(
             f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"

@@ -148,7 +148,6 @@ def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
 
 
 def _with_limits_of_bus(row: UnitRow, units: Sequence[UnitRow]) -> UnitRow:
-    """The row with the limits of all units of its bus, which hold for them together."""
     return replace(row, q_min_mvar=sum(u.q_min_mvar for u in units), q_max_mvar=sum(u.q_max_mvar for u in units))
 
 
@@ -229,7 +228,6 @@ def _parts_in(entry: Row) -> dict[str, str]:
 
 
 def _parts_of(table: UnitsTable) -> dict[str, str]:
-    """Parts that all units have in common."""
     return {part: name for part in PARTS if (name := getattr(table, part)) is not None}
 
 

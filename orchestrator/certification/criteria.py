@@ -39,8 +39,6 @@ class ModeVerdict:
     similarity
         Similarity of the two modes, from 0 to 1, by their shapes over the states that both systems have. If the
         converter introduces the mode, the similarity of the best candidate that is not matched with another mode.
-    components
-        The components that take part most, in words.
     """
 
     eigenvalue: complex
@@ -76,7 +74,6 @@ class ModalTest:
 
 
 def is_judged(frequency_hz: float) -> bool:
-    """Whether the norm judges a mode of this frequency."""
     return FREQUENCIES[0] <= frequency_hz <= FREQUENCIES[1]
 
 

@@ -25,8 +25,6 @@ class CriterionMargin:
     margin
         How far the figure is on the good side of its limit, in parts of the limit (negative: on the bad side); None
         where the criterion has no figure, as with a loss of synchronism.
-    text
-        What was found.
     """
 
     place: str

@@ -64,14 +64,10 @@ class PointResult:
     ----------
     modes
         From 0.05 to 3 Hz, least damped first.
-    components
-        The components that take part in each mode, in words.
     growth
         Largest real part of any eigenvalue [1/s], zeros left out.
     stability
         The verdict over the whole spectrum, as `Stability.as_json` has it.
-    residual
-        Of the steady state.
     identified
         Order of the identified model that replaces the converter in the modes; None if the converter's own states are
         used.
@@ -114,7 +110,6 @@ class PointResult:
 
     @classmethod
     def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
-        """The result of a point whose worker died."""
         return cls(task.X_L, task.scenario, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -137,13 +132,7 @@ class PointResult:
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
-    """Steady state, modes and response of one point; a failure becomes part of the result.
-
-    Raises
-    ------
-    InputError
-        As `same_case`.
-    """
+    """Steady state, modes and response of one point; a failure becomes part of the result."""
     case = same_case(task.case, task.fingerprint)
     result = PointResult(task.X_L, task.scenario)
     with failure_kept(result), alone():

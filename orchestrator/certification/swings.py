@@ -66,12 +66,8 @@ class SwingTest:
     ----------
     dropped
         The first extremum, towards which the oscillation starts; None if no extremum was dropped.
-    swings
-        All swings that the record holds.
     ratio
         ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
-    reason
-        Reason of the verdict, in words.
     """
 
     dropped: Extremum | None

@@ -14,7 +14,6 @@ class Joined(argparse.Action):
     """A list with commas, to which the option adds each time that it is given."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
-        """Add what is given."""
         before = getattr(namespace, self.dest)
         setattr(namespace, self.dest, f"{before},{values}" if before else values)
 

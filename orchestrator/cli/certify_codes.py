@@ -42,12 +42,7 @@ def codes_of(asked: str) -> tuple[str, ...]:
 
 
 def run_code(options: argparse.Namespace, device: Device) -> int:
-    """Run one code's rows, write the certificate and print it.
-
-    Returns
-    -------
-    As `gfor certify`.
-    """
+    """Run one code's rows, write the certificate and print it."""
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{options.code}"
     console = make_console(stderr=options.json)
@@ -83,7 +78,6 @@ def bench_request(device: Device) -> CertificationRequest:
 def certified_code(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[CodeCertificate, list[Path]]:
-    """The certificate, and its files."""
     code = code_for(key, dict(options.declare))
     request = bench_request(device)
     return certified(

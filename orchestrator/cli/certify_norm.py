@@ -27,12 +27,7 @@ from orchestrator.watch.finding import MISFIT
 
 
 def run_norm(options: argparse.Namespace, device: Device) -> int:
-    """Run the test for one device, write its report and print the verdict.
-
-    Returns
-    -------
-    As `gfor certify`.
-    """
+    """Run the test for one device, write its report and print the verdict."""
     if options.declare:
         raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
                          f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
@@ -49,7 +44,6 @@ def run_norm(options: argparse.Namespace, device: Device) -> int:
 def certified_norm(
     options: argparse.Namespace, device: Device, folder: Path, console: Console
 ) -> tuple[Certification, list[Path]]:
-    """The certificate, and its files."""
     request = _request(options, device)
     return certified(
         options, request, folder, "orchestrator.certification.point",
@@ -59,7 +53,6 @@ def certified_norm(
 
 
 def show_norm(result: Certification, files: Sequence[Path], folder: Path, console: Console) -> None:
-    """Print a certificate."""
     good = result.passed and not result.refused
     console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
     misfits = [str(f["message"]) for p in result.points.values() for f in p.findings if f["kind"] == MISFIT]

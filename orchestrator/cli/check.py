@@ -28,7 +28,6 @@ NOT_SUPPORTED = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor check``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
     parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what its variables mean (`gfor bind`)")
     parser.add_argument("--step", type=positive, metavar="H", help="communication step of use [s]")

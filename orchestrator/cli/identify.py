@@ -13,7 +13,6 @@ from orchestrator.report.tables import PlainTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor identify``."""
     parser.epilog = (
         "Amplitudes are those at the start; an oscillation's is half of its peak, as it is one of two conjugate "
         "exponentials. '?' marks a mode in doubt, with the reasons below the table."

@@ -32,7 +32,6 @@ from orchestrator.study.modes import modes_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor modes``."""
     add_case_arguments(parser, schedule=True)
     parser.add_argument(
         "--range",

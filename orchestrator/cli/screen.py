@@ -31,7 +31,6 @@ from orchestrator.screening.study import Shard, plan_screening
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor screen``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--points", type=Path, metavar="FILE",
@@ -112,7 +111,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _present(found: Screening, folder: Path, console: Console, options: argparse.Namespace) -> int:
-    """Write the files and print the summary."""
     written, result = found.save(folder), found.result
     if options.json:
         print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))

@@ -57,8 +57,6 @@ class Tried:
 
 
 class SettingSearch:
-    """The search over the operating points."""
-
     def __init__(self, space: SettingSpace, points: Sequence[RatedPoint]) -> None:
         self._space, self._points = space, tuple(points)
         self.evaluations = 0
@@ -239,7 +237,6 @@ class _Program:
         self._matrix, self._right = np.array(matrix).reshape(len(right), len(lowest) + 3), np.array(right)
 
     def change(self, radius: float) -> Numbers | None:
-        """The change of x; None where there is none."""
         limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
         cost = np.zeros(len(limits) + 3)
         cost[-3:] = _BESIDE - 1.0, -_BESIDE, _PRICE

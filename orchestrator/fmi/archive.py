@@ -74,13 +74,7 @@ def read_model_description_text(path: Path) -> bytes:
 
 
 def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
-    """The bytes of another file in an archive; None where there is no such file.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """The bytes of another file in an archive; None where there is no such file."""
     with _opened(path, kind) as archive:
         if name not in archive.namelist():
             return None
@@ -89,25 +83,13 @@ def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
 
 
 def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
-    """Names of all files in an archive, once they were found harmless.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """Names of all files in an archive, once they were found harmless."""
     with _opened(path, kind) as archive:
         return tuple(entry.filename for entry in archive.infolist())
 
 
 def listed_twice(path: Path) -> tuple[str, ...]:
-    """Names of files that an archive lists more than once, with the same bytes.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """Names of files that an archive lists more than once, with the same bytes."""
     names = [name for name in names_in(path) if not name.endswith("/")]
     return tuple(name for name, count in Counter(names).items() if count > 1)
 

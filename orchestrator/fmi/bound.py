@@ -162,13 +162,7 @@ class BoundComponent(Derived):
     # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool], *, own: bool = False) -> None:
-        """Set variables by name; ``own`` means the FMU's own names.
-
-        Raises
-        ------
-        InputError, ComponentError
-            As `Component.set`.
-        """
+        """Set variables by name; ``own`` means the FMU's own names."""
         for name, value in values.items():
             if not own and name in self._start:
                 self._start[name] = float(value)

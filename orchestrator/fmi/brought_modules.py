@@ -58,7 +58,6 @@ class BroughtModules:
                 builtins.__import__ = _import
 
     def holds(self, file: object) -> bool:
-        """Whether a file or folder lies in the FMU."""
         return isinstance(file, str) and (file == self.root or file.startswith((f"{self.root}/", f"{self.root}\\")))
 
     def offers(self, top: str) -> bool:
@@ -66,7 +65,6 @@ class BroughtModules:
         return top in (self._names or ())
 
     def may_stand_first(self, top: str) -> bool:
-        """Whether an import of this name has to do with the FMU."""
         return self.offers(top) or bool(self._shown) or self in _loading
 
     def settle(self) -> None:
@@ -104,7 +102,6 @@ class BroughtModules:
 
     @contextmanager
     def seen(self, top: str, own: bool) -> Iterator[None]:
-        """For one import of one name: the FMU's modules of that name, or those of all others."""
         self._note_folders()
         changed, first = (top in self._shown) != own, bool(sys.path) and self.holds(sys.path[0])
         if changed:

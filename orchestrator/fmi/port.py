@@ -43,8 +43,6 @@ class PhasorMap:
 
     Attributes
     ----------
-    form, variables
-        Two variables, or three phases.
     matrix
         Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
         its own rating. Magnitude and angle, phases and powers are taken behind or before it.
@@ -142,8 +140,6 @@ class BoundDescription(FmuDescription):
 
     Attributes
     ----------
-    inner
-        What its file says.
     inner_names
         For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of
         the port's is called ``native.<name>`` here.
@@ -255,5 +251,4 @@ def _dependencies(
 
 
 def without_binding(description: FmuDescription) -> FmuDescription:
-    """What an FMU's file says: where it is behind a binding, of the FMU there."""
     return description.inner if isinstance(description, BoundDescription) else description

@@ -118,7 +118,6 @@ def _archive(members: dict[str, bytes]) -> bytes:
 
 
 def _digest(path: Path, library: Path) -> str:
-    """Of everything that the FMU is made of."""
     found = hashlib.sha256(_own_code())
     for file in (path, library):
         try:
@@ -132,7 +131,6 @@ def _digest(path: Path, library: Path) -> str:
 
 @cache
 def _own_code() -> bytes:
-    """Of the code that makes the FMU."""
     import fmus  # noqa: PLC0415 - the place alone
 
     root = Path(fmus.__file__).parent

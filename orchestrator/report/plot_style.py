@@ -42,7 +42,6 @@ def colour(index: int) -> str:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure, with the folder it belongs in."""
     _to_the_letter(figure)
     picture = BytesIO()
     figure.savefig(picture, dpi=_DPI, format=path.suffix.removeprefix("."))

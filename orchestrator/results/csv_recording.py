@@ -55,6 +55,5 @@ def read_csv(path: Path) -> xr.Dataset:
 
 
 def _parts(heading: str) -> tuple[str, str]:
-    """Name and unit."""
     found = _HEADING.fullmatch(heading)
     return (found[1], found[2] or "") if found else (heading, "")

@@ -87,8 +87,6 @@ class RecordingFolder:
 
         Parameters
         ----------
-        path
-            The file.
         further
             More attributes of it, such as `ENDED_EARLY`.
 

@@ -159,7 +159,6 @@ def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
 
 
 def save_json(content: Any, path: Path) -> None:
-    """Write indented JSON."""
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 

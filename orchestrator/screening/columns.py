@@ -29,7 +29,6 @@ class Elements:
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
-        """Those of a prepared scenario."""
         network, table = prepared.network, prepared.case.table.power_flow
         if network is None or table is None:
             raise InputError(
@@ -51,7 +50,6 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All of them."""
         return (*self.units, *self.lines, *self.loads, *self.shunts)
 
 
@@ -91,7 +89,6 @@ Raises `ValueError` where the text has no meaning in this column.
 
 
 def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
-    """How the cells of a column are read."""
     if column == "load":
         return lambda text: Setting(scale=_factor(column, text))
     if column == "generation":

@@ -145,23 +145,15 @@ def find_sensitivities(
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    again
-        Prepares it with other values.
     mode
         Name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the first
         named one, else the critical one.
-    patterns, fixed
-        As `parameters_of`.
     held
         Hold the operating point, which leaves the tunable parameters alone.
     directional
         Linearise with the FMUs' own directional derivatives instead of by perturbation.
     frequency_range
         In which the mode is [Hz].
-    report
-        Called with how many parameters are done, of how many.
     """
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -211,7 +203,6 @@ def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> 
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:
-    """The mode that is asked for."""
     if name is None and found.electromechanical is not None:
         return found.electromechanical
     if name not in (None, CRITICAL):
@@ -239,7 +230,6 @@ class _Mode:
         self._exact = exact if same else None
 
     def shift(self, blocks: Blocks, master: Master) -> Shift:
-        """How far the mode moves in a system of these blocks."""
         varied = model_of(master, blocks)
         if varied.names != self._model.names:
             raise AnalysisError("with another value the outputs depend on other inputs, which changes the states")

@@ -16,8 +16,6 @@ _KIND = "SSP"
 
 
 class SspArchive:
-    """An .ssp file on disk."""
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self._members = set(names_in(path, _KIND))
@@ -47,14 +45,12 @@ class SspArchive:
         return name
 
     def read(self, member: str) -> bytes:
-        """Contents of a member."""
         content = read_member(self.path, member, _KIND)
         if content is None:
             raise InputError(f"{self.path}: the archive has no {member!r}; export it again with all its resources")
         return content
 
     def xml(self, member: str) -> Element:
-        """Root element of a member."""
         text = self.read(member)
         check_xml(self.path, member, text)
         try:

@@ -51,8 +51,6 @@ def study_of(
 
     Parameters
     ----------
-    scenario, title
-        Name of the scenario, and its title for people.
     step_size
         Communication step [s].
     schedule

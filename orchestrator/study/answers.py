@@ -32,12 +32,8 @@ class ScenarioAnswer:
 
     Attributes
     ----------
-    subject
-        What it is about, such as a scenario's title.
     good
         Whether that is good; None where it is not known.
-    verdict
-        In a word or two.
     mode
         The least damped mode of the range.
     """
@@ -49,7 +45,6 @@ class ScenarioAnswer:
     remark: str
 
     def as_json(self) -> dict[str, Any]:
-        """For a summary."""
         return {
             "stable": self.good,
             "verdict": self.verdict,
@@ -60,7 +55,6 @@ class ScenarioAnswer:
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:
-    """By the eigenvalues at the operating point."""
     verdict, mode = result.stability, min(result.modes, key=lambda m: m.damping_percent, default=None)
     swing = "" if mode is None else _swing(result, mode)
     remark = swing

@@ -176,8 +176,6 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
 
     Parameters
     ----------
-    a, b
-        Trajectories of the two runs.
     expression
         The signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
     start
@@ -218,10 +216,6 @@ def most_different(
     ----------
     a, b
         Trajectories of the two runs, compared at the times of `common_times`.
-    count
-        Most signals to be named.
-    labels
-        Names of the two runs for errors.
     """
     times = common_times(a["time"].values, b["time"].values, labels)
 

@@ -66,8 +66,6 @@ def linear_model(
 
     Parameters
     ----------
-    prepared
-        The scenario.
     inputs, outputs
         Names ``component.variable``.
     as_continuous

@@ -14,8 +14,6 @@ _MOST_STATES = 200
 
 
 class Choosable(Protocol):
-    """A scenario that can be prepared with loads of constant power."""
-
     @property
     def prepared(self) -> PreparedScenario:
         """As it was asked for."""

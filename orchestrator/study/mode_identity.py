@@ -80,10 +80,6 @@ def settled(
 
     Parameters
     ----------
-    system
-        The scenario, with the names that its shapes give.
-    computed
-        Gives others where they are needed.
     known
         Scenarios that are settled already, by name, with the values that hold for all.
     undamped

@@ -64,10 +64,6 @@ class ModesResult:
         Somebody else's figures for them, where their conditions hold.
     swing
         States that show who swings against whom, mostly speeds.
-    areas
-        Area of every component that has one.
-    stability
-        The verdict over the whole spectrum.
     hidden
         The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
     system
@@ -113,7 +109,6 @@ class ModesResult:
         return dict(self.model.sources)
 
     def name_of(self, mode: Mode) -> str | None:
-        """Name of a mode, if it has one."""
         return next((name for name, named in self.named.items() if named is mode), None)
 
     def by_area(self, mode: Mode) -> dict[str, float]:
@@ -341,10 +336,6 @@ def identified(
 
     Parameters
     ----------
-    modes
-        That can bear a name.
-    known
-        Other scenarios of the same case and values that have their names.
     at_gains
         The linear model with other gains of damping controllers, where the scenario still runs.
     directional

@@ -73,12 +73,6 @@ class RunResult:
 
     Attributes
     ----------
-    dataset
-        What was recorded, up to the failure if there was one.
-    ring_down
-        The electromechanical mode as identified from the response.
-    linear
-        The linear model's response to the same events, where it was asked for.
     failure
         The error that ended the run before its time.
     findings
@@ -134,8 +128,6 @@ def run_scenario(
 
     Parameters
     ----------
-    prepared
-        The scenario.
     frequency_range
         Modes of these frequencies are shown [Hz].
     observers
@@ -146,10 +138,6 @@ def run_scenario(
         Where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
     checkpoints
         Keep the run while it goes on, and go on from the newest where one was left; not with federates.
-    federates
-        Components that run as federates at HELICS.
-    threads
-        As `orchestrator.coupling.master.Master`.
     """
     if federates is not None:
         if federates.announce is not None:

@@ -101,7 +101,6 @@ class PointRecord:
 
     @classmethod
     def lost(cls, _: SweepPointTask, error: WorkerLostError) -> Self:
-        """The record of a point whose worker died."""
         return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:

@@ -70,7 +70,6 @@ class SweepPlan:
         return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
-        """The task of one point."""
         varied = self.values(place)
         return make_task(prepared, self.layers, varied, self.step_size, self.frequency_range)
 
@@ -158,8 +157,6 @@ def plan_sweep(
 
     Parameters
     ----------
-    case
-        The case that is swept.
     vary
         The varied parameters, one for each axis. Modes are followed along the last axis.
     scenarios
@@ -221,12 +218,6 @@ def run_sweep(
     ----------
     plan
         A plan that `plan_sweep` has checked.
-    executor
-        Where the points are computed.
-    store
-        Keeps every point as soon as it is computed.
-    report
-        Progress.
     """
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
@@ -251,7 +242,6 @@ def _fill(
     store: PointStore,
     report: CountReport,
 ) -> None:
-    """Load or compute some points."""
     tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
     before = result.stored + result.computed
 

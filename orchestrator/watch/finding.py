@@ -36,8 +36,6 @@ class Finding:
         When it began [s].
     component, variable
         The component and variable that show the fault most, or whose limit acts.
-    message
-        The whole finding in words.
     until
         Its end [s]; None if it lasts to the end of the run, or has no duration.
     figures
@@ -56,7 +54,6 @@ class Finding:
     represented: bool = True
 
     def as_json(self) -> dict[str, Any]:
-        """The finding for a summary."""
         return {
             "kind": self.kind,
             "time": self.time,

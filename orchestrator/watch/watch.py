@@ -68,10 +68,6 @@ class Watch:
 
         Parameters
         ----------
-        failure
-            What ended the run.
-        late_starts
-            As `Master` has them.
         misfits
             Of devices and their bindings, by component.
         """
@@ -87,8 +83,6 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
     Parameters
     ----------
-    seen, system, events
-        What was seen of the run, what ran, and what happened in it.
     whole
         Whether the run came to its end; of one that did not, nobody asks whether it settles.
     """

@@ -79,8 +79,6 @@ class _After:
 
     Attributes
     ----------
-    end
-        What became of the device.
     away
         Distance of the current from where it was [pu, S_n].
     changed
@@ -219,7 +217,6 @@ class _Look:
         currents(running, 0j, round((until - running.time) / self._subject.step_size))
 
     def _came_back(self, running: Running, rest: complex) -> tuple[_End, float]:
-        """What became of it, and how far its current is from where it was."""
         steps, quiet = self._steps(_WINDOW), 0
         for number in range(_WINDOWS):
             current = currents(running, 0j, steps)

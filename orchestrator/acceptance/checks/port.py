@@ -95,7 +95,6 @@ def present_current(running: Running) -> complex:
 
 
 def _points(subject: Subject) -> tuple[OperatingAt, ...]:
-    """The operating point of use, and others."""
     return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
 
 

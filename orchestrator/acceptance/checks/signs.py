@@ -169,7 +169,6 @@ def _named(point: OperatingAt) -> str:
 
 
 def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
-    """What small changes at one operating point say."""
     voltage, frequency = _answers(subject, steps, point)
     figures: dict[str, Any] = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
@@ -206,7 +205,6 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
 
 
 def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[DroopAnswer, DroopAnswer]:
-    """To lower voltage, and to lower frequency."""
     omega = 2 * pi * _rated(subject) * FREQUENCY
     return (
         _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * VOLTAGE, complex)),
@@ -245,7 +243,6 @@ def _answer(
 
 
 def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
-    """What one change brought, in the windows at the end."""
     late, later = (complex(power[window].mean()) for window in windows[1:])
     far = float(np.nan_to_num(np.abs(power), nan=np.inf).max())
     part = len(power) // 3
@@ -276,7 +273,6 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
 
 
 def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> tuple[str, str] | None:
-    """Name of a fault, and what shows it."""
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
     for answer, kind in zip((voltage, frequency), ("voltage", "frequency"), strict=True):

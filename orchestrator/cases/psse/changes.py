@@ -25,12 +25,8 @@ def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
 
     Parameters
     ----------
-    raw
-        The file.
     allowed
         Kinds of `LEFT_OUT` that the user lets go.
-    changes
-        Where they are noted.
     """
     unknown = [kind for kind in allowed if kind not in LEFT_OUT]
     if unknown:

@@ -50,10 +50,6 @@ def machine_models(
 
     Parameters
     ----------
-    records
-        Of the DYR file.
-    machines
-        Of the RAW file.
     leaving_out
         Models whose records may be left out; their generators keep what the case says of that part.
     replaced
@@ -158,7 +154,6 @@ def _followed(
 def _doubts(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[tuple[str, str, str]]:
-    """What two files say of one machine and should be the same."""
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -177,7 +172,6 @@ def _sets(name: str) -> set[str]:
 
 
 def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
-    """The model of a machine, of the parts that have records."""
     if "converter" in parts:
         coupling = {"RL": machine.source.real, "XL": machine.source.imag}
         return MachineModel({}, {**coupling, **values}, parts["converter"])
@@ -189,7 +183,6 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
-    """Parameters that a record sets."""
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
     found: dict[str, float] = {}
     for field in known.fields:

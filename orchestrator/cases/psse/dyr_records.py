@@ -29,12 +29,10 @@ class DynamicRecord:
 
     @property
     def place(self) -> str:
-        """File and line."""
         return f"{self.file}, line {self.line}"
 
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
-    """Records of a DYR file."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
     if (size := path.stat().st_size) > MOST_BYTES:
@@ -67,7 +65,6 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
 
 
 def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
-    """Values of a record by the names of its fields."""
     following = next((text for text in record.values[2:] if text.upper() in known), None)
     if following is not None:
         raise InputError(

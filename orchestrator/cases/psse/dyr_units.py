@@ -47,8 +47,6 @@ def with_records(
     ----------
     rows, machines
         In the same order.
-    path
-        Of the DYR file.
     leaving_out
         Models whose records may be left out.
     without

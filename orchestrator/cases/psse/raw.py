@@ -34,10 +34,6 @@ class Machine:
 
     Attributes
     ----------
-    bus, name
-        Number of its bus, and its identifier there.
-    line
-        Of its record.
     p_mw, v_pu
         Active power [MW], and voltage that it holds at its bus [pu].
     rating_mva
@@ -76,14 +72,11 @@ class RawNetwork:
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
-    """Read the network of a RAW file."""
     raw = read_records(path)
     return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
 
 
 class _Reading:
-    """One file on its way to tables."""
-
     def __init__(self, raw: RawFile, changes: Changes, keep_load_parts: bool) -> None:
         self._raw, self._changes, self._keep_load_parts = raw, changes, keep_load_parts
         self._rows: dict[int, list[float]] = {}

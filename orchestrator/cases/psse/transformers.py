@@ -33,8 +33,6 @@ class Transformer:
     ----------
     record
         Its first line.
-    windings
-        Two or three.
     impedances
         Between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system].
     magnetisation
@@ -60,8 +58,6 @@ def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transf
 
     Parameters
     ----------
-    raw
-        The file.
     voltages
         Bus → base voltage [kV]; 0 where the file leaves it open.
     """

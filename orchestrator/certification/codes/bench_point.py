@@ -27,10 +27,6 @@ class BenchTask:
 
     Attributes
     ----------
-    row
-        Name of the row.
-    case, fingerprint
-        Path of the case file, and its fingerprint.
     key
         Name of the result's file: a hash of everything that the result depends on.
     changes
@@ -92,13 +88,7 @@ class BenchResult:
 
 
 def compute_row(task: BenchTask) -> BenchResult:
-    """Run a row; a failure becomes part of the result.
-
-    Raises
-    ------
-    InputError
-        As `same_case`.
-    """
+    """Run a row; a failure becomes part of the result."""
     case = same_case(task.case, task.fingerprint)
     result, begin = BenchResult(task.row), _processor_time()
     with failure_kept(result), alone():

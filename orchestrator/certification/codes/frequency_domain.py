@@ -69,7 +69,6 @@ class AskedStiffness:
         return self.found >= self.value
 
     def sentence(self) -> str:
-        """The comparison in words."""
         low, high = self.band
         return (
             f"{OPPOSED:g} pu against {np.rad2deg(JUMP):g}° at SCR {SCR:g} (MISO, ERCOT) asks, by this program's "
@@ -88,8 +87,6 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
 
     Parameters
     ----------
-    found
-        What was measured.
     f_n
         Rated frequency [Hz].
     """
@@ -104,8 +101,6 @@ def measure_stiffness(request: CertificationRequest, f_n: float, report: Callabl
 
     Parameters
     ----------
-    request
-        The converter, its binding and its values.
     f_n
         Rated frequency [Hz].
     report
@@ -162,14 +157,8 @@ def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> li
 
     Parameters
     ----------
-    found
-        What was measured.
-    model
-        Name of the converter.
     f_n
         Rated frequency [Hz].
-    folder
-        Where the files go.
     """
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []

@@ -93,10 +93,6 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
 
     Parameters
     ----------
-    name
-        What a screen reader reads out.
-    x_label, y_label
-        Of the axes, with their units.
     curves
         At least one, with a point at least.
     height
@@ -129,8 +125,6 @@ def complex_plane(
 
     Parameters
     ----------
-    name
-        What a screen reader reads out.
     marks
         Eigenvalues: x [1/s], y [Hz].
     trajectories
@@ -188,7 +182,6 @@ def thinned(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> str:
-    """Names with their colours."""
     items = "".join(f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries)
     return f'<ul class="legend">{items}</ul>'
 

@@ -22,14 +22,8 @@ class Results:
 
     Attributes
     ----------
-    case
-        The case of the run.
     scenarios
         One summary a scenario, as in ``summary.json``.
-    modes, participation, step_sizes
-        Rows of the files of that name.
-    trajectories, linear
-        By scenario.
     sweeps, designs
         Datasets and calculation sheets that were found beside the run.
     ended_early
