@@ -258,7 +258,10 @@ def test_modes_of_an_fmu_that_cannot_be_perturbed(foreign):
     inside, perturbed = results
     assert inside.operating_point.residual < 1e-12
     assert inside.model.names == perturbed.model.names
-    assert abs(inside.electromechanical.eigenvalue - perturbed.electromechanical.eigenvalue) < 1e-6
+    # No system without its POD can be made of a closed FMU, so that two modes keep fitting the name.
+    assert inside.electromechanical is None
+    assert "those at 0.8116 Hz and 0.3524 Hz fit it about equally" in inside.unnamed["electromechanical"]
+    assert min(abs(m.eigenvalue - perturbed.electromechanical.eigenvalue) for m in inside.modes) < 1e-6
     # Above 1000 1/s the FMU's own Runge-Kutta steps of 100 µs tell: 10 000 1/s becomes 9808 1/s in them.
     slow = [v for v in eigenvalues(perturbed.model) if abs(v) < 500]
     found = eigenvalues(inside.model)

@@ -187,18 +187,18 @@ def _stale(subject: Subject, *, declared: bool) -> str | None:
         for name in claimed:
             if name in seen[output]:
                 continue
-            jumps = [_jump(subject, output, name, size) for size in (h, h / 8)]
-            if jumps[0] > 1e-6 and jumps[1] > 0.8 * jumps[0]:
+            (jump, size), (short, _) = (_jump(subject, output, name, step) for step in (h, h / 8))
+            if jump > 1e-6 * max(size, 1.0) and short > 0.8 * jump:
                 follows = "is declared to follow" if declared else "follows"
                 return (
-                    f"{output} {follows} {name} at once, but not when read: it jumps by {jumps[1]:.3g} in the next, "
+                    f"{output} {follows} {name} at once, but not when read: it jumps by {short:.3g} in the next, "
                     f"of {h / 8:g} s or of {h:g} s"
                 )
     return None
 
 
-def _jump(subject: Subject, output: str, name: str, step_size: float) -> float:
-    """How far one step moves an output after an input moved, beyond where it goes without."""
+def _jump(subject: Subject, output: str, name: str, step_size: float) -> tuple[float, float]:
+    """How far one step moves an output after an input moved, beyond where it goes without, and the output's size."""
     ends = []
     for on in (0.0, 1.0):
         deviation = np.zeros(len(subject.inputs))
@@ -207,7 +207,7 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> float:
             running.feed(deviation)
             running.step(step_size)
             ends.append(running.component.get([output])[output])
-    return abs(ends[1] - ends[0])
+    return abs(ends[1] - ends[0]), abs(ends[0])
 
 
 @check("step_invariance", "Is its answer the same with other communication steps?", needs=(*SAME, "reading", "delay"))
