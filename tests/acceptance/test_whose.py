@@ -235,7 +235,8 @@ def test_an_fmu_that_leaves_a_process_with_each_instance_gets_a_verdict(tmp_path
 
 def faults_of(function):
     """Names of faults that calls of a function state, in all modules: one, or one of two by a condition."""
-    for path in (*Path("orchestrator/acceptance").rglob("*.py"), *Path("orchestrator/fmi").rglob("*.py")):
+    rooms = ("acceptance", "binding", "fmi")
+    for path in (p for room in rooms for p in Path("orchestrator", room).rglob("*.py")):
         for call in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") == function:
                 inside = [part for a in call.args[1:2] for part in (a, *ast.walk(a))]
@@ -245,7 +246,7 @@ def faults_of(function):
 
 def faults_returned():
     """First words of pairs of texts that functions of the checks return: a fault, and what shows it."""
-    for path in Path("orchestrator/acceptance/checks").glob("*.py"):
+    for path in (*Path("orchestrator/acceptance/checks").glob("*.py"), *Path("orchestrator/binding").glob("*.py")):
         for part in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(part, ast.FunctionDef) and "tuple[str, str]" in ast.unparse(part.returns or ast.Constant("")):
                 for end in ast.walk(part):

@@ -288,7 +288,7 @@ class _Reading:
             least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
             p_least, p_most = _limits(record, "PB", status + 3, "PT", status + 2, "MW")
             feeds = record.number(2, "PG", 0.0)
-            if not p_least <= feeds <= p_most:
+            if not p_least <= feeds <= p_most and feeds <= rating:  # else the rating is asked about
                 text = f"PG is {feeds:g} MW, beyond the machine's limits, PB = {p_least:g} and PT = {p_most:g} MW"
                 self._changes.note(record.line, f"{text}: it feeds PG, and takes no part of an outage beyond")
             machines.append(
