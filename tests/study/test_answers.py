@@ -34,7 +34,8 @@ def result(findings=(), stable=True, events=("fault",), failure=None):
     case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(modes={})))
     prepared = SimpleNamespace(title="S", events=events, stop_time=5.0, case=case)
     modes = SimpleNamespace(
-        prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={}, swing_of=lambda _: (["sg1"], ["sg2"]),
+        prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
+        swing_of=lambda _: (["sg1"], ["sg2"]),
         stability=Stability(stable, mode, reason="" if stable else "not searched"),
     )  # fmt: skip
     return RunResult(modes, None, findings=list(findings), failure=failure)
