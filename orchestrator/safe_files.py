@@ -46,25 +46,12 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file at once.
-
-    Raises
-    ------
-    ResultsError
-        As `replacing`.
-    """
     with replacing(path) as partial:
         partial.write_bytes(content)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file at once, in UTF-8 and with the lines' ends as they are.
-
-    Raises
-    ------
-    ResultsError
-        As `replacing`.
-    """
+    """Write a text file at once, in UTF-8 and with the lines' ends as they are."""
     write_bytes(path, text.encode("utf-8"))
 
 

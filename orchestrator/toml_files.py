@@ -1,5 +1,6 @@
 """TOML files that users write: how they are read, the form of their tables, and the errors that all of them share."""
 
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
                 "files of their own"
             )
         text = path.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
+        return text, parsed(text)
     except OSError as error:
         raise InputError(f"{source}: {subject} cannot be read: {error.strerror}; {remedy}") from error
     except tomllib.TOMLDecodeError as error:
@@ -46,10 +47,25 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f"{source}: it is not a TOML file: {error}") from error
-    except ValueError as error:  # Python's own words: it converts at most 4,300 digits
+    except ValueError as error:  # of `parsed`, or Python's own, which converts at most 4,300 digits
         raise InputError(f"{source}: a whole number in it has too many digits to be read; shorten it") from error
     except RecursionError as error:
         raise InputError(f"{source}: its brackets nest too deeply to be read; {subject} nests at most five") from error
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """What a text in TOML says; ValueError and RecursionError where it cannot be read, or not be computed with."""
+    found = tomllib.loads(text)
+    _check_whole_numbers(found)
+    return found
+
+
+def _check_whole_numbers(value: Any) -> None:
+    if isinstance(value, dict | list):
+        for inner in value.values() if isinstance(value, dict) else value:
+            _check_whole_numbers(inner)
+    elif isinstance(value, int) and abs(value) > sys.float_info.max:
+        raise ValueError(f"a whole number has {value.bit_length()} bits; it must be one that a computation takes")
 
 
 def fault_of(detail: Any) -> str:
@@ -59,5 +75,11 @@ def fault_of(detail: Any) -> str:
             return "this key is unknown; check its spelling, or remove it"
         case "missing":
             return "this key is missing; add it"
+        case "string_type":
+            return "it must be a text; write it in quotes"
+        case "dict_type" | "model_type" | "model_attributes_type":
+            return "it must be a table: keys with values, in braces or below a heading of their own"
+        case "list_type" | "tuple_type":
+            return "it must be a list; write it in square brackets"
         case _:
-            return str(detail["msg"]).removeprefix("Value error, ")
+            return str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "it must be")

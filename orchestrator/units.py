@@ -48,6 +48,10 @@ def _built_registry() -> Any:
     return registry
 
 
+LARGEST = 1e100
+"""Of a number in a file, below which products of some are numbers still."""
+
+
 def read_value(text: str) -> bool | float | str:
     """A truth value, a number, or text such as ``500 ms``, as options and ranges give it."""
     if text.lower() in ("true", "false"):

@@ -1,4 +1,4 @@
-"""Who calls a function with many arguments reads in its docstring what each of them is."""
+"""On the public face and on models docstrings are complete; inside they stand only where they tell something."""
 
 import ast
 import re
@@ -9,7 +9,21 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PLACES = ("orchestrator/api", "gfor_fmu")
-"""The public face and the product's models. Inside, a docstring says what name and types do not."""
+"""The public face and the product's models."""
+
+INSIDE = ("orchestrator", "fmus/control_dll", "fmus/toolchain", "fmus/vendor_dll")
+
+FILLER = re.compile(
+    r"(As (for )?`[\w.]+`( (has|gives|does) (it|them))?|Arguments of ``gfor [\w -]+``"
+    r"|(Of|For|In) the (command|same|study|run|case|model|system|component|scenario)s?)\.?"
+)
+"""Sentences that say nothing of what they stand at."""
+
+LITTLE_WORDS = frozenset(
+    re.findall(
+        r"\w+", "a all an and are as at by for from has in is it its of on one or that the their this to was what with"
+    )
+)
 
 MANY = 4
 """From so many arguments on, names and types alone no longer say enough."""
@@ -58,3 +72,54 @@ def test_docstring_explains_every_argument(function):
     assert sorted(explained(docstring)) == sorted(arguments(function)), (
         f"line {function.lineno}: list every argument of {function.name} under Parameters, and none besides"
     )
+
+
+def documented(node):
+    """Functions and classes inside of a module that have more to them than a docstring, with its text."""
+    for inner in ast.walk(node):
+        if isinstance(inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and len(inner.body) > 1:
+            text = ast.get_docstring(inner)
+            if text and not (isinstance(inner.body[1], ast.Expr) and isinstance(inner.body[1].value, ast.Constant)):
+                yield inner, text
+
+
+def words(text):
+    return {word.lower().rstrip("s") for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", text)}
+
+
+def says_nothing(node, text):
+    """Whether a docstring is a filler, or has no word that the name and the arguments do not have."""
+    named = words(node.name) | (set() if isinstance(node, ast.ClassDef) else words(" ".join(arguments(node))))
+    return bool(FILLER.fullmatch(text)) or not (words(text) - named - {word.rstrip("s") for word in LITTLE_WORDS})
+
+
+def inside():
+    for package in INSIDE:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            if not path.is_relative_to(ROOT / "orchestrator/api"):
+                yield path.relative_to(ROOT).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def test_inside_a_docstring_says_what_the_name_does_not():
+    empty = [
+        f"{place}:{node.lineno} {node.name}: {text!r}"
+        for place, module in inside()
+        for node, text in documented(module)
+        if says_nothing(node, cleandoc(text))
+    ]
+    assert not empty, "say what the name does not, or nothing:\n" + "\n".join(empty)
+
+
+@pytest.mark.parametrize(
+    ("source", "empty"),
+    [
+        ('def run(x):\n    "Of the command."\n    return x', True),
+        ('def pointer(self):\n    "As `Component` has it."\n    return 1', True),
+        ('def read_details(path):\n    "Read the details."\n    return 1', True),
+        ('def read_details(path):\n    "Read the details [pu]."\n    return 1', False),
+        ('def zeros(values):\n    "Values below 1e-9."\n    return 1', False),
+        ('def end(self):\n    "The end."', False),
+    ],
+)
+def test_an_empty_docstring_is_told_from_one_that_says_something(source, empty):
+    assert any(says_nothing(node, text) for node, text in documented(ast.parse(source))) == empty

@@ -6,6 +6,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from fmus.toolchain.catalogue import model_names
 from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.acceptance.runner import FILE_CHECKS
@@ -65,3 +67,14 @@ def test_nothing_lies_at_the_top_that_has_no_place_there():
     done = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     tops = {"".join(name.partition("/")[:2]) for name in done.stdout.splitlines() if not name.startswith(".")}
     assert tops <= files | folders
+
+
+@pytest.mark.parametrize("command", ["compare", "verify"])
+def test_commands_that_read_results_start_without_what_computes_them(command):
+    """Each of these takes half a second or more, and reading and judging kept results needs none."""
+    code = (
+        f"import sys, orchestrator.cli.{command}\n"
+        "heavy = {'scipy.optimize', 'scipy.signal', 'scipy.stats', 'matplotlib', 'casadi'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

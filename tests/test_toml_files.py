@@ -48,7 +48,7 @@ class Gain(Table):
     [
         ({}, "this key is missing; add it"),
         ({"K": 1.0, "k": 2.0}, "this key is unknown; check its spelling, or remove it"),
-        ({"K": "much"}, "Input should be a valid number, unable to parse string as a number"),
+        ({"K": "much"}, "it must be a valid number, unable to parse string as a number"),
     ],
 )
 def test_an_entry_that_is_wrong(given, words):

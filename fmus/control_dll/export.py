@@ -33,8 +33,6 @@ class ControlDllError(ValueError):
 
 @dataclass(frozen=True)
 class WrittenDll:
-    """What was written: libraries by platform, and the data sheet."""
-
     libraries: dict[str, Path]
     sheet: Path
 
@@ -45,7 +43,6 @@ def control_names() -> tuple[str, ...]:
 
 
 def control_part_of(name: str) -> ControlPart:
-    """The control part of a converter."""
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             part = entry.load()()

@@ -16,7 +16,6 @@ _RULES = {
 
 
 def data_sheet(part: ControlPart, sample_time: float) -> str:
-    """The sheet as Markdown."""
     model = part.model
     values = {p.name: p.start for p in model.parameters}
     sections = [

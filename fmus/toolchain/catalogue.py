@@ -16,7 +16,6 @@ SKETCH = "sketch"
 
 
 def model_names() -> tuple[str, ...]:
-    """Names of all models, sorted."""
     return tuple(sorted(_entries()))
 
 

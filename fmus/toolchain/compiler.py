@@ -92,13 +92,7 @@ def compile_here(*files: Path) -> Path:
 
 
 def prebuild(*files: Path) -> None:
-    """Compile files of C, as one, for every platform into the folder that a released wheel takes along.
-
-    Raises
-    ------
-    RuntimeError
-        As `compile_library`.
-    """
+    """Compile files of C, as one, for every platform into the folder that a released wheel takes along."""
     source = joined_source(*files)
     for platform in TARGETS:
         library = _prebuilt(source, platform)

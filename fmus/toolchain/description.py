@@ -34,8 +34,6 @@ def model_description(
 
     Parameters
     ----------
-    model
-        What the FMU computes.
     guid, identifier
         As in the standard; the identifier also names the binaries.
     tool

@@ -21,8 +21,6 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
 
     Parameters
     ----------
-    model
-        What the FMU computes.
     token, identifier
         As in the standard; the identifier also names the binaries.
     tool

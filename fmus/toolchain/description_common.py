@@ -46,10 +46,6 @@ def root_element(model: Model, version: str, identity: Mapping[str, str], tool: 
 
     Parameters
     ----------
-    model
-        What the FMU computes.
-    version
-        Of FMI.
     identity
         The attribute that tells one FMU from another.
     tool

@@ -15,8 +15,6 @@ class Recipe(Protocol):
 
     Attributes
     ----------
-    model
-        The exported model.
     digest
         Hash over everything that the FMU is made from [hex].
     cache_prefix

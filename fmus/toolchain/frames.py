@@ -42,7 +42,6 @@ class Phasor:
         return Phasor(self.re / other, self.im / other)
 
     def conjugate(self) -> Phasor:
-        """The complex conjugate."""
         return Phasor(self.re, -self.im)
 
     def times_j(self) -> Phasor:
@@ -50,7 +49,6 @@ class Phasor:
         return Phasor(-self.im, self.re)
 
     def magnitude(self) -> ca.SX:
-        """Its length."""
         return ca.sqrt(self.re**2 + self.im**2)
 
     def angle(self) -> ca.SX:
@@ -113,11 +111,9 @@ class QdState:
 
     @property
     def value(self) -> Phasor:
-        """The two states as a phasor."""
         return Phasor(self.q, -self.d)
 
     def set_derivative(self, m: ModelBuilder, rate: Phasor) -> None:
-        """Give both states their rates of change."""
         m.derivative(self.q, rate.re)
         m.derivative(self.d, -rate.im)
 
@@ -127,8 +123,6 @@ def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> Q
 
     Parameters
     ----------
-    m
-        The model.
     name
         Of both states, before ``_q`` and ``_d``.
     initial

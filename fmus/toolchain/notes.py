@@ -33,8 +33,6 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
     entry
         The catalogue's entry of the model. Of a model from another distribution nothing is noted, since nobody knows
         what its code imports.
-    asked
-        What is to be known of it, with all arguments.
     find
         Finds it [JSON's types].
     """
@@ -71,7 +69,6 @@ def note_of(entry: EntryPoint, asked: str) -> Path | None:
 
 
 def machine() -> tuple[str, ...]:
-    """What runs the toolchain on this machine."""
     return (sys.platform, platform.machine(), sys.version)
 
 

@@ -77,14 +77,10 @@ def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) 
 
     Parameters
     ----------
-    m
-        The device's model.
     name
         Of both states, before ``_q`` and ``_d``.
     value, start
         In the device's frame [pu], a function of states; and its value at the operating point.
-    text
-        What it is.
     """
     moving = []
     for part, now, initial in (("q", value.re, start.re), ("d", -value.im, -start.im)):
@@ -104,8 +100,6 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
 
     Parameters
     ----------
-    m
-        The device's model.
     emf, start
         In the device's frame [pu], a function of states; and its value at the operating point.
     angle, rate
@@ -129,10 +123,6 @@ def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, im
 
     Parameters
     ----------
-    m
-        The device's model.
-    port
-        Of the device.
     emf
         In the network frame [pu], as `source_emf` returns it.
     impedance

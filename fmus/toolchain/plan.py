@@ -34,7 +34,6 @@ class Plan:
         ]
 
     def tables(self) -> dict[str, list[int]]:
-        """The lists by the names that they have in a kernel."""
         return {
             "PERM": self.order,
             "ROW": self.row,

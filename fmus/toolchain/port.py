@@ -42,8 +42,6 @@ class DevicePort(OperatingPoint):
 
     Attributes
     ----------
-    v_0, i_0, omega_b
-        As `OperatingPoint`.
     v
         Bus voltage, network frame [pu].
     current_scale
@@ -83,8 +81,6 @@ def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> Dev
 
     Parameters
     ----------
-    m
-        The device's model.
     v
         Bus voltage, network frame [pu].
     P_0

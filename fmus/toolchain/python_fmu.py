@@ -87,7 +87,6 @@ class PythonFmu:
 
 
 def _slave_data(model: Model) -> dict[str, object]:
-    """Data of the model for the slave."""
     first_input = len(model.parameters) + len(model.calculated)
     start = {index: p.start for index, p in enumerate(model.parameters)}
     start |= {first_input + index: i.start for index, i in enumerate(model.inputs)}

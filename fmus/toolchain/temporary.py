@@ -54,7 +54,6 @@ def own_folder(kind: str) -> Path:
 
 
 def _locked(new: Path) -> Path:
-    """A new folder under the name of those that have their lock."""
     lock = os.open(new, os.O_RDONLY | os.O_CLOEXEC)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

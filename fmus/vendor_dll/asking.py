@@ -19,6 +19,7 @@ BEFORE_IT_STARTS = 300.0
 _OWN_DOING = 0.5
 """Processor time, as a part of the time it had, from which a DLL counts as one that never comes back."""
 
+_START = tuple(f"Model_{call} runs" for call in ("FirstCall", "CheckParameters", "Initialize"))
 _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGXCPU", "SIGSTOP"))
 """Signals by which others end a process: the system that lacks memory, a person."""
 
@@ -33,16 +34,17 @@ class Answer:
         Its answer; empty where it gave none.
     end
         How it ended where it gave none, in words that follow "the process that reads it".
-    why
-        What that means, and the remedy.
     passing
         The reason lies in this machine, so that another call may find more.
+    in_its_start
+        The DLL's own code ended it before the first sample.
     """
 
     found: dict[str, Any] = field(default_factory=dict)
     end: str = ""
     why: str = ""
     passing: bool = False
+    in_its_start: bool = False
 
 
 def note_beside(answer: Path) -> Path:
@@ -55,8 +57,6 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
 
     Parameters
     ----------
-    path
-        The DLL.
     reader
         Module that is run for it.
     longest
@@ -124,7 +124,6 @@ def _wait(process: "subprocess.Popen[bytes]", note: Path, longest: float) -> boo
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End it, and what it started."""
     with contextlib.suppress(OSError):
         if hasattr(os, "killpg"):
             os.killpg(process.pid, signal.SIGKILL)
@@ -166,7 +165,7 @@ def _out_of_time(doing: str, longest: float, used: float) -> Answer:
 
 
 def _ended(doing: str, code: int) -> Answer:
-    name = f"exit code {code}"
+    name, started = f"exit code {code}", doing in _START
     with contextlib.suppress(ValueError):
         name = signal.Signals(-code).name if code < 0 else name
     end = f"ends with {name}" + (f" while {doing}" if doing else "")
@@ -179,5 +178,6 @@ def _ended(doing: str, code: int) -> Answer:
     elif doing.startswith("what"):
         why = "its structures are of another layout; ask its author for a DLL of the interface's layout"
     else:
-        why = "it crashes there or ends its own process; ask its author for a DLL that does not"
-    return Answer(end=end, why=why)
+        why = "it crashes there or ends its own process, in which no file is seen but those that its text parameters "
+        why += "name; name the one that it needs, or ask its author for a DLL that does not"
+    return Answer(end=end, why=why, in_its_start=started)

@@ -56,8 +56,6 @@ def converter_circuit(name: str, filter_kind: FilterKind, bridge: BridgeKind) ->
 
     Parameters
     ----------
-    name
-        Of the model.
     filter_kind
         ``L``: one inductor. ``LC``: an inductor and a capacitor. ``LCL``: a second inductor, before the transformer.
     bridge

@@ -46,8 +46,6 @@ def dll_description(
         As in the standard; the identifier also names the binaries.
     tool
         Name and version for ``generationTool``.
-    circuit
-        What lies around the controller, if anything does.
     """
     attributes = {
         "fmiVersion": "2.0",

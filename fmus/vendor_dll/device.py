@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -42,14 +43,8 @@ class Route:
 
     Attributes
     ----------
-    place
-        In the DLL's inputs or outputs.
-    quantity
-        Of the circuit.
     base
         Parameter of the circuit with which it is multiplied; None for none.
-    factor
-        Of the unit, with its sign.
     """
 
     place: Place
@@ -64,18 +59,12 @@ class Device:
 
     Attributes
     ----------
-    filter_kind, bridge
-        As `converter_circuit`.
-    measured
-        What the DLL is told.
     driven
         The three signals of the bridge.
     constants
         Start values of inputs that the circuit does not give, by name.
     parameters
         Values of the DLL's parameters, instead of its defaults.
-    texts
-        Those of its parameters that are text.
     circuit
         Default values of the circuit's parameters.
     delay
@@ -105,7 +94,6 @@ class Device:
     voltage_per_q: float = 0.2
 
     def around(self, name: str) -> Model:
-        """The circuit, as a model of this name."""
         made = converter_circuit(name, self.filter_kind, self.bridge)
         known = {p.name: p for p in made.parameters if p.type == "Real"}
         for key, value in self.circuit.items():
@@ -116,14 +104,6 @@ class Device:
                 raise DeviceFileError(f"[circuit] {key} = {value}; allowed is {low} to {high}")
         changed = [replace(p, start=self.circuit[p.name]) if p.name in self.circuit else p for p in made.parameters]
         return replace(made, parameters=tuple(changed))
-
-    def with_parameters(self, interface: DllInterface) -> DllInterface:
-        """The DLL's interface with these values as defaults."""
-        rows = [
-            replace(row, default=self.parameters[row.name]) if row.name in self.parameters else row
-            for row in interface.parameters
-        ]
-        return replace(interface, parameters=tuple(rows))
 
 
 def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
@@ -144,7 +124,6 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
 
 
 def device_of(path: Path, table: Mapping[str, Any], interface: DllInterface) -> Device:
-    """Work out a device's file for the DLL that it names."""
     try:
         return _Reader(table, interface).device(path.parent / table["dll"])
     except ValueError as error:
@@ -252,7 +231,7 @@ class _Reader:
             raise ValueError('[bridge]: give one of modulation = ["m_a", "m_b", "m_c"] and voltage = [...], and a unit')
         (kind,) = kinds
         names = part[kind]
-        if not isinstance(names, list) or len(names) != 3 or len({str(name) for name in names}) != 3:
+        if not isinstance(names, list) or [type(name) for name in names] != [str] * 3 or len({*names}) != 3:
             raise ValueError(f"[bridge] {kind}: three different outputs of the DLL are needed, for phases a, b and c")
         places = {place.name: place for place in layout(self._interface.outputs).places if place.type.kind != "String"}
         routes = []
@@ -307,7 +286,6 @@ class _Reader:
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Names with their dots, and values."""
     for name, value in table.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{name}.")
@@ -316,7 +294,7 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _finite(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
         raise ValueError(f"{where} = {value!r}; it must be a finite number")
     return float(value)
 
@@ -338,7 +316,7 @@ def _sign(where: str, entry: Mapping[str, Any]) -> float:
 
 
 def _factor(where: str, kind: str, unit: str) -> float:
-    if unit not in _PARTS[kind]:
+    if not isinstance(unit, str) or unit not in _PARTS[kind]:
         known = ", ".join([*_PARTS[kind], "pu"])
         raise ValueError(
             f"{where}: the unit {unit!r} is none of a {kind}; say what it is with unit = ..., one of: {known}"

@@ -1,11 +1,12 @@
 """An IEEE/CIGRE DLL as an FMU for co-simulation by FMI 2.0."""
 
 import hashlib
+import json
 import re
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version as version_of
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from fmus.vendor_dll.device import Device
 from fmus.vendor_dll.interface import DATA_TYPES, DllInterface
 from fmus.vendor_dll.source import device_variables, host_source, host_variables
 from fmus.vendor_dll.state_trial import Trial
+from fmus.vendor_dll.text_files import hidden, places
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
 _LONGEST = 60
@@ -37,12 +39,14 @@ class DllError(ValueError):
 
 @dataclass(frozen=True)
 class VendorDll:
-    """A vendor's DLL, as it describes itself."""
+    """A vendor's DLL, as it describes itself, with the files that its text parameters name, and where it was looked."""
 
     path: Path
     interface: DllInterface
     trial: Trial
     platform: str
+    files: Mapping[str, Path] = field(default_factory=dict)
+    looked: tuple[Path, ...] = ()
 
     @property
     def identifier(self) -> str:
@@ -55,8 +59,21 @@ READER = "fmus.vendor_dll.reading"
 """Module whose process reads a DLL."""
 
 
-def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -> VendorDll:
+def read_dll(
+    path: Path | str,
+    reader: str = READER,
+    also: Sequence[str] = (),
+    texts: Mapping[str, str] | None = None,
+    folder: Path = Path(),
+) -> VendorDll:
     """Read a DLL in a process of its own, and try how it keeps its state.
+
+    Parameters
+    ----------
+    path, reader, also
+        The DLL, the module whose process reads it, and further platforms that this machine runs.
+    texts, folder
+        Values of text parameters, and where the files lie that they name.
 
     Raises
     ------
@@ -65,20 +82,29 @@ def read_dll(path: Path | str, reader: str = READER, also: Sequence[str] = ()) -
     """
     path = Path(path).absolute()
     platform = platform_of(path, also)
-    asked = ask(path, reader, _LONGEST, "--try")
-    answer = asked.found
-    if not answer:
-        again = ask(path, reader, _LONGEST)
-        if not again.found:
-            raise DllError(f"{path.name}: the process that reads it {again.end}: {again.why}")
-        why = f"with inputs that move, the process that ran it {asked.end}: {asked.why}"
-        answer = again.found | {"trial": Trial("not tried", why=why, passing=asked.passing).as_json()}
-    if "error" in answer:
-        raise DllError(f"{path.name}: {answer['error']}")
-    interface = DllInterface.from_json(answer["interface"])
-    if faults := interface.faults():
-        raise DllError(f"{path.name}: {'; '.join(faults)}; its author must mend that")
-    return VendorDll(path, interface, Trial.from_json(answer["trial"]), platform)
+    given, files = {name: value for name, value in (texts or {}).items() if isinstance(value, str)}, dict[str, Path]()
+    while True:
+        asked = ask(path, reader, _LONGEST, json.dumps(given | {name: str(file) for name, file in files.items()}))
+        answer = asked.found
+        if not answer:
+            again = ask(path, reader, _LONGEST)
+            if not again.found:
+                raise DllError(f"{path.name}: the process that reads it {again.end}: {again.why}")
+            why = f"with inputs that move, the process that ran it {asked.end}: {asked.why}"
+            answer = again.found | {"trial": Trial("not tried", why=why, passing=asked.passing).as_json()}
+        if "error" in answer:
+            raise DllError(f"{path.name}: {answer['error']}")
+        interface = DllInterface.from_json(answer["interface"])
+        if faults := interface.faults():
+            raise DllError(f"{path.name}: {'; '.join(faults)}; its author must mend that")
+        looked = places(interface, given, path, folder)
+        named = {name: place for name, place in looked.items() if place.is_file()}
+        if named == files:
+            break
+        files = named  # known from what it declares; now it is run with them
+    if asked.in_its_start and (unseen := hidden(interface, given, files)):
+        raise DllError(f"{path.name}: the process that runs it {asked.end}; {unseen}")
+    return VendorDll(path, interface, Trial.from_json(answer["trial"]), platform, files, tuple(looked.values()))
 
 
 def platform_of(path: Path, also: Sequence[str] = ()) -> str:
@@ -123,10 +149,6 @@ def dll_fmu(
 
     Parameters
     ----------
-    dll
-        The DLL, as it was read.
-    destination
-        The folder.
     texts
         Value of parameters that are text; by default the DLL's own.
     device
@@ -141,29 +163,38 @@ def dll_members(
     """Members of the archive, by path; otherwise as `dll_fmu`."""
     given = dict(texts or {}) | dict(device.texts if device else {})
     _check_texts(dll, given)
-    interface = device.with_parameters(dll.interface) if device else dll.interface
+    interface = dll.interface.with_defaults(device.parameters) if device else dll.interface
     circuit = device.around(dll.identifier) if device else None
     variables = host_variables(interface, dll.trial)
     if device and circuit:
         variables = device_variables(interface, dll.trial, device, circuit)
     _check_names(dll, [v.name for v in variables])
     content = dll.path.read_bytes()
-    file = re.sub(r"[^\w.-]", "_", dll.path.name, flags=re.ASCII)
+    file = _plain(dll.path.name)
     around = (device, circuit) if device and circuit else None
-    code = host_source(interface, dll.trial, given, file, variables, around)
+    carried = {name: f"text{n}/{_plain(at.name)}" for n, (name, at) in enumerate(dll.files.items())}
+    files = {f"resources/{carried[name]}": at.read_bytes() for name, at in dll.files.items()}
+    code = host_source(interface, dll.trial, given, carried, file, variables, around)
     tool = f"gfor-cosim {version_of('gfor-cosim')}"
 
     def described(guid: str) -> bytes:
         return dll_description(interface, dll.trial, variables, guid, dll.identifier, tool, circuit)
 
-    digest = digest_of(code, described("").decode(), hashlib.sha256(content).hexdigest(), *recipe())
+    digest = digest_of(code, described("").decode(), hashlib.sha256(content).hexdigest(), *recipe(),
+                       *(hashlib.sha256(held).hexdigest() for held in files.values()))  # fmt: skip
     guid, (target, *_) = guid_of(digest), TARGETS[dll.platform]
     host = compile_for(identity_source(guid, digest) + code, target, ENDINGS[dll.platform], _LIBRARIES[dll.platform])
     return {
         "modelDescription.xml": described(guid),
         f"binaries/{dll.platform}/{dll.identifier}{ENDINGS[dll.platform]}": host.read_bytes(),
         f"resources/{file}": content,
+        **files,
     }
+
+
+def _plain(name: str) -> str:
+    """A file's name with nothing in it that a path or C code would take for something else."""
+    return re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
 
 
 def _check_texts(dll: VendorDll, given: Mapping[str, str]) -> None:

@@ -4,8 +4,8 @@ Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of 
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 Number = int | float
@@ -19,8 +19,6 @@ class DataType:
     ----------
     name
         As the interface has it, such as ``real64``.
-    c
-        Type in C.
     size
         Of one value, which is also its alignment [bytes].
     kind
@@ -128,7 +126,6 @@ class DllInterface:
     calls: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """For another process."""
         return asdict(self)
 
     @classmethod
@@ -138,6 +135,10 @@ class DllInterface:
         rows = {"parameters": tuple(DllParameter(**row) for row in data["parameters"])}
         plain = {name: tuple(data[name]) for name in ("interface_version", "states", "calls")}
         return cls(**data | signals | rows | plain)
+
+    def with_defaults(self, values: Mapping[str, Number | str]) -> "DllInterface":
+        rows = tuple(replace(row, default=values.get(row.name, row.default)) for row in self.parameters)
+        return replace(self, parameters=rows)
 
     def faults(self) -> list[str]:
         """What the DLL declares that no host can run, in words; empty for a sound one."""
@@ -185,8 +186,6 @@ class Place:
     ----------
     name
         Of the signal or parameter, with its place in the array in brackets, from 1, where there is one.
-    row
-        The signal or parameter it belongs to.
     offset
         From the structure's start [bytes].
     """
@@ -197,7 +196,6 @@ class Place:
 
     @property
     def type(self) -> DataType:
-        """Of the value."""
         return DATA_TYPES[self.row.data_type]
 
 

@@ -62,7 +62,6 @@ class LocalLibrary:
         self._kept: list[Any] = []
 
     def has(self, name: str) -> bool:
-        """Whether it has a function."""
         return hasattr(self._library, name)
 
     def call(self, name: str, argument: int = 0) -> int:
@@ -75,7 +74,6 @@ class LocalLibrary:
         return found
 
     def read(self, address: int, size: int) -> bytes:
-        """A stretch of memory."""
         return c.string_at(address, size)
 
     def text(self, address: int | None) -> bytes:

@@ -1,12 +1,13 @@
 """Read what a DLL declares, and try how it keeps its state. Run as a process of its own: foreign code may do anything.
 
-``python -m fmus.vendor_dll.reading FILE ANSWER`` writes JSON to the file ANSWER; the DLL may print what it likes.
+``python -m fmus.vendor_dll.reading FILE ANSWER`` writes JSON to the file ANSWER; the DLL may print what it likes. With
+a third word, values of text parameters as JSON, the DLL is tried.
 """
 
 import ctypes as c
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -67,7 +68,6 @@ class _ModelInfo(c.Structure):
 
 
 def read_interface(library: Library) -> DllInterface:
-    """What a loaded DLL declares."""
     if not library.has("Model_GetInfo"):
         raise ValueError("it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL")
     found = library.call("Model_GetInfo")
@@ -130,10 +130,12 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
     )
 
 
-def read(library: Library, *, with_trial: bool) -> dict[str, Any]:
-    """What a DLL declares, and how it keeps its state where that is tried, as JSON has it."""
+def read(library: Library, texts: Mapping[str, str] | None) -> dict[str, Any]:
+    """What a DLL declares, and, where texts are given, how it keeps its state with them, as JSON has it."""
     interface = read_interface(library)
-    trial = tried(library, interface) if with_trial and not interface.faults() else Trial("not tried")
+    trial = (
+        Trial("not tried") if texts is None or interface.faults() else tried(library, interface.with_defaults(texts))
+    )
     return {"interface": interface.as_json(), "trial": trial.as_json()}
 
 
@@ -150,27 +152,21 @@ def _noting(path: Path) -> Note:
     return note
 
 
-def answer_for(load: Callable[[Note], Library], answer: Path, *, with_trial: bool) -> None:
-    """Write what `read` finds into a file, or the error.
-
-    Parameters
-    ----------
-    load
-        Loads the DLL, and notes what it does from then on.
-    answer
-        The file.
-    with_trial
-        As `read`.
-    """
+def answer_for(load: Callable[[Note], Library], answer: Path, texts: Mapping[str, str] | None) -> None:
+    """Write what `read` finds into a file, or the error."""
     found: dict[str, Any]
     try:
-        found = read(load(_noting(note_beside(answer))), with_trial=with_trial)
+        found = read(load(_noting(note_beside(answer))), texts)
     except (OSError, ValueError) as error:
         found = {"error": str(error)}
     answer.write_text(json.dumps(found), encoding="utf-8")
 
 
+def texts_in(words: Sequence[str]) -> dict[str, str] | None:
+    """Values of text parameters in the words of a command; None where nothing is to be tried."""
+    found: dict[str, str] | None = json.loads(words[3]) if len(words) > 3 else None
+    return found
+
+
 if __name__ == "__main__":
-    answer_for(
-        lambda note: LocalLibrary(Path(sys.argv[1]), note), Path(sys.argv[2]), with_trial=sys.argv[3:] == ["--try"]
-    )
+    answer_for(lambda note: LocalLibrary(Path(sys.argv[1]), note), Path(sys.argv[2]), texts_in(sys.argv))

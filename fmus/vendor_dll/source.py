@@ -165,6 +165,7 @@ def host_source(
     interface: DllInterface,
     trial: Trial,
     texts: Mapping[str, str],
+    carried: Mapping[str, str],
     vendor_file: str,
     variables: Sequence[HostVariable],
     around: tuple[Device, Model] | None = None,
@@ -173,7 +174,7 @@ def host_source(
     code = [(_C / name).read_text(encoding="utf-8") for name in ("library.c", "host.c")]
     functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
     export = (_TOOLCHAIN / "fmi.h").read_text(encoding="utf-8").split("typedef")[0]
-    tables = _tables(interface, trial, texts, vendor_file, variables)
+    tables = _tables(interface, trial, {**texts, **carried}, carried, vendor_file, variables)
     before, after = no_kernel_source(), no_circuit_source()
     if around is not None:
         device, circuit = around
@@ -182,7 +183,12 @@ def host_source(
 
 
 def _tables(
-    interface: DllInterface, trial: Trial, texts: Mapping[str, str], vendor_file: str, variables: Sequence[HostVariable]
+    interface: DllInterface,
+    trial: Trial,
+    texts: Mapping[str, str],
+    carried: Mapping[str, str],
+    vendor_file: str,
+    variables: Sequence[HostVariable],
 ) -> list[str]:
     """Declarations of the DLL's data."""
     regions = trial.regions
@@ -219,6 +225,8 @@ def _tables(
         f"static const struct variable VARIABLE[] = {{{', '.join(values)}}};",
         f"static const size_t TEXT_AT[] = {{{', '.join(str(place.offset) for place in words) or '0'}}};",
         f"static const char *const WORDS[] = {{{', '.join(map(c_string, given)) or '0'}}};",
+        f"static const char *const NAMES[] = {{{', '.join(c_string(place.name) for place in words) or '0'}}};",
+        f"static const char CARRIED[] = {{{', '.join(str(int(place.name in carried)) for place in words) or '0'}}};",
         f"static const size_t TEXT_INPUT_AT[] = {{{', '.join(str(place.offset) for place in text_inputs) or '0'}}};",
         'static const char *const EMPTY = "";',
         f"static const size_t REGION[][2] = {{{', '.join(f'{{{a}, {b}}}' for a, b in regions) or '{0, 0}'}}};",

@@ -51,7 +51,6 @@ class Trial:
     passing: bool = False
 
     def as_json(self) -> dict[str, Any]:
-        """For another process."""
         return asdict(self)
 
     @classmethod

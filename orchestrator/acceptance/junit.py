@@ -10,7 +10,6 @@ from orchestrator.safe_files import write_bytes
 
 
 def write_junit(report: AcceptanceReport, path: Path) -> None:
-    """Write a report."""
     results = report.results
     suite = Element(
         "testsuite",

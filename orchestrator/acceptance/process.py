@@ -21,7 +21,7 @@ from orchestrator.fmi import answers
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
-from orchestrator.fmi.limits import TO_BEGIN, Limits
+from orchestrator.fmi.limits import TO_BEGIN, Limits, crowded
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
@@ -111,8 +111,6 @@ class FmuProcess:
 
         Parameters
         ----------
-        instance
-            Its number in the process.
         into, out
             Value references that are set before a step, and read after it.
         rows
@@ -212,8 +210,8 @@ class FmuProcess:
                 raise self._died(call)
             if box.head.steps != steps:
                 steps, begin = box.head.steps, now
-            if now - begin > self._patience:
-                raise self._given_up(f"no answer within {self._patience:g} s in {self._where(call)}")
+            if now - begin > self._patience and now - begin > (allowed := self._patience * crowded()):
+                raise self._given_up(f"no answer within {allowed:.3g} s in {self._where(call)}")
             if now > self.deadline:
                 raise self._given_up(f"it takes too long, last in {self._where(call)}")
         if answered < 0:
@@ -244,7 +242,6 @@ class FmuProcess:
         return self._ended
 
     def close(self) -> None:
-        """End the process and remove what was written for it."""
         self._process.close()
         self._ended = self._ended or ProcessEndedError(ProcessFault.EXIT, "its process was closed")
 

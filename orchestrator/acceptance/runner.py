@@ -43,7 +43,7 @@ from orchestrator.errors import (
 from orchestrator.fmi.archive import extract, listed_twice
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
-from orchestrator.fmi.limits import Limits
+from orchestrator.fmi.limits import Limits, crowded
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection, missing
 from orchestrator.safe_files import file_hash
@@ -78,7 +78,6 @@ class AcceptanceReport:
 
     @property
     def failures(self) -> list[CheckResult]:
-        """Results of the checks that failed."""
         return [r for r in self.results if r.verdict is Verdict.FAIL]
 
     @property
@@ -90,6 +89,11 @@ class AcceptanceReport:
     def not_supported(self) -> list[str]:
         """Names of what this program or machine lacks for this FMU, each once."""
         return list(dict.fromkeys(r.fault for r in self.results if r.verdict is Verdict.NOT_SUPPORTED))
+
+    @property
+    def not_judged(self) -> list[str]:
+        """What passed or was remarked on without being judged as a whole, in words."""
+        return [str(r.figures["not_judged"]) for r in self.results if "not_judged" in r.figures]
 
     @property
     def binding_fails(self) -> bool:
@@ -144,10 +148,6 @@ def check_fmu(
 
     Parameters
     ----------
-    fmu
-        Its file.
-    binding
-        File of the binding; None where there is none.
     limits
         What the FMU may take; the usual limits where None.
     only
@@ -236,7 +236,11 @@ def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -
         )
         report.results.append(replace(result, remedy=remedy, whose=Whose.BINDING))
         return None
-    report.results.append(passed("binding", "all variables are there, with the units that it says"))
+    unlike = [f"the binding has {text}" for text in bound.unlike_delivered().values()]
+    report.results.append(
+        remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered") if unlike
+        else passed("binding", "all variables are there, with the units that it says")
+    )  # fmt: skip
     return bound
 
 
@@ -264,7 +268,7 @@ class _Runner:
     def run(self, names: list[str]) -> None:
         results = self._report.results
         for place, name in enumerate(names):
-            self._deadline = monotonic() + _PATIENCE * self._limits.seconds
+            self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
             results.append(self._with_whom(result))
             self._asked.append(name)
@@ -280,7 +284,7 @@ class _Runner:
         before = self._asked
         if result.fault != CRASH or not before or self._process is None or self._process.alive:
             return result
-        self._deadline = monotonic() + _PATIENCE * self._limits.seconds
+        self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
         if self._answer(CHECKS[result.check]).fault == CRASH:
             return result
         says = f"not so in a new process: what came before it, {', '.join(before[-_LAST:])}, damaged the FMU's memory"

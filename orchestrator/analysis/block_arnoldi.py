@@ -46,10 +46,6 @@ class BlockArnoldi:
     ----------
     apply
         The operator, for complex vectors as columns, shape (n, k).
-    size
-        Number n.
-    most
-        Largest number of vectors.
 
     Attributes
     ----------
@@ -97,7 +93,6 @@ class BlockArnoldi:
         return bool((near <= ROUGH).all()) and not any(map(wanted, np.flatnonzero(near > TOLERANCE).tolist()))
 
     def most_often(self, larger: int) -> int:
-        """How often the value that is there most often was found, among the largest ones."""
         among = self.values[:larger]
         apart = np.abs(among[:, None] - among[None, :])
         return int((apart <= _EQUAL * np.abs(among)).sum(axis=1).max(initial=0))

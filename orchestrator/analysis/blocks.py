@@ -1,6 +1,7 @@
 """Linearised components of a running system, with what connects them."""
 
 import copy
+import difflib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -53,12 +54,8 @@ class Blocks:
 
     Attributes
     ----------
-    parts
-        In how many parts a component does the communication step.
     period
         Communication steps after which the system repeats; 1 where each step is like every other.
-    sampled
-        Names of the sampled components among them.
     declared
         By component and output: the inputs that its FMU says it depends on directly.
     """
@@ -188,7 +185,6 @@ class Blocks:
 
     @property
     def how(self) -> dict[str, str]:
-        """How the linear model of every component was found."""
         return {name: c.source for name, c in self.components.items()}
 
     @property
@@ -239,14 +235,8 @@ def linearize_within(
     ----------
     master
         At the operating point; it is left as it was.
-    name
-        Of the component.
     step_size
         Communication step to linearise over [s].
-    inputs, observed, derivatives, idle
-        As `linearize_component`.
-    without_step, directional
-        As `Blocks`.
     """
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):
@@ -278,7 +268,10 @@ def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
     for full in names:
         component, _, variable = full.partition(".")
         if component not in found or variable not in master.components[component].description.variables:
-            raise InputError(f"linear model: there is no variable {full!r}; `gfor info` lists the variables of an FMU")
+            known = [f"{name}.{own}" for name, one in master.components.items() for own in one.description.variables]
+            near = difflib.get_close_matches(full, known, 3)
+            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor info` lists the variables of an FMU"
+            raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found
 

@@ -24,8 +24,6 @@ from orchestrator.fmi.linear_model import EmbeddedModel
 
 
 class StepMap(NamedTuple):
-    """A, B, C and D of one component over one communication step."""
-
     A: Matrix
     B: Matrix
     C: Matrix
@@ -100,8 +98,6 @@ def linearize_component(
 
     Parameters
     ----------
-    exchange
-        The component, at its operating point, with its connected inputs and outputs.
     time
         Of the operating point [s].
     step_size
@@ -168,13 +164,6 @@ def linearize_by_derivatives(
     The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
     The derivatives are compared with differences of the FMU's own variables, or where its states cannot be set with
     its response to small steps of its inputs.
-
-    Parameters
-    ----------
-    exchange, time, step_size
-        As `linearize_component`.
-    inputs, observed
-        As `linearize_component`.
     """
     component = exchange.component
     states = component.description.states

@@ -22,6 +22,9 @@ _SHORTEST = 1 / 64
 
 _NEIGHBOURS = 8
 
+_LITTLE = 0.3
+"""A mode of which less is in the states that are looked at is not recognised by them."""
+
 _DEFECTIVE = 1e-12
 """Below this lᴴ·r is rounding: equal stages side by side share one eigenvector, and such a mode is like no other."""
 
@@ -50,6 +53,11 @@ class Eigenpair:
         mine, theirs = (self.left[None], self.right[None]), (other.left[None], other.right[None])
         return float(similarity(*mine, *theirs).item())
 
+    def within(self, places: Sequence[int]) -> "Eigenpair":
+        """The part of the mode that is in some of the states, scaled anew; like no other where that is little."""
+        left, right = self.left[places], self.right[places]
+        return _pair(self.eigenvalue, left if abs(np.vdot(right, left)) > _LITTLE else 0 * left, right)
+
 
 def eigenpairs(model: LinearModel, lowest_hz: float, highest_hz: float) -> tuple[list[Eigenpair], Vector]:
     """The eigenpairs of a frequency range [Hz], one of each conjugate pair, and all eigenvalues [rad/s]."""
@@ -66,7 +74,6 @@ def pairs_near(model: LinearModel, wanted: complex) -> list[Eigenpair]:
 
 
 def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
-    """The pair whose eigenvalue is nearest to a given one."""
     return min(pairs_near(model, eigenvalue), key=lambda pair: abs(pair.eigenvalue - eigenvalue))
 
 
@@ -80,8 +87,6 @@ class Strides:
         Least similarity with which a mode is taken for the same.
     rival
         Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
-    shortest
-        Length of the shortest stride, as a part of the path.
     """
 
     same: float = _SAME
@@ -89,8 +94,10 @@ class Strides:
     shortest: float = _SHORTEST
 
 
-USUAL, CAREFUL = Strides(), Strides(0.8, 0.4, 1 / 512)
-"""Along a gain that a design turns up; and between two systems that may differ in anything."""
+USUAL, CAREFUL, COSTLY = Strides(), Strides(0.8, 0.4, 1 / 512), Strides(0.8, 0.4, 1 / 16)
+"""Along a gain that a design turns up; between two systems that may differ in anything; and where each model on the way
+is a system that has to be started.
+"""
 
 
 def follow_along(
@@ -99,6 +106,7 @@ def follow_along(
     begin: float,
     end: float,
     strides: Strides = USUAL,
+    common: Sequence[str] = (),
 ) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
@@ -106,18 +114,17 @@ def follow_along(
     ----------
     start
         The mode at ``begin``.
-    model_at
-        The linear model at any point of the path.
     begin, end
         Ends of the path; the end may be the smaller one.
-    strides
-        How it is walked.
+    common
+        States by which modes are recognised, where not all models have the same; the start's vectors hold these alone.
     """
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin
     while here != end:
         there = end if abs(end - here) <= abs(stride) * (1 + 1e-12) else here + stride
-        found = _recognise(pair, pairs_near(model_at(there), pair.eigenvalue), strides)
+        model = model_at(there)
+        found = _recognise(pair, [_of(p, model, common) for p in pairs_near(model, pair.eigenvalue)], strides)
         if found is not None:
             here, pair, stride = there, found, 2 * stride
         elif abs(stride) > shortest:
@@ -159,6 +166,10 @@ def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Stride
         return None
     beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])  # above 1 it is half of a double eigenvalue
     return candidates[order[0]] if beside <= strides.rival else None
+
+
+def _of(pair: Eigenpair, model: LinearModel, common: Sequence[str]) -> Eigenpair:
+    return pair.within([model.names.index(name) for name in common]) if common else pair
 
 
 def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:

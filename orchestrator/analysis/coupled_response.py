@@ -92,8 +92,6 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
     ----------
     master
         The running system at the model's operating point; it is restored.
-    blocks
-        The linearised components.
     model
         The step map composed of the blocks.
     stability
@@ -154,10 +152,19 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
         return "", short if found.seconds < _SHORT else ""
     return (
         f"{whose} does not answer as its linear model does: {found.time:.3g} s after a small disturbance {found.state} "
-        f"differs by {100 * found.error:.3g} % of the response, where {100 * LARGEST_ERROR:g} % is allowed. Does the "
-        "FMU keep states that it does not declare, or is its control sampled? Simulate it with `gfor run`, or ask for "
-        "an export that declares all its states"
+        f"differs by {100 * found.error:.3g} % of the response, where {100 * LARGEST_ERROR:g} % is allowed. "
+        f"{_asked(master, [of] if of in foreign else foreign)} Simulate it with `gfor run`"
     ), ""
+
+
+def _asked(master: Master, foreign: Sequence[str]) -> str:
+    """What may explain a departure; a control that is declared as sampled declares what it keeps as well."""
+    if all(master.components[name].description.sample_time is not None for name in foreign):
+        return "It declares its samples and its states: does it reach a limit, a dead band or another mode so soon?"
+    return (
+        "Does the FMU keep states that it does not declare, or is its control sampled? Ask for an export that declares "
+        "all its states."
+    )
 
 
 def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:

@@ -11,7 +11,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
@@ -273,6 +272,8 @@ class Search:
 
     def _pairs_of_blocks(self, blocks: BlockArnoldi, chosen: list[int]) -> list[tuple[complex, Vector, Vector]]:
         """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
+        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
         wanted = blocks.values[chosen]
         adjoint = BlockArnoldi(self._solver.solve_adjoint, len(self._model.names), 2 * MOST)
         if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
@@ -282,7 +283,7 @@ class Search:
             moved = self._solver.solve(right)
             nu, of_left, of_right = scipy.linalg.eig(left.conj().T @ moved, left.conj().T @ right, left=True)
             left, right, moved = left @ of_left, right @ of_right, moved @ of_right
-        order = scipy.optimize.linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
+        order = linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
         rest = np.linalg.norm(moved - right * nu, axis=0) / (np.abs(nu) * np.linalg.norm(right, axis=0))
         moves = np.abs(nu[order] - wanted) / np.abs(wanted)
         if not (np.concatenate([rest, moves]) <= _SAME).all():  # nor is it where one is not a number
@@ -330,9 +331,11 @@ def _grow(blocks: BlockArnoldi, enough: Callable[[BlockArnoldi], bool]) -> bool:
 
 def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int] | None:
     """Places of the settled values of the adjoint equations that are those wanted, one for each; None if one lacks."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
     if len(settled) < len(wanted):
         return None
     apart = np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
-    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(apart, 1.0))
+    rows, columns = linear_sum_assignment(np.minimum(apart, 1.0))
     return settled[columns].tolist() if bool((apart[rows, columns] <= _SAME).all()) else None

@@ -185,7 +185,6 @@ def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], s
 
 
 def is_memory_of(link: WireLink, name: str) -> bool:
-    """Whether a state stands for what is on its way over a connection."""
     return name.startswith(f"{link.name}{DELAYED}")
 
 

@@ -26,8 +26,6 @@ class PerturbedStep:
 
     Attributes
     ----------
-    component
-        At its operating point.
     inputs, exits
         Names of the inputs that are perturbed after the states, and of the outputs that are read.
     time, step_size
@@ -42,12 +40,10 @@ class PerturbedStep:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states."""
         return self.component.description.states
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What can be perturbed: the states, then the inputs."""
         return (*self.states, *self.inputs)
 
     def differences(self, varied: Sequence[int], size: float, rates: Sequence[str] = ()) -> Differences:

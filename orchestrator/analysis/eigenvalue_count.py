@@ -37,8 +37,6 @@ def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector
 
     Parameters
     ----------
-    equations
-        Of a continuous model.
     alone
         All eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
         determinant is theirs.

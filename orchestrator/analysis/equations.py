@@ -24,12 +24,8 @@ class Equations:
 
         Parameters
         ----------
-        rows
-            Where the states stand whose next values these are.
         states, A
             On which states they depend, and how; shape (rows, states).
-        w, B
-            The same for entries of w.
         """
         n = self._shapes["F"][0]
         self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
@@ -40,12 +36,8 @@ class Equations:
 
         Parameters
         ----------
-        rows
-            Entries of w.
         states, C
             On which states they depend, and how; shape (rows, states).
-        w, D
-            The same for entries of w.
         """
         self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
         self._add("K", rows, w, D)
@@ -57,13 +49,6 @@ class Equations:
     def model(
         self, names: Iterable[str], step_size: float | None, disagreement: float, sources: Mapping[str, str]
     ) -> LinearModel:
-        """The linear model of what was collected.
-
-        Parameters
-        ----------
-        names, step_size, disagreement, sources
-            As `LinearModel` has them.
-        """
         F, G, H, K = (self._matrix(name) for name in self._shapes)
         return LinearModel(F, G, H, K, tuple(names), step_size, disagreement, sources)
 

@@ -44,8 +44,6 @@ def examine(
     ----------
     master
         At the operating point at which the blocks were linearised; it is left as it was.
-    blocks
-        The linearised components.
     model, system
         The step map composed of the blocks, and the continuous model; None where a component gives no derivatives.
     spectrum
@@ -98,7 +96,6 @@ def examine(
 
 
 def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bool:
-    """Whether the model has all delays right at these modes."""
     return all(
         representation_error(link, mode.eigenvalue, model.step_size) <= LARGEST_ERROR
         for link in blocks.links.values()

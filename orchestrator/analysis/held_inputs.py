@@ -30,8 +30,6 @@ def over_parts(A: Matrix, B: Matrix, parts: int) -> LineMap:
     ----------
     A, B
         Over one part with held inputs, shapes (n, n), (n, m).
-    parts
-        Number of parts.
     """
     mean, slope = np.zeros_like(B), np.zeros_like(B)
     for j in range(parts):

@@ -45,8 +45,6 @@ class HubEquations:
         what somebody takes.
     states
         Number n of states, which come first.
-    hub, rest
-        Places of the hub's equations and unknowns, and of all others.
     """
 
     whole: sp.csr_array
@@ -200,13 +198,7 @@ def _times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
 
 
 def hub_equations(F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array) -> HubEquations | None:
-    """The equations with their hub; None where there is no hub worth setting apart.
-
-    Parameters
-    ----------
-    F, G, H, K
-        As `LinearModel` has them.
-    """
+    """The equations with their hub; None where there is no hub worth setting apart."""
     n = F.shape[0]
     taken = _taken(G, K)
     G, H, K = G[:, taken], H[taken], K[taken][:, taken]

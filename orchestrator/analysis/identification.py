@@ -62,8 +62,6 @@ def identify_modes(
         Shape (n,); equally spaced samples of a free response, [s] and any unit.
     tolerance
         Singular values below this fraction of the largest are taken for noise.
-    max_order
-        Most exponentials looked for.
     highest_hz
         The signal is thinned to ten samples per period of this frequency.
     """
@@ -101,8 +99,6 @@ class Sampling:
         Time between two samples of the record [s].
     thin
         Every so many of them are used.
-    number
-        Samples of the record.
     finest
         Time between two samples from which on they are thinned, however short the record [s].
     """
@@ -119,7 +115,6 @@ class Sampling:
 
     @property
     def remedy(self) -> str:
-        """What shows faster oscillations."""
         shorter = f"identify a shorter part of the record (start, stop), as at most {_MAX_SAMPLES} samples are used"
         if self.thin == 1 and self.recorded > 1.5 * self.finest:
             more = "record more often (solver.record_interval)"

@@ -60,8 +60,6 @@ class LinearModel:
         Communication step [s]; None for a continuous model, whose A is in 1/s.
     disagreement
         Largest difference between the two perturbation sizes, in elements of the components' matrices.
-    sources
-        How the linear model of every component was found.
     period
         Communication steps over which the map's power is that of the system; more than 1 with sampled controllers.
     """

@@ -52,8 +52,6 @@ class Doubt:
 
     Attributes
     ----------
-    mode
-        The mode that the component's perturbation moves most.
     shift
         The shift of this mode, relative to |λ|.
     turns

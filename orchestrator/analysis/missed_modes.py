@@ -38,10 +38,6 @@ def missed(
 
     Parameters
     ----------
-    equations
-        Of a continuous model.
-    known
-        Its known modes.
     lowest, highest
         Range of Im λ [rad/s], above 0.
     damping

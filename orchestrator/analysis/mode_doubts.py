@@ -40,14 +40,10 @@ def with_doubts(
 
     Parameters
     ----------
-    modes
-        As identified, all of the signal.
     length
         Of the window [s].
     others
         Modes of the same signal by another order and window; None where that shows none.
-    halves
-        The two halves of the window, each with its own modes.
     noise_like
         Whether the modes leave nothing of the signal but noise.
     """
@@ -77,12 +73,8 @@ def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float
 
     Parameters
     ----------
-    modes
-        As identified.
     length
         Of the window [s].
-    weakest
-        Least part of the largest amplitude.
     """
     largest = max((mode.amplitude for mode in modes), default=0.0)
     swing = max((mode.amplitude for mode in modes if _swings(mode, length)), default=largest)
@@ -164,8 +156,6 @@ def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
 
     Parameters
     ----------
-    modes
-        As identified.
     length
         Of the window [s].
     """

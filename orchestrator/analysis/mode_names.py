@@ -44,8 +44,6 @@ class Naming:
 
     Attributes
     ----------
-    named
-        The modes that have names.
     reasons
         Why a name that fits some mode is borne by none, by name.
     contested
@@ -80,8 +78,6 @@ def opposition(mode: Mode, side: Sequence[str], other: Sequence[str]) -> float:
     ----------
     mode
         With its participations and its shape.
-    side, other
-        Names of the states of the two groups.
 
     Returns
     -------

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.linear_model import LinearModel
@@ -56,8 +55,6 @@ def refine(
 
     Parameters
     ----------
-    model, equations
-        The model, and its equations.
     values, left, right
         As in `RefinedModes`, of a similar model with the same states.
     """
@@ -99,9 +96,11 @@ def _groups(values: NDArray[np.complex128]) -> list[NDArray[np.int64]]:
 
 def _in_order_of(before: NDArray[np.complex128], found: NDArray[np.complex128]) -> NDArray[np.int64]:
     """Places of what was found, each next to what it was before."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     apart = np.abs(before[:, None] - found[None, :])
     apart[~np.isfinite(apart)] = np.finfo(float).max ** 0.5
-    return np.asarray(scipy.optimize.linear_sum_assignment(apart)[1], dtype=np.int64)
+    return np.asarray(linear_sum_assignment(apart)[1], dtype=np.int64)
 
 
 def _are_eigenvectors(model: LinearModel, values: NDArray[np.complex128], right: Vector) -> bool:

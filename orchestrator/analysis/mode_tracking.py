@@ -11,7 +11,6 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.similarity import similarity
@@ -42,8 +41,6 @@ class ModeSet:
         λ [rad/s], shape (m,).
     left, right
         Eigenvectors as rows, shape (m, n), in any scaling.
-    names
-        Of the n states.
     """
 
     eigenvalues: Complex
@@ -111,6 +108,8 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
     """
     if not (len(a.eigenvalues) and len(b.eigenvalues)):
         return []
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     alike = similarities(a, b)
     sizes = np.abs(a.eigenvalues)[:, None] + np.abs(b.eigenvalues)[None, :]
     distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(sizes > 0, sizes, 1.0)
@@ -133,8 +132,6 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
     Parameters
     ----------
-    a, b
-        The modes of both points.
     frequency_range
         In which modes were looked for [Hz].
     threshold
@@ -173,7 +170,6 @@ def number_trajectories(
     route: Iterable[tuple[At, Sequence[At]]],
     threshold: float = THRESHOLD,
 ) -> Followed[At]:
-    """Give every mode of every point the number of a trajectory."""
     result: Followed[At] = Followed()
     count = 0
     for place, origins in route:

@@ -243,8 +243,6 @@ def make_mode(
         Eigenvector of Aᴴ, shape (n,), of any length and angle.
     right
         Eigenvector of A, shape (n,), of any length and angle.
-    names
-        Of the states, length n.
     """
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()

@@ -81,8 +81,6 @@ def check_resolution(
     model, system
         The step map, and the continuous model. If this is None, because a component gives no derivatives, nothing is
         compared.
-    modes
-        Of the step map.
     frequency_range
         Range of the modes [Hz].
     stability

@@ -75,7 +75,6 @@ class ContinuousModel:
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names of all compared signals."""
         return (*self.states, *self.rates, *self.outputs)
 
 
@@ -139,8 +138,6 @@ def check_response(component: Component, model: ContinuousModel, what: str, time
     ----------
     component
         At the model's operating point; it can save and restore its state.
-    model
-        States, inputs and outputs have the names of the FMU's variables.
     what
         What the model is, for the error: ``the linear model inside its FMU``.
     time

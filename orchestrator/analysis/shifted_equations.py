@@ -23,8 +23,6 @@ class Factors:
         ----------
         right
             Shape (n, k).
-        adjoint
-            Whether the adjoint equations are solved.
         """
         whole = np.zeros((self._lu.shape[0], right.shape[1]), dtype=complex)
         whole[: self._n] = right

@@ -69,7 +69,6 @@ class Hidden:
     electromechanical: tuple[complex, ...] = ()
 
     def sentence(self) -> str:
-        """The sentence on the hidden modes."""
         low, high = self.frequency_range
         words = "oscillatory mode lies" if self.count == 1 else "oscillatory modes lie"
         text = f"{self.count} {words} outside {low:g} to {high:g} Hz"
@@ -200,7 +199,6 @@ class Stability:
 
 
 def zeros_in_words(zeros: int) -> str:
-    """What more than one eigenvalue of zero means."""
     return f"{zeros} eigenvalues are zero, one of them may be the free angle: nothing restores the others"
 
 
@@ -269,8 +267,6 @@ def judge(
 
     Parameters
     ----------
-    model
-        Step map, or continuous model.
     spectrum
         All eigenvalues of the model where they are known already.
     system

@@ -43,11 +43,9 @@ class StateAccess:
         self._buffer = RealBatch(component, component.description.states)
 
     def read(self) -> Matrix:
-        """The present values of the states."""
         return self.batch.read().copy()
 
     def write(self, values: Matrix) -> None:
-        """Set the states that a master can set."""
         if self._settable:
             self._buffer.values[:] = values
             self._buffer.write()

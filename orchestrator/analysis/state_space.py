@@ -92,11 +92,6 @@ def read_linear_model(path: Path) -> StateSpace:
 def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
     """The state space between the inputs and outputs that ``blocks`` was made with: the step map of a schedule, or the
     continuous model for None.
-
-    Raises
-    ------
-    AnalysisError
-        As `compose` and `continuous`.
     """
     model = compose(blocks, schedule) if schedule else continuous(blocks)
     n, m = model.G.shape

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.coupled_state import CoupledState
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import HELD
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.periodic import find_periodic_point
@@ -125,6 +126,8 @@ def what_to_check(master: Master) -> str:
             f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
             "mode (`gfor check --only initial_outputs` shows it alone)"
         )
+    if misfits := sentences(misfits_of(master)):
+        return "; ".join(misfits)
     return (
         "check the start values of the component of these states, which for a model of yours are the arguments of its "
         "blocks at the operating point; then whether generation and load balance at rated frequency"

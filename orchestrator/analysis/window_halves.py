@@ -36,12 +36,8 @@ class WindowPart:
 
     Attributes
     ----------
-    modes
-        Of this part.
     length
         Of this part [s].
-    samples
-        Their number.
     remainder
         Root mean square of what the modes leave [unit of the signal].
     noise_like
@@ -105,8 +101,6 @@ def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequ
     ----------
     times, signal
         Shape (n,); the part of the signal, [s] and any unit.
-    modes
-        Identified in it.
     """
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]

@@ -11,6 +11,7 @@ from orchestrator.api.values import Names, Time, binding_path, in_megabytes, in_
 from orchestrator.api.values import path as path_of
 from orchestrator.cases.use import use_in_case
 from orchestrator.errors import InputError
+from orchestrator.fmi.description import read_description
 from orchestrator.fmi.limits import LEAST_MEMORY, Limits
 from orchestrator.fmi.vendor_files import as_fmu
 
@@ -69,7 +70,8 @@ class Acceptance:
 
     def _verdict(self) -> str:
         if self.trusted:
-            return "no check failed"
+            left = self.report.not_judged
+            return f"no check failed; not judged: {', and '.join(left)}" if left else "no check failed"
         if not self.report.failures:
             return f"not supported here: {', '.join(self.report.not_supported)}"
         if self.report.binding_fails:
@@ -95,6 +97,7 @@ def check(
     component: str | None = None,
     scenario: str | None = None,
     seed: int | None = None,
+    frequency: float | None = None,
     time_limit: Time | None = None,
     memory_limit: float | str | None = None,
 ) -> Acceptance:
@@ -119,6 +122,8 @@ def check(
     seed
         Whole number, at least 0, from which dips, jumps and operating points are drawn; by default it follows from the
         file's bytes, and the report states it.
+    frequency
+        Of the network [Hz], where the FMU has a parameter f_n, as the FMU of a device's file has; by default its own.
     time_limit
         Wall-clock time that one call of the FMU may take [s]; 30 s by default.
     memory_limit
@@ -157,7 +162,12 @@ def check(
     elif component or scenario:
         kind, name = ("component", component) if component else ("scenario", scenario)
         raise InputError(f"{kind} = {name!r} names a {kind} of a case; give case as well")
-    return Acceptance(check_fmu(as_fmu(file), bound_by, limits, names(only, "only"), use=use, seed=seed))
+    fmu = as_fmu(file)
+    if frequency is not None:
+        if "f_n" not in read_description(fmu).variables:
+            raise InputError(f"frequency = {frequency}: {file.name} has no parameter f_n; a binding's [rating] has one")
+        use = replace(use, values={**use.values, "f_n": float(frequency)})
+    return Acceptance(check_fmu(fmu, bound_by, limits, names(only, "only"), use=use, seed=seed))
 
 
 def _limits(time_limit: Time | None, memory_limit: float | str | None) -> Limits:

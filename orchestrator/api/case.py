@@ -13,7 +13,7 @@ from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoi
 from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.design_wishes import in_ratios
-from orchestrator.api.executors import choose_executor
+from orchestrator.api.executors import Compute, Plan, Shown, choose_executor
 from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
 from orchestrator.api.interactions import Interactions, WantedInteractions
 from orchestrator.api.interactions import compute as interacting
@@ -47,6 +47,7 @@ from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.points.executor import Executor
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
@@ -274,14 +275,10 @@ class Case:
         0       0.1          0.58            10.59
         1       0.2          0.43            18.01
         """
-        if scheduler is not None and workers not in (None, 1):
-            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
-        kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
         planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
         question(planned.scenarios)
-        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
-            return compute(planned, executor, kept, report)
+        return _computed(compute, planned, executor, folder, "Points", shown=progress)
 
     def screen(
         self,
@@ -345,9 +342,6 @@ class Case:
            point  frequency_hz  damping_percent
         0  00:00          0.58            10.57
         """
-        if scheduler is not None and workers not in (None, 1):
-            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
-        kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
         ratio = damping_percent(damping, "damping", most=100 * MOST_DAMPING)
         wanted = CriticalRegion(*frequency_range(frequencies), ratio or 0.0)
@@ -360,8 +354,7 @@ class Case:
             sharing=None if sharing is None else SharingRule(sharing),
         )  # fmt: skip
         question([planned.prepared])
-        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
-            return screened(planned, executor, kept, report)
+        return _computed(screened, planned, executor, folder, "Points", shown=progress)
 
     def interactions(
         self,
@@ -399,13 +392,11 @@ class Case:
         >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
         [45.53, 0.4, 0.6]
         """
-        kept = None if folder is None else _folder(folder)
         executor = choose_executor(workers, None, INTERACTIONS_IMPORT)
         own, files = case_values(values), parameter_files(parameters)
         planned = plan_interactions(self.file, interactions_of(wanted), scenario, own, in_seconds(step, "step"), files)
         question([planned.prepared])
-        with shown_progress("Systems", shown=progress) as report, nullcontext() if kept is None else held(kept):
-            return interacting(planned, executor, kept, report)
+        return _computed(interacting, planned, executor, folder, "Systems", shown=progress)
 
     def design(
         self,
@@ -515,17 +506,13 @@ class Case:
         >>> bool(design.points()["damping_percent"].min() >= 15)
         True
         """
-        if scheduler is not None and workers not in (None, 1):
-            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
-        kept = None if folder is None else _folder(folder)
         request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
         executor = choose_executor(workers, scheduler, COORDINATED_IMPORT, tls)
         planned = plan_points_design(self.file, request, path_of(points, "points", "file"), outages)
         question([planned.prepared])
-        with shown_progress("Points", shown=progress) as report, nullcontext() if kept is None else held(kept):
-            return designed(planned, executor, kept, report)
+        return _computed(designed, planned, executor, folder, "Points", shown=progress)
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
@@ -534,6 +521,21 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+def _computed(
+    compute: Compute[Plan, Shown],
+    planned: Plan,
+    executor: Executor,
+    folder: str | Path | None,
+    title: str,
+    *,
+    shown: bool,
+) -> Shown:
+    """What a planned study gives; a folder that keeps its points is kept from other commands meanwhile."""
+    kept = None if folder is None else _folder(folder)
+    with shown_progress(title, shown=shown) as report, nullcontext() if kept is None else held(kept):
+        return compute(planned, executor, kept, report)
 
 
 def _folder(given: str | Path) -> Path:

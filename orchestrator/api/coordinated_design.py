@@ -1,33 +1,27 @@
 """The design of POD controllers over operating points and outages."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypedDict
 
 import pandas as pd
 
 from orchestrator.api.design import parameter_file_path
 from orchestrator.api.design_wishes import check_wishes, in_ratios
+from orchestrator.api.executors import computing
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, whole_number
 from orchestrator.api.values import names as names_given
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
 from orchestrator.coordinated_design.study import (
     PointsDesign,
-    PointsDesignPlan,
     PointsDesignRequest,
     design_over_points,
     values_of,
 )
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
-from orchestrator.pod_design.design import StageReport
 from orchestrator.pod_design.target import CONTROLLERS
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport
-from orchestrator.points.store import POINTS, PointStore
 
 WORKERS_IMPORT = ("orchestrator.coordinated_design.worker",)
 """Modules that a process of a design imports once, before its first point."""
@@ -155,28 +149,4 @@ class CoordinatedDesign:
         return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
-def compute(
-    planned: PointsDesignPlan,
-    executor: Executor,
-    folder: str | Path | None = None,
-    report: CountReport = lambda done, total: None,
-    stage: StageReport = lambda text: None,
-) -> CoordinatedDesign:
-    """Compute a planned design, as `Case.design_over_points` does; the executor is closed afterwards.
-
-    Parameters
-    ----------
-    planned
-        A checked design.
-    executor
-        Computes the points.
-    folder
-        Folder whose subfolder ``points`` keeps them. Without a folder they are forgotten.
-    report
-        Called with the number of points done and their total.
-    stage
-        Called with the name of each stage when it begins.
-    """
-    with TemporaryDirectory() as passing, closing(executor):
-        store = PointStore(Path(folder or passing) / POINTS)
-        return CoordinatedDesign(design_over_points(planned, executor, store, report, stage))
+compute = computing(design_over_points, CoordinatedDesign)

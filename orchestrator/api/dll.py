@@ -46,7 +46,7 @@ def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[
     folder
         Where the FMU is written.
     texts
-        Value of parameters that are text, by name; they cannot be changed later.
+        Value of parameters that are text, by name, for good. A file that one names goes into the FMU.
 
     Raises
     ------
@@ -64,7 +64,10 @@ def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[
         if library.suffix.lower() == DEVICE_ENDING:
             library, table = read_device_file(library)
         also = foreign_platforms(library)
-        read = read_dll(library, READER, also) if also else read_dll(library)
+        of_device = (table or {}).get("texts")
+        given = {**(of_device if isinstance(of_device, dict) else {}), **(texts or {})}
+        place = Path(dll).parent if table else Path()
+        read = read_dll(library, READER, also, given, place) if also else read_dll(library, texts=given, folder=place)
         device = None if table is None else device_of(Path(dll), table, read.interface)
         path = dll_fmu(read, Path(folder), texts, device)
     except (DllError, DeviceFileError) as error:

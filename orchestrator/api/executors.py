@@ -1,14 +1,23 @@
 """Where the points of a study are computed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Concatenate, TypeVar
 
 from orchestrator.cores import number_of_cores
 from orchestrator.errors import InputError
 from orchestrator.points.dask_cluster import DaskCluster
-from orchestrator.points.executor import Executor
+from orchestrator.points.executor import Executor, Result
+from orchestrator.points.points import CountReport
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
+from orchestrator.points.store import POINTS, PointStore
+
+Plan = TypeVar("Plan")
+Shown = TypeVar("Shown")
+Compute = Callable[Concatenate[Plan, Executor, str | Path | None, CountReport, ...], Shown]
 
 
 def choose_executor(
@@ -30,9 +39,12 @@ def choose_executor(
     Raises
     ------
     InputError
-        If the number of workers is below 1, or there are certificates that are incomplete or that nothing uses.
+        If the number of workers is below 1, there are workers beside a cluster, or certificates that are incomplete or
+        that nothing uses.
     """
     if scheduler is not None:
+        if workers not in (None, 1):
+            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
         return DaskCluster(scheduler, None if tls is None else Path(tls))
     if tls is not None:
         raise InputError(f"--tls {tls}: certificates are for a Dask cluster; name its address with --scheduler")
@@ -40,3 +52,26 @@ def choose_executor(
         raise InputError(f"workers = {workers!r}; it must be a whole number of at least 1")
     workers = workers or number_of_cores()
     return Processes(workers, imports) if workers > 1 else Serial()
+
+
+def computing(
+    run: Callable[Concatenate[Plan, Executor, PointStore, CountReport, ...], Result], shown: Callable[[Result], Shown]
+) -> Compute[Plan, Shown]:
+    """A study on its planned request, an executor, which is closed afterwards, a folder and a callback for progress.
+
+    The folder's subfolder ``points`` keeps the points; without a folder they are forgotten. Further arguments are the
+    study's own.
+
+    Parameters
+    ----------
+    run
+        Computes all points.
+    shown
+        What users get of its result.
+    """
+
+    def compute(planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any) -> Shown:
+        with TemporaryDirectory() as passing, closing(executor):
+            return shown(run(planned, executor, PointStore(Path(folder or passing) / POINTS), report, *more))
+
+    return compute

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypedDict
 
+from orchestrator.api.executors import computing
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, binding_path, flag, frequency_range, text_or_none
 from orchestrator.api.values import names as names_given
@@ -16,13 +15,10 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.judgement import JudgedInteractions
 from orchestrator.interactions.request import RANGE_HZ, THRESHOLD, GivenDevice, InteractionsRequest
-from orchestrator.interactions.study import InteractionsPlan, InteractionsResult, run_interactions
+from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
 from orchestrator.late import Late
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport
-from orchestrator.points.store import POINTS, PointStore
 from orchestrator.safe_files import made_folder
 
 if TYPE_CHECKING:
@@ -171,24 +167,4 @@ class Interactions:
         return page(repr(self).strip("<>"), self.sentences, self.pairs())
 
 
-def compute(
-    planned: InteractionsPlan,
-    executor: Executor,
-    folder: str | Path | None = None,
-    report: CountReport = lambda done, total: None,
-) -> Interactions:
-    """Compute a planned study, as `Case.interactions` does; the executor is closed afterwards.
-
-    Parameters
-    ----------
-    planned
-        A checked study.
-    executor
-        Computes the systems.
-    folder
-        Folder whose subfolder ``points`` keeps them. Without a folder they are forgotten.
-    report
-        Called with the number of systems done and their total.
-    """
-    with TemporaryDirectory() as passing, closing(executor):
-        return Interactions(run_interactions(planned, executor, PointStore(Path(folder or passing) / POINTS), report))
+compute = computing(run_interactions, Interactions)

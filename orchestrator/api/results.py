@@ -9,19 +9,20 @@ import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
-from orchestrator.analysis.stability import Stability
 from orchestrator.api.show import Axes, axes_or_new, curves_on, page
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import Late
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
-from orchestrator.study.modes import ModesResult, modes_json
-from orchestrator.study.run import RunResult
-from orchestrator.watch.finding import Finding
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from orchestrator.analysis.stability import Stability
+    from orchestrator.study.modes import ModesResult
+    from orchestrator.study.run import RunResult
+    from orchestrator.watch.finding import Finding
 else:
     pd = Late("pandas")
 
@@ -111,6 +112,8 @@ class Modes:
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
+        from orchestrator.study.modes import modes_json  # noqa: PLC0415 - imports the reading of cases
+
         return dict(modes_json([self.result]))
 
     def plot(self, ax: Axes = None) -> Axes:

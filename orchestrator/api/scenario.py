@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
@@ -24,8 +24,10 @@ from orchestrator.api.values import (
     frequency_range,
     in_seconds,
     parameter_files,
+    plain_value,
 )
 from orchestrator.api.values import names as names_given
+from orchestrator.api.values import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.load_models import as_powers, is_open
@@ -254,10 +256,11 @@ class Scenario:
             raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
         with ExitStack() as stack:
             kept = checkpoints if isinstance(checkpoints, Checkpoints) else None
-            if isinstance(checkpoints, str | Path):
+            if checkpoints is not None and kept is None:
+                folder = path_of(checkpoints, "checkpoints", "folder")
                 every = in_seconds(checkpoint_every, "checkpoint_every") or EVERY
-                stack.enter_context(held(Path(checkpoints)))
-                kept = _checkpoints(prepared, Path(checkpoints), every)
+                stack.enter_context(held(folder))
+                kept = _checkpoints(prepared, folder, every)
             if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
                 recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
             with shown_progress(self.title, shown=progress) as report:
@@ -392,14 +395,17 @@ class Scenario:
         >>> choice.largest("midpoint").step_size
         0.0005
         """
-        if len(allowed) != 2 or not all(0 < error < float("inf") for error in allowed):
+        errors = [plain_value(error) for error in allowed] if isinstance(allowed, Sequence) else []
+        if len(errors) != 2 or not all(isinstance(x, int | float) and 0 < x < float("inf") for x in errors):
             raise InputError(f"allowed = {allowed!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)")
-        if wrong := [name for name in schedules if name not in SCHEDULES]:
+        chosen = cast("tuple[ScheduleName, ...]", names_given(schedules, "schedules"))
+        if wrong := [name for name in chosen if name not in SCHEDULES]:
             raise InputError(f"schedules: {wrong[0]!r} is none; give some of {', '.join(SCHEDULES)}")
-        lengths = [length for step in steps if (length := in_seconds(step, "steps")) is not None]
+        listed = [steps] if isinstance(steps, int | float | str) else steps
+        lengths = [length for step in listed if (length := in_seconds(step, "steps")) is not None]
         if wrong_lengths := [length for length in lengths if not length > 0]:
             raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
-        return choose_step(self.prepared, Allowed(*allowed), lengths, schedules, frequency_range(frequencies))
+        return choose_step(self.prepared, Allowed(*allowed), lengths, chosen, frequency_range(frequencies))
 
     def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.

@@ -1,18 +1,14 @@
 """Screenings: operating points times outages."""
 
-from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
 
+from orchestrator.api.executors import computing
 from orchestrator.api.show import page
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport
-from orchestrator.points.store import POINTS, PointStore
 from orchestrator.safe_files import made_folder
-from orchestrator.screening.study import ScreeningPlan, ScreeningResult, Shard, run_screening
+from orchestrator.screening.study import ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, Summary, as_json
 from orchestrator.screening.words import verdict_sentence, what_was_counted
 
@@ -94,28 +90,4 @@ class Screening:
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
-def compute(
-    planned: ScreeningPlan,
-    executor: Executor,
-    folder: str | Path | None = None,
-    report: CountReport = lambda done, total: None,
-    shard: Shard | None = None,
-) -> Screening:
-    """Compute a planned screening, as `Case.screen` does; the executor is closed afterwards.
-
-    Parameters
-    ----------
-    planned
-        A checked screening.
-    executor
-        Computes the stretches.
-    folder
-        Folder whose subfolder ``points`` keeps them. Without a folder they are forgotten.
-    report
-        Called with the number of items done and their total.
-    shard
-        The part to compute; all where None.
-    """
-    with TemporaryDirectory() as passing, closing(executor):
-        store = PointStore(Path(folder or passing) / POINTS)
-        return Screening(run_screening(planned, executor, store, report, shard))
+compute = computing(run_screening, Screening)

@@ -1,15 +1,14 @@
 """Sweeps: modes over a grid of parameters."""
 
 from collections.abc import Iterable, Mapping
-from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.executors import computing
 from orchestrator.api.show import Axes, axes_or_new, page
 from orchestrator.api.values import (
     Names,
@@ -25,9 +24,6 @@ from orchestrator.api.values import (
 )
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.errors import InputError
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport
-from orchestrator.points.store import POINTS, PointStore
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -232,27 +228,7 @@ def plan(
     return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)
 
 
-def compute(
-    planned: SweepPlan,
-    executor: Executor,
-    folder: str | Path | None = None,
-    report: CountReport = lambda done, total: None,
-) -> ParameterSweep:
-    """Compute a planned sweep, as `Case.sweep` does; the executor is closed afterwards.
-
-    Parameters
-    ----------
-    planned
-        A checked sweep, as `plan` gives it.
-    executor
-        Computes the points.
-    folder
-        Folder whose subfolder ``points`` keeps the points. Without a folder the points are forgotten.
-    report
-        Called with the number of points done and their total.
-    """
-    with TemporaryDirectory() as passing, closing(executor):
-        return ParameterSweep(run_sweep(planned, executor, PointStore(Path(folder or passing) / POINTS), report))
+compute = computing(run_sweep, ParameterSweep)
 
 
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:

@@ -1,7 +1,7 @@
 """Arguments as they are given in Python, as the rest of the program takes them; one clear error where they do not fit.
 
 A caller gives a list where one name would do, a text where a number is meant, ``None`` from a table that was empty.
-Each reader here says which argument it was, the value seen, and how to write it.
+Each reader here raises an `InputError` that says which argument it was, the value seen, and how to write it.
 """
 
 import re
@@ -43,11 +43,6 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
         ``{"grid.X_L": 0.3}``, or the same nested: ``{"grid": {"X_L": 0.3}}``.
     argument
         Name of the caller's argument, for the error.
-
-    Raises
-    ------
-    InputError
-        If it is no mapping from names to values.
     """
     if values is None:
         return {}
@@ -63,13 +58,7 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
 
 
 def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
-    """Values by ``component.variable``; otherwise as `plain`.
-
-    Raises
-    ------
-    InputError
-        If it is no mapping, or a name has no component or no variable.
-    """
+    """Values by ``component.variable``; otherwise as `plain`."""
     read = plain(values, argument)
     for name in read:
         check_case_name(name, argument)
@@ -98,13 +87,7 @@ def plain_value(value: Any) -> Value:
 
 
 def names(given: Names, argument: str) -> tuple[str, ...]:
-    """One name or several, as a tuple.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """One name or several, as a tuple."""
     if isinstance(given, str):
         return (given,)
     listed: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
@@ -114,13 +97,7 @@ def names(given: Names, argument: str) -> tuple[str, ...]:
 
 
 def path(given: Any, argument: str, kind: str = "file") -> Path:
-    """A path of a file, or of another ``kind`` of place.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """A path of a file, or of another ``kind`` of place."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
     _check_length(Path(given), argument)
@@ -138,24 +115,12 @@ def _check_length(path: Path, argument: str) -> None:
 
 
 def binding_path(given: Any) -> Path | None:
-    """The path of a binding; None for None.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """The path of a binding; None for None."""
     return None if given is None else path(given, "binding")
 
 
 def in_seconds(time: Time | None, argument: str) -> float | None:
-    """A time [s]; None for None.
-
-    Raises
-    ------
-    InputError
-        If it is no time above 0.
-    """
+    """A time [s]; None for None."""
     if time is None:
         return None
     number = _number(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
@@ -165,13 +130,7 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
 
 
 def moment(time: Any, argument: str) -> float:
-    """A time on the axis of a run [s], which begins at 0.
-
-    Raises
-    ------
-    InputError
-        If it is no time, or lies before 0.
-    """
+    """A time on the axis of a run [s], which begins at 0."""
     rule = "a time of 0 or later and finite, such as 2.0 or '500 ms'"
     number = _number(time, "s", argument, rule)
     if not 0 <= number < float("inf"):
@@ -188,11 +147,6 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
         What the caller gave, and the name of the argument.
     least
         The least that is of use [MB].
-
-    Raises
-    ------
-    InputError
-        If it is none, or less.
     """
     rule = "an amount of memory in MB, such as 4096, or '4 GB'"
     number = _number(given, "MB", argument, rule)
@@ -207,13 +161,7 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
 
 
 def frequency_range(given: Any) -> tuple[float, float]:
-    """Two frequencies [Hz], the lower one first.
-
-    Raises
-    ------
-    InputError
-        If they are not that.
-    """
+    """Two frequencies [Hz], the lower one first."""
     rule = "give two in Hz, the lower one first, such as (0.1, 2.0)"
     if isinstance(given, str) or not isinstance(given, Sequence | tuple) or len(given) != 2:
         raise InputError(f"frequencies = {given!r}; {rule}")
@@ -224,13 +172,7 @@ def frequency_range(given: Any) -> tuple[float, float]:
 
 
 def damping_percent(given: Any, argument: str, most: float = 90.0) -> float | None:
-    """A damping [%] as a ratio; None for None. A number below 1 looks like a ratio and is refused.
-
-    Raises
-    ------
-    InputError
-        If it is no number, below 1 or above ``most``.
-    """
+    """A damping [%] as a ratio; None for None. A number below 1 looks like a ratio and is refused."""
     if given is None:
         return None
     own = plain_value(given)
@@ -246,13 +188,7 @@ def damping_percent(given: Any, argument: str, most: float = 90.0) -> float | No
 
 
 def text_or_none(given: Any, argument: str, rule: str) -> str | None:
-    """One text; None for None.
-
-    Raises
-    ------
-    InputError
-        If it is neither, or empty.
-    """
+    """One text; None for None."""
     if given is not None and (not isinstance(given, str) or not given):
         raise InputError(f"{argument} = {given!r}; {rule}")
     return given
@@ -267,11 +203,6 @@ def whole_number(given: Any, argument: str, least: int, most: int) -> int:
         What the caller gave, and the name of the argument.
     least, most
         The range, both ends included.
-
-    Raises
-    ------
-    InputError
-        If it is none, or outside.
     """
     own = plain_value(given)
     if isinstance(own, bool) or not isinstance(own, int) or not least <= own <= most:
@@ -280,13 +211,7 @@ def whole_number(given: Any, argument: str, least: int, most: int) -> int:
 
 
 def flag(given: Any, argument: str) -> bool:
-    """A truth value.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
+    """A truth value."""
     own = plain_value(given)
     if not isinstance(own, bool):
         raise InputError(f"{argument} = {given!r}; give True or False")
@@ -306,12 +231,6 @@ def _number(given: Any, unit: str, argument: str, rule: str) -> float:
 
 
 def parameter_files(paths: Paths) -> list[ParameterFile]:
-    """The parameter files of one path or several.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read.
-    """
+    """The parameter files of one path or several."""
     listed = [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
     return [read_parameter_file(path(one, "parameters")) for one in listed]

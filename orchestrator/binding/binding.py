@@ -45,7 +45,6 @@ def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescript
 
 
 def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
-    """Describe an FMU through a binding file."""
     path = Path(binding)
     return BoundDescription.of(fmu, _Reader(fmu, read_table(path), str(path)).port_map())
 

@@ -48,7 +48,6 @@ def kind_of_voltage(text: str) -> str:
 
 
 def kind_of_current(text: str) -> str:
-    """The same of an alternating current."""
     return _size(text.lower())
 
 

@@ -89,14 +89,10 @@ class Bases:
 
         Parameters
         ----------
-        unit
-            Of the variable: pu, or a unit of voltage.
         base
             Voltage of 1 pu, such as ``"220 kV"``; V_n where None. Only the unit pu has a base.
         value
             Kind of value, such as ``"phase peak"``; required for every unit except pu.
-        name
-            Of the variable, for errors.
         """
         if unit == PER_UNIT:
             if base in (None, "V_n"):
@@ -111,14 +107,10 @@ class Bases:
 
         Parameters
         ----------
-        unit
-            Of the variable: pu, or a unit of current.
         base
             Power of the base, such as ``"100 MVA"``; S_n where None. Only the unit pu has a base.
         value
             ``"rms"`` or ``"peak"``; required for every unit except pu.
-        name
-            Of the variable, for errors.
         """
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)

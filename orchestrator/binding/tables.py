@@ -84,8 +84,6 @@ class SignalTable(QuantityTable):
 
 
 class BindingTable(DraftedTable):
-    """A whole binding file."""
-
     fmu: FileTable = Field(default_factory=FileTable)
     rating: RatingTable
     voltage: PhasorTable

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
@@ -40,8 +41,6 @@ class BoxedSystem:
 
     Attributes
     ----------
-    component
-        The box.
     residual
         The larger of two changes: of a known component's state in one communication step, and of the box's current from
         its start to its rest at the ideal bus.
@@ -102,21 +101,18 @@ def linearize_with_box(
         Signals that excite the box; the usual signals where None.
     restore
         Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
-    report
-        As `measure`.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
     require_fitting()
+    misfits = sentences(misfits_of(master))
     residual = _check_still(master, [component])
     response, moved = _respond(master, component, excitation or Excitation(), restore=restore, report=report)
     identified = fit(response)
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
     doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
-    return BoxedSystem(
-        component, response, identified, model, max(moved, residual), tuple(str(doubt) for doubt in doubtful)
-    )
+    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)))
 
 
 def modes_with_boxes(
@@ -133,26 +129,25 @@ def modes_with_boxes(
     ----------
     prepared, master, frequency_range, critical
         As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
-    excitation, report
-        As `linearize_with_box`.
-
-    Raises
-    ------
-    AnalysisError
-        As `linearize_with_box`.
     """
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)
     require_fitting()
-    residual = _check_still(master, boxes)
-    known = {}
-    for name in boxes:
-        response, moved = _respond(master, name, excitation or Excitation(), report=report)
-        known[name] = _as_component(name, fit(response))
-        residual = max(residual, moved)
-    point = OperatingPoint(residual, residual / master.clock.step_size, residual, 0, {})
-    return modes_from(prepared, master, point, Blocks(master, known=known), frequency_range, critical)
+    most = 0.0
+
+    def identified(master: Master) -> dict[str, ComponentLinearization]:
+        nonlocal most
+        most, known = max(most, _check_still(master, boxes)), {}
+        for name in boxes:
+            response, moved = _respond(master, name, excitation or Excitation(), report=report)
+            known[name] = _as_component(name, fit(response))
+            most = max(most, moved)
+        return known
+
+    blocks = Blocks(master, known=identified(master))
+    point = OperatingPoint(most, most / master.clock.step_size, most, 0, {})
+    return modes_from(prepared, master, point, blocks, frequency_range, critical, identified)
 
 
 def _respond(

@@ -29,8 +29,6 @@ def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Number
     ----------
     lines
         Multiples of the base frequency, shape (f,).
-    period
-        Number of steps of one period.
     amplitude
         Largest magnitude of the sum.
 

@@ -34,7 +34,6 @@ def save_identification(
 
 
 def identification_json(response: FrequencyResponse, model: IdentifiedModel, passive: Passivity) -> dict[str, Any]:
-    """The figures of an identification."""
     slowest_first = sorted(model.poles.tolist(), key=abs)
     return {
         "method": response.method,

@@ -115,7 +115,6 @@ class FrequencyResponse:
 
 
 def measure(bench: Bench, excitation: Excitation, report: Callable[[str], None] | None = None) -> FrequencyResponse:
-    """Measure a device."""
     lines = odd_lines(excitation.lowest_hz, excitation.highest_hz, excitation.lines)
     frequencies = lines * excitation.lowest_hz
     if frequencies[-1] * bench.step_size >= 0.5:

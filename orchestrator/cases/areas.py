@@ -14,8 +14,6 @@ def areas_of(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, st
     areas
         Patterns by area. A component belongs to the first area with a pattern that fits its own name, or the
         bus (the scope of the variables) that feeds it.
-    system
-        Components and connections.
     """
     return {name: found[0] for name, found in _fitting(areas, system).items()}
 

@@ -31,10 +31,6 @@ class NativeChoice:
     ----------
     pattern
         Name of a component, or a pattern such as ``*``.
-    given
-        As it is written.
-    place
-        Where it is written.
     """
 
     pattern: str
@@ -42,12 +38,10 @@ class NativeChoice:
     place: str
 
     def fits(self, component: str) -> bool:
-        """Whether the choice is for a component."""
         return fnmatch.fnmatch(component, self.pattern)
 
     @property
     def native(self) -> bool:
-        """The choice."""
         if not isinstance(self.given, bool):
             raise ValueError(f"native = {self.given!r}; it must be true or false")
         return self.given
@@ -63,10 +57,6 @@ class PartChoice:
         Name of a component, or a pattern such as ``g*``.
     part
         One of `PARTS`.
-    given
-        As it is written.
-    place
-        Where it is written.
     """
 
     pattern: str
@@ -80,7 +70,6 @@ class PartChoice:
 
     @property
     def name(self) -> str:
-        """The choice."""
         if not isinstance(self.given, str):
             raise ValueError(f"{self.part} = {self.given!r}; it must be the name of a part, in quotes")
         return self.given
@@ -116,8 +105,6 @@ class Layer:
         Parts of generators, in the source's order.
     shares
         Converters' shares; the one for all units comes first, so that those for one unit override it.
-    place
-        Where a value is written.
     """
 
     values: Mapping[str, Value]
@@ -125,6 +112,7 @@ class Layer:
     parts: tuple[PartChoice, ...]
     shares: tuple[ShareChoice, ...]
     place: Place
+    given: Mapping[str, Value]
 
 
 def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
@@ -134,8 +122,6 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
     ----------
     given
         By ``component.variable`` or a choice's key.
-    place
-        Where a key is written.
     has_units
         Whether the case has a table of units; without one, nothing has a share.
     """
@@ -154,4 +140,4 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
         else:
             values[key] = value
     shares.sort(key=lambda choice: choice.label != "")
-    return Layer(values, tuple(natives), tuple(parts), tuple(shares), place)
+    return Layer(values, tuple(natives), tuple(parts), tuple(shares), place, given)

@@ -1,5 +1,6 @@
 """A case file, read and checked against its form."""
 
+import difflib
 import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,8 @@ from pydantic import ValidationError
 from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.contradictions import contradictions
 from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.event_tables import other_scenarios
+from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.names import close_names
@@ -25,7 +28,7 @@ from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
 from orchestrator.ssp.reading import read_ssp
-from orchestrator.toml_files import fault_of, read_toml
+from orchestrator.toml_files import Table, fault_of, read_toml
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
@@ -38,15 +41,18 @@ _SOURCES = {
 }
 """Files of other programs by their suffix: what each is, and where a case names it."""
 
+_STEP = "give a communication step with its unit, such as '100 us' with EMT models or '5 ms' with phasor models"
+_TIMES = {"step_size": _STEP, "micro_step": _STEP} | dict.fromkeys(("stop_time", "record_interval", "time"), "")
+"""Keys of times [s], with the remedy."""
+
+_SHARES = {"alpha": "it is a part of the unit's rating: 30 % is 0.3"}
+
 
 def built_in_cases() -> tuple[str, ...]:
-    """Names of the cases that come with the package."""
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
 
 
 class Case(CaseDefinition):
-    """A case whose scenarios can be prepared."""
-
     def prepare(
         self,
         scenarios: Sequence[str] = (),
@@ -98,8 +104,13 @@ class Case(CaseDefinition):
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
+        if scenarios and self.numbered:
+            others = other_scenarios(preparer.draft, scenarios)
+            prepared[-1] = prepared[-1] and replace(prepared[-1], questions=(*prepared[-1].questions, *others))
         beside = partial(self._beside, overrides, step_size, parameters)
-        return [replace(p, beside=beside) for p in prepared if p is not None]
+        ready = [p for p in prepared if p is not None]
+        idle = idle_everywhere([p.idle for p in ready])
+        return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
 
     def _beside(
         self,
@@ -142,13 +153,6 @@ class Case(CaseDefinition):
     def placed(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
-        """The same with the table of each component, which says where it stands and what it is made of.
-
-        Raises
-        ------
-        CaseError
-            As `components_of`.
-        """
         preparer = self._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
         if problems := [*self.problems, *preparer.problems]:
@@ -243,23 +247,22 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
         except ValidationError as error:
             removed, details = False, error.errors()
             if len(details) > MOST_PROBLEMS:
-                shown = [_problem(raw, text, detail) for detail in details[:MOST_PROBLEMS]]
+                first = [(_location(raw, detail["loc"]), detail) for detail in details[:MOST_PROBLEMS]]
+                shown = [Problem(place_in(text, where), _schema_message(detail, where)) for where, detail in first]
                 raise CaseError(str(path), [*shown, TOO_MANY]) from None
-            for detail in details:
-                location = _location(raw, detail["loc"])
+            located = [(_location(raw, detail["loc"]), detail) for detail in details]
+            seen = [place for place, _ in located]
+            for k, (location, detail) in enumerate(located):
+                if location in seen[:k] or any(x[: len(location)] == location for x in seen if x != location):
+                    continue  # one of several forms that do not fit; what is said of the nearest one is enough
                 known = any(p.place == place_in(text, location) for p in problems)
                 if not (known and detail["type"] == "missing"):  # missing because it was wrong and removed
-                    problem = _problem(raw, text, detail)
+                    problem = Problem(place_in(text, location), _schema_message(detail, location))
                     problems += [] if problem in problems else [problem]
-                removed |= _take_out(raw, location, detail["type"])
+                removed |= _take_out(raw, _location(raw, detail["loc"]), detail["type"])  # others may be gone
             if not removed:
                 break
     raise CaseError(str(path), problems)
-
-
-def _problem(raw: dict[str, Any], text: str, detail: Any) -> Problem:
-    """One of pydantic's errors as a problem of the case."""
-    return Problem(place_in(text, _location(raw, detail["loc"])), _schema_message(detail))
 
 
 def _join_names(raw: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -313,9 +316,18 @@ def _take_out(raw: Any, location: Sequence[str | int], fault: str) -> bool:
     return False
 
 
-def _schema_message(detail: Any) -> str:
+def _tables(of: type[Table]) -> set[type[Table]]:
+    return {of}.union(*(_tables(kind) for kind in of.__subclasses__()))
+
+
+def _schema_message(detail: Any, location: Sequence[str | int]) -> str:
+    key = str(location[-1]) if location else ""
     match detail["type"]:
-        case "extra_forbidden" | "missing":
+        case "extra_forbidden":
+            known = {name for table in _tables(Table) for name in table.model_fields}
+            near = [] if key in known else difflib.get_close_matches(key, sorted(known), 1, 0.75)
+            return f"this key is unknown; did you mean {near[0]}?" if near else fault_of(detail)
+        case "missing":
             return fault_of(detail)
         case "union_tag_invalid":
             tag, known = detail["ctx"]["tag"], detail["ctx"]["expected_tags"]
@@ -325,5 +337,8 @@ def _schema_message(detail: Any) -> str:
             return "the key 'type' is missing; it says what kind of event this is"
         case _:
             seen = detail.get("input")
-            shown = f" (value seen: {seen!r})" if not isinstance(seen, dict | list) else ""
-            return fault_of(detail) + shown
+            in_seconds = key in _TIMES and type(seen) in (int, float)
+            shown = f" (value seen: {seen!r}{' s' if in_seconds else ''})" if not isinstance(seen, dict | list) else ""
+            said = fault_of(detail) + (" s" if in_seconds else "") + shown
+            remedy = (_TIMES | _SHARES).get(key, "")
+            return f"{said}; {remedy}" if remedy else said

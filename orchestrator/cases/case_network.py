@@ -65,6 +65,8 @@ def find_network(draft: Draft, everything: Tables) -> None:
         draft.network = _from_table(draft, grid, everything)
     elif grid.model in model_names():
         draft.network = _with_switches(network_of(grid.model or ""), draft.case)
+    elif grid.model is not None:
+        draft.network_failed = True  # what is wrong with its model is said where it is added
 
 
 def _check_buses_have_a_grid(draft: Draft) -> None:

@@ -22,8 +22,6 @@ class PlannedFmu:
 
     Attributes
     ----------
-    model, network, native, parts
-        As `plan_fmu`.
     description
         Its description; of one that is not there, as it will be, but for its identity and the dependencies of its
         outputs, which need its equations.
@@ -109,11 +107,5 @@ def build_fmu(planned: PlannedFmu) -> FmuDescription:
 
 
 def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
-    """FMU of a catalogue's model, built once on each machine.
-
-    Raises
-    ------
-    KeyError, MissingLibraryError
-        As `plan_fmu`.
-    """
+    """FMU of a catalogue's model, built once on each machine."""
     return build_fmu(plan_fmu(model, network, native))

@@ -10,7 +10,6 @@ from orchestrator.errors import Problem
 
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:
-    """Every such entry, with its place."""
     return [
         *_modes(case, place),
         *_references(case, place),

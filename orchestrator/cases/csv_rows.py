@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError
+from orchestrator.units import LARGEST
 
 Row = dict[str, str]
 PLACE = "_place"
@@ -32,7 +33,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
         raise InputError(f"{path}: there is no such file; {wanted}")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write the mark
-            reader = csv.DictReader(file)
+            reader = csv.DictReader(file, restval="")
             names = reader.fieldnames or ()
             _check_names(path, names)
             missing = [c for c in columns if c not in names]
@@ -60,17 +61,15 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
 
 
 def place_of(row: Row) -> str:
-    """File and line of a row."""
     return row[PLACE]
 
 
 def number(row: Row, column: str) -> float:
-    """The number in a column."""
     try:
         value = float(row[column])
     except (TypeError, ValueError):
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) < LARGEST:
         raise InputError(f"{place_of(row)}: {column} = {row[column]!r} is not a number")
     return value
 

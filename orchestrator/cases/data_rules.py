@@ -13,11 +13,9 @@ class Rule:
     may_be_equal: bool = False
 
     def holds(self, larger: float, smaller: float) -> bool:
-        """Whether two values obey the rule."""
         return larger > smaller or (self.may_be_equal and larger == smaller)
 
     def text(self, larger: str, smaller: str) -> str:
-        """The rule with the values seen, both as text."""
         must = "must not exceed" if self.may_be_equal else "must be less than"
         return f"{smaller} {must} {larger}: {self.why}"
 
@@ -44,6 +42,7 @@ RULES = (
     Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
     Rule("machine.T_d10", "machine.T_d20", _SLOWER),
     Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+    Rule("machine.s_12", "machine.s_10", "saturation rises with the flux; are the two swapped?", may_be_equal=True),
     *(Rule(upper, lower, _LIMITS) for upper, lower in LIMITS),
 )
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU

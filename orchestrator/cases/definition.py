@@ -19,10 +19,6 @@ class CaseDefinition:
     table
         Contents of the file. Entries of a wrong form are left out here and listed in ``problems``; the meaning of the
         rest can still be checked.
-    text
-        Text of the case file.
-    path
-        Path of the file, as it was given.
     directory
         Folder to which paths in the tables are relative; it holds wherever the program works later.
     numbered
@@ -51,7 +47,6 @@ class CaseDefinition:
 
     @property
     def name(self) -> str:
-        """The case's name."""
         return self.table.name
 
     @property

@@ -29,11 +29,14 @@ class UnitOrigin:
         Parameters that the row itself gives.
     common
         Key of ``[units]`` with the common parameters of this kind of unit.
+    lines
+        Lines of the row's file by the parameter that they give, where there are several.
     """
 
     row: str
     own: frozenset[str]
     common: str
+    lines: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass
@@ -51,24 +54,18 @@ class Draft:
         one.
     from_outside
         Variables, by ``component.variable``, that the command line or its parameter files set.
-    problems
-        All problems found so far.
     data
         Elements of the network, and the source's data of units; None if the case has no network of its own.
     network
         The network behind the grid component.
     known, tables
         Names of all possible components, and the tables of the components in this scenario.
-    system
-        Components and connections.
     places
         Place of the last assignment of each ``component.variable``.
-    origins
-        Origin of each component of the units table, by its name.
     reactive_limits
         Least and most reactive power of the units at a bus together [Mvar], by bus.
-    questions
-        Questions about unusual data.
+    active_limits
+        Least and most active power of a unit in sharing [MW], by component.
     parameter_files
         The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
     misfits
@@ -99,6 +96,7 @@ class Draft:
     places: dict[str, str] = field(default_factory=dict)
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     misfits: dict[str, str] = field(default_factory=dict)
@@ -108,13 +106,7 @@ class Draft:
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
-        """Add a problem, once.
-
-        Raises
-        ------
-        CaseError
-            If there are more than `MOST_PROBLEMS`.
-        """
+        """Add a problem, once."""
         problem = Problem(place, text, kind)
         if problem not in self.problems:
             self.problems.append(problem)
@@ -149,9 +141,9 @@ class Draft:
         common = getattr(self.case.units, origin.common)
         if ".".join(path) not in origin.own and path[0] in common:
             return self.place("units", origin.common, *path)
-        return f"{origin.row}, {name}.{'.'.join(path)}"
+        line = origin.lines.get(".".join(path))
+        return f"{origin.row}{'' if line is None else f', line {line}'}, {name}.{'.'.join(path)}"
 
     @property
     def grid(self) -> str | None:
-        """Name of the grid component."""
         return self.case.power_flow.grid if self.case.power_flow else None

@@ -1,6 +1,6 @@
 """Events of a case file as the coupling's typed events, checked against the components they change."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from orchestrator.cases.schema import (
     BusFaultTable,
     ComponentFaultTable,
     EventTable,
+    GridEventBase,
     LineReclosingTable,
     LineTripTable,
     LoadChangeTable,
@@ -76,6 +77,22 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
     _is_point(draft, clock, stop, "the stop", where)
     question_islands(draft, [(event, where) for event, where in events if event.time < stop])
     return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
+
+
+def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
+    """What is wrong with events of scenarios that are not asked for: a time after the run, an element that the network
+    of this one lacks. Their units may be others.
+    """
+    for name in (name for name in draft.case.scenarios if name not in wanted):
+        other = replace(draft, name=name, problems=[], questions=[])
+        for index, table in enumerate(draft.case.scenarios[name].events or ()):
+            where = draft.place("scenarios", name, "events", index)
+            if table.time >= draft.case.solver.stop_time:
+                _note_late(other, table.time, draft.case.solver.stop_time, where)
+            if isinstance(table, GridEventBase) and not isinstance(table, UnitTripTable | UnitReconnectionTable):
+                for event in _events_of(other, table, where):
+                    _checked(other, event, {}, where)
+        yield from (Problem(p.place, f"scenario {name!r}, which was not asked for: {p.text}") for p in other.problems)
 
 
 def _is_point(draft: Draft, clock: Clock, time: float, what: str, where: str) -> bool:
@@ -245,5 +262,4 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
 
 
 def _elements(names: Iterable[str], variable: str) -> list[str]:
-    """Names of the elements that have a variable."""
     return [name.removesuffix(f".{variable}") for name in names if name.endswith(f".{variable}")]

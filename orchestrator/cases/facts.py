@@ -27,8 +27,6 @@ class Facts:
         How many; units out of service do not count.
     load_mw
         Active power of all loads, without what feeds in [MW].
-    load_model
-        How the loads follow the voltage.
     slack
         Units at the slack bus, with their power [MW] and their rating [MVA].
     voltages_pu
@@ -105,7 +103,6 @@ def _power(load: Load, grid: ComponentPlan) -> float:
 
 
 def _model(loads: list[Load]) -> str:
-    """How loads follow the voltage, where all do so alike."""
     active, reactive = {x.active for x in loads}, {x.reactive for x in loads if x.q_mvar}
     if len(active) > 1 or len(reactive) > 1:
         return "several models"

@@ -37,10 +37,6 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, 
 
     Parameters
     ----------
-    draft
-        Takes the notes.
-    table
-        The imperfection with its times.
     clock
         Whose communication points the times must be.
     stop
@@ -75,7 +71,6 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, 
 
 
 def component_events(draft: Draft, table: ComponentFaultTable, where: str) -> list[Event]:
-    """What a fault of a whole component comes down to."""
     name = table.component
     plan = draft.system.components.get(name)
     if plan is None:

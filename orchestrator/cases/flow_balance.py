@@ -26,7 +26,6 @@ class FlowLine:
 
     @property
     def has_ratio(self) -> bool:
-        """Whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0
 
     @property
@@ -94,7 +93,6 @@ def nodal_powers(
 
 
 def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: str) -> None:
-    """Every bus needs a way to the slack bus."""
     neighbours: dict[str, set[str]] = {bus: set() for bus in buses}
     for line in lines:
         if line.closed:

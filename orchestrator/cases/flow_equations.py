@@ -62,8 +62,6 @@ class FlowEquations:
 
         Parameters
         ----------
-        buses, lines, loads, shunts
-            The network.
         active
             Active power that units feed, by bus [pu, 100 MVA].
         held
@@ -103,7 +101,6 @@ class FlowEquations:
 
     @cached_property
     def angle_buses(self) -> NDArray[np.int64]:
-        """Buses whose angle is unknown."""
         return np.flatnonzero(np.arange(len(self.buses)) != self.slack)
 
     @cached_property

@@ -21,10 +21,6 @@ def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable
 
     Parameters
     ----------
-    equations
-        The power flow.
-    failed
-        Where its iterations ended.
     with_stray
         The same power flow with a share of its stray capacitances; None where it has none.
     """

@@ -27,8 +27,6 @@ class Excess:
 
     Attributes
     ----------
-    bus
-        Its name.
     q
         Reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept.
     limit
@@ -44,7 +42,6 @@ class Excess:
     voltage: float
 
     def text(self, *, kept: bool) -> str:
-        """The excess in words."""
         kind = "most" if self.q > self.limit else "least"
         limit = f"{self.limit * SYSTEM_BASE_MVA:.4g} Mvar"
         if kept:

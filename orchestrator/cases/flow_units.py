@@ -53,7 +53,6 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
 
 
 def _is_told(draft: Draft, units: Mapping[str, str], bus: str) -> bool:
-    """Whether another unit at the bus says its voltage."""
     return any("v_0" in draft.system.components[name].parameters for name, other in units.items() if other == bus)
 
 

@@ -45,10 +45,6 @@ def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, fl
 
     Parameters
     ----------
-    draft
-        Takes the system and the notes.
-    clock
-        Delays are whole steps of it.
     stop
         End of the run [s]; a delay that lasts beyond it is noted.
     """
@@ -78,8 +74,6 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
 
     Parameters
     ----------
-    draft
-        Takes the note.
     delay, stop
         How late a value is, and the end of the run [s].
     where
@@ -97,7 +91,6 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
 def _overridden(
     draft: Draft, tables: Mapping[str, tuple[ImperfectionTable, str]]
 ) -> dict[str, tuple[ImperfectionTable, str]]:
-    """The tables with the values of all layers."""
     adapter: TypeAdapter[ImperfectionTable] = TypeAdapter(ImperfectionTable)
     found = dict(tables)
     for layer in draft.layers:
@@ -215,7 +208,6 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def _numbers(name: str, imperfection: Imperfection) -> dict[str, float | bool]:
-    """The numbers of an imperfection, by the key under which they can be set."""
     values: dict[str, Any]
     match imperfection:
         case Bias():

@@ -20,7 +20,6 @@ class OptionValues(ParameterFile):
         return cls(Path(COMMAND_LINE), "", dict(values))
 
     def place(self, key: str) -> str:
-        """A key as the command line has it."""
         return f"{COMMAND_LINE} {key}"
 
 

@@ -45,10 +45,6 @@ def with_laws(
 
     Parameters
     ----------
-    load
-        Its name, bus and power.
-    table
-        The network, with the models of all loads and of all static generation.
     own
         The load's own keys, which decide first.
     parts

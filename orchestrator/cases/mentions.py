@@ -19,8 +19,6 @@ class Named:
 
     Attributes
     ----------
-    components
-        Names of all components.
     foreign
         Components that are FMU files. Such an FMU may lack outputs and states of the catalogue's model that it
         replaces, and their names are not checked.

@@ -48,6 +48,8 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
         return f"phasor and EMT models name it differently: here it is {twin}"
     close = [name for name in names if _parts(name) == _parts(wanted)]
     close = close or [name for name in names if name.endswith(f".{wanted}")][:3]
+    number = re.fullmatch(r"\D*(\d+)", wanted)  # as of a bus, which may be written in another way
+    close = close or [name for name in names if number and re.fullmatch(rf"\D*{number[1]}", name)][:3]
     close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else otherwise
 

@@ -40,8 +40,6 @@ class NetworkData:
         Rated frequency [Hz]; None leaves every model's own.
     places
         File and line of the lines that a file holds, by name.
-    changes
-        What the source holds and was taken over in another form, each with its place.
     machines, idle_machines
         Machines in service, one by one, where the source is of PSS/E; bus and identifier of those out of service.
     feeding, capacitors
@@ -158,13 +156,17 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
             f"{raw.tables.name}: BASFRQ, the sixth value of the first record, is missing or 0, so the frequency is not "
             'known; write it in [network]: frequency = "50 Hz" or frequency = "60 Hz"'
         )
+    own, changes = raw.tables.frequency, list(raw.changes)
+    if table.frequency is not None and own is not None and own != table.frequency:
+        text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
+        changes.append(Problem(f"{raw.tables.name}, line 1", text))
     imported = import_network(raw.tables)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), raw.changes, raw.machines, raw.idle, raw.solved)
+    return _Source(replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, raw.solved)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
@@ -177,9 +179,10 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
-    """The lines of a file, each with its place."""
     lines = []
     for row in rows_of(path, ("from", "to", "R", "X", "B")):
+        if not (row["from"] and row["to"]):
+            raise InputError(f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end")
         circuit = (row.get("circuit") or "").strip()
         if circuit and not (circuit.isascii() and circuit.isalnum()):
             raise InputError(

@@ -102,7 +102,6 @@ def import_network(source: SourceTables) -> ImportedNetwork:
 
 
 def bus_of(label: str) -> str:
-    """Name of a bus with a label."""
     return f"bus_{label}"
 
 
@@ -143,7 +142,6 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
 
 
 def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[_Member]]:
-    """By bus, the generators in service."""
     at_bus: dict[int, list[_Member]] = {}
     for row in source.gen:
         if row[7] > 0 and int(row[0]) in labels:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
+from orchestrator.cases.names import close_names
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import UnitReconnectionTable
@@ -25,17 +26,17 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     units = {p.name: p.bus for p in draft.network.ports if p.name in draft.system.components}
     wanted = table.slack or (draft.data.slack if draft.data else None)
     if wanted is None:
-        draft.note(
-            draft.place("power_flow"),
-            "the key 'slack' is missing; name a unit or a bus with one that feeds what is left",
-        )
+        raw = draft.case.network.raw if draft.case.network else None
+        none = f"no bus of {raw} is the reference (IDE = 3), and " if raw is not None else ""
+        text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
+        draft.note(draft.place("power_flow"), f'{text}, such as slack = "{next(iter(units.values()), "bus_1")}"')
         return None
     slack = units.get(wanted, wanted)
     if slack not in units.values():
-        known = ", ".join(units)
+        known = close_names(wanted, dict.fromkeys(units.values()), f"units: {', '.join(units)}")
         draft.note(
             draft.place("power_flow", "slack"),
-            f"{wanted!r} is neither a unit of this scenario nor a bus with one; units: {known}",
+            f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}",
         )
         return None
     note_contradictions(draft, units)
@@ -48,6 +49,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         flow = start_from_power_flow(
             draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
             keep_limits=table.reactive_limits is True, returning=_returning(draft), dispatch=draft.dispatch,
+            active=draft.active_limits,
         )  # fmt: skip
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
@@ -103,7 +105,6 @@ def _reactive_limits(draft: Draft) -> dict[str, tuple[float, float]]:
 
 
 def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
-    """What is to be said of limits of reactive power."""
     kept = draft.case.power_flow.reactive_limits if draft.case.power_flow else None
     where = draft.place("power_flow", *(["reactive_limits"] if kept is not None else []))
     found = []

@@ -29,7 +29,6 @@ class ParameterFile:
     values: dict[str, Value]
 
     def place(self, key: str) -> str:
-        """A key with its file and line."""
         return _place(self.path, self.text, key)
 
 

@@ -23,9 +23,6 @@ from orchestrator.fmi.port import BoundDescription
 _FULL = 1.05
 """Apparent power [pu of the rating] above which a converter's operating point is questioned."""
 
-_SAME_RATING = 0.01
-"""Part by which a binding's rating may differ from the FMU's own."""
-
 _SHOWN = 3
 """Largest number of components that a question names; the others are counted."""
 
@@ -85,17 +82,9 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
         found = plan.description
         if not isinstance(found, BoundDescription):
             continue
-        for start in found.port.start.get("S_n", ()):
-            own = found.inner.variables[start.variable].start
-            if isinstance(own, bool | str) or own is None or not start.factor or start.variable in found.port.settings:
-                continue
-            rating = (own - start.offset) / start.factor
-            if abs(rating - found.port.rating) > _SAME_RATING * found.port.rating:
-                text = (
-                    f"the binding has S_n = {found.port.rating:g} MVA, and the FMU's {start.variable} is {rating:g} "
-                    "MVA by itself: is the binding's rating that of one unit as delivered?"
-                )
-                yield UnusualValue(f"{name}.S_n", draft.place("components", name, "binding"), text)
+        for rated, said in found.unlike_delivered().items():
+            text = f"the binding has {said}: is the binding's rating that of one unit as delivered?"
+            yield UnusualValue(f"{name}.{rated}", draft.place("components", name, "binding"), text)
 
 
 def question_loading(draft: Draft) -> None:
@@ -139,7 +128,7 @@ def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> Non
     if larger is None or smaller is None or rule.holds(larger, smaller):
         return
     texts = [
-        f"{v} = {x:g} {unit_of(plan, v)}{'' if v in plan.parameters else ' (the default)'}"
+        f"{v} = {x:g}{f' {unit_of(plan, v)}'.removesuffix(' 1')}{'' if v in plan.parameters else ' (the default)'}"
         for v, x in ((rule.larger, larger), (rule.smaller, smaller))
     ]
     draft.note(place_of(draft, name, rule.smaller, rule.larger), rule.text(*texts))

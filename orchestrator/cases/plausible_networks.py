@@ -16,7 +16,6 @@ _SHOWN = 3
 
 
 def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
-    """Ask about the elements of the network, with the values that are set."""
     grid = draft.system.components.get(draft.grid or "")
     if grid is None or draft.network is None or draft.grid is None:
         return

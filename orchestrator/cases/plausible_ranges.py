@@ -14,10 +14,10 @@ class Plausible:
     ----------
     unit
         Unit of the variable. The range does not apply to a variable of the same name in another unit.
-    why
-        Source of the range.
     or_zero
         Whether 0 is usual as well, because it switches a part off.
+    slip
+        The likely mistake behind a value outside; found from the value where empty.
     """
 
     low: float
@@ -25,9 +25,9 @@ class Plausible:
     unit: str
     why: str
     or_zero: bool = False
+    slip: str = ""
 
     def fits(self, value: float) -> bool:
-        """Whether a value lies in the range."""
         return self.low <= value <= self.high or (self.or_zero and value == 0)
 
 
@@ -37,11 +37,12 @@ _421 = "IEEE 421.5, typical data, widened"
 _PSS = "IEEE 421.5, stabilisers, widened"
 _GOVERNORS = "IEEE PES-TR1, turbine-governor models, widened"
 _DROOP = "governors' droops: 2 to 12 %, widened"
-_SATURATION = "usual saturation of machines: 0.02 to 0.3 at 1 pu, 0.1 to 1 at 1.2 pu, widened; is it in percent?"
+_SATURATION = "usual saturation of machines: 0.02 to 0.3 at 1 pu, 0.1 to 1 at 1.2 pu, widened"
 _FILTER = "usual LC filters and transformers of converters"
 _CONTROL = "usual time scales of converter control"
 
 _MACHINE = {
+    "machine.D": Plausible(-1, 5, "pu", "damping torques: 0 to 3 pu, as more stands for what is modelled here"),
     "machine.H": Plausible(0.5, 15, "s", _KUNDUR_H),
     "machine.R_s": Plausible(0, 0.05, "pu", _KUNDUR),
     "machine.X_l": Plausible(0.02, 0.5, "pu", _KUNDUR),
@@ -82,6 +83,7 @@ _MACHINE = {
     "governor.inverse_R": Plausible(5, 100, "pu", _GOVERNORS, or_zero=True),
     "governor.R": Plausible(0.005, 0.3, "pu", _DROOP),
     "governor.K": Plausible(3, 200, "pu", f"{_DROOP}; K is 1/droop", or_zero=True),
+    **{f"governor.{q}_MAX": Plausible(0.1, 3, "pu", "a turbine's most power is about its rating") for q in "VPG"},
     "governor.r": Plausible(0.05, 5, "pu", "usual temporary droops of hydro governors"),
     "governor.K_T": Plausible(0.2, 10, "1", _GOVERNORS),
     "governor.A_T": Plausible(0.3, 3, "pu", _GOVERNORS),
@@ -161,7 +163,7 @@ RANGES: dict[str, Plausible] = {
 """Ranges by the variable's name inside a component."""
 
 _LINE = "lines and transformers on 100 MVA, from 20 kV cables to tie lines"
-LINE_X = Plausible(1e-5, 10, "pu", _LINE)
+LINE_X = Plausible(1e-5, 10, "pu", _LINE, slip="in ohms or in percent")
 LINE_B = Plausible(0, 10, "pu", _LINE)
 LINE_RATIO = Plausible(0.6, 1.6, "1", "tap changers and off-nominal ratios")
 COMPENSATION = Plausible(0.05, 0.9, "1", "series capacitors take 20 to 80 % of a line's reactance, widened")

@@ -51,13 +51,20 @@ def outside(
     if wanted.fits(value):
         return
     unit = f" {wanted.unit}" if wanted.unit != "1" else ""
-    slip = ""
-    for factor, text, far in (
-        (1e-3, f"{value / wanted.high:.3g} times too large", value > _FAR * wanted.high),
-        (1e3, f"{wanted.low / value if value else 0:.3g} times too small", value < wanted.low / _FAR),
+    slip = f"; is it {wanted.slip}?" if wanted.slip else ""
+    ratio = wanted.unit in ("pu", "1")
+    for meant, text, far, cause in (
+        (value / 100, f"{value / wanted.high:.3g} times too large", ratio and value > wanted.high, "in percent"),
+        (1 / value if value else 0, "", ratio and 0 < value < wanted.low / _FAR, "the inverse"),
+        (value / 1e3, f"{value / wanted.high:.3g} times too large", value > _FAR * wanted.high, ""),
+        (value * 1e3, f"{wanted.low / value if value else 0:.3g} times too small", value < wanted.low / _FAR, ""),
     ):
-        if far and wanted.low <= value * factor <= wanted.high:
-            slip = f"; it is {text}, and usual by a factor of 1000: check its unit and base"
+        if far and not slip and wanted.low <= meant <= wanted.high:
+            slip = (
+                f"; is it {cause}? {meant:.4g}{unit} would be usual"
+                if cause
+                else (f"; it is {text}, and usual by a factor of 1000: check its unit and base")
+            )
     shown = f"{given:g}{unit}" if scale == 1 else f"{given:g}{unit} on machine.S_data, {value:.4g}{unit} on S_n,"
     text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield UnusualValue(f"{component}.{variable}", where or place_of(draft, component, variable), text)

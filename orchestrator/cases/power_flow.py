@@ -87,16 +87,10 @@ def solve_power_flow(
 
     Parameters
     ----------
-    buses
-        Names of all buses.
     lines, loads, shunts
         Elements of the network [pu, 100 MVA; loads in MW and Mvar].
-    units
-        Units that feed the network, each with its bus, power and voltage.
     slack_bus
         The bus whose units feed the remaining power; its angle is zero.
-    limits
-        Limits of reactive power, by bus.
     keep_limits
         Whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only named.
 

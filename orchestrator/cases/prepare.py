@@ -15,6 +15,7 @@ from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.event_tables import scenario_events
+from orchestrator.cases.idle_values import Idle, idle_values
 from orchestrator.cases.imperfection_tables import disturb_connections
 from orchestrator.cases.layers import value_layers
 from orchestrator.cases.load_models import open_question
@@ -49,8 +50,6 @@ class PreparedScenario:
 
     Attributes
     ----------
-    case
-        The case that the scenario is of.
     record
         Names ``component.variable`` of the signals that are recorded every ``record_every`` communication steps.
     about_rows
@@ -78,6 +77,10 @@ class PreparedScenario:
     beside
         Prepares another scenario of the case with the same values, or with those of its file alone where that is asked
         for; None where nothing but the file gave values.
+    given
+        What the scenario, parameter files and the command line give, as it is written; a later source goes first.
+    idle
+        What came from outside of the file, and where that cannot act; see `idle_everywhere`.
     """
 
     case: CaseDefinition
@@ -102,6 +105,8 @@ class PreparedScenario:
     network: Network | None = None
     source_slack: str | None = None
     beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
+    given: Mapping[str, Value] = field(default_factory=dict, repr=False)
+    idle: Idle = field(default_factory=dict, repr=False)
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""
@@ -209,6 +214,8 @@ class Preparer:
             told=told,
             network=draft.network,
             source_slack=draft.data.slack if draft.data else None,
+            idle=idle_values(draft.system, draft.from_outside, draft.places, events),
+            given={key: value for layer in draft.layers for key, value in layer.given.items()},
         )
 
     def _add_component(self, name: str, table: ComponentTable) -> None:

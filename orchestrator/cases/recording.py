@@ -16,10 +16,6 @@ def record_every(draft: Draft, clock: Clock, stop_time: float) -> tuple[int, tup
 
     Parameters
     ----------
-    draft
-        The scenario.
-    clock
-        The communication step.
     stop_time
         Of the run [s].
     """

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.scheduling import schedule_of
+from orchestrator.cases.schema import LONGEST_STEP
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import InputError
@@ -19,6 +20,10 @@ _STEPS_A_SECOND = 30_000
 def clock_of(draft: Draft, step_size: float | None) -> Clock | None:
     """The clock of the file, or of the command's step [s]; None if there is none of such a step."""
     try:
+        if step_size is not None and step_size > LONGEST_STEP:
+            raise InputError(
+                f"a communication step of {step_size:g} s is too long; it must be at most {LONGEST_STEP} s"
+            )
         return Clock(step_size if step_size is not None else draft.case.solver.step_size)
     except InputError as error:
         draft.note("--step", str(error))
@@ -55,7 +60,6 @@ def checked_schedule(draft: Draft) -> Schedule:
 
 
 def _chosen(draft: Draft) -> Schedule:
-    """The schedule that the file names."""
     solver = draft.case.solver
     if solver.schedule == "jacobi":
         _check_unused_groups(draft, solver.groups or [])

@@ -37,7 +37,6 @@ def schedule_of(
 
 
 def schedule_in(case: CaseDefinition, scenario: str, system: System, name: ScheduleName) -> Schedule:
-    """The same, of a scenario that was prepared."""
     flow = case.table.power_flow
     grid = None if flow is None else flow.grid
     return schedule_of(name, case.table.solver, grid, system, case.scenarios[scenario].remove)

@@ -39,15 +39,16 @@ Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int
 FileName = Annotated[str, AfterValidator(file_name)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
+LONGEST_STEP = 0.1
+"""Between two communication points [s]."""
+
 
 class SolverTable(Table):
-    """Communication step, schedule and recording."""
-
-    step_size: Seconds = Field(default=1e-4, gt=0, le=0.1)
+    step_size: Seconds = Field(default=1e-4, gt=0, le=LONGEST_STEP)
     stop_time: Seconds = Field(default=20.0, gt=0)
     record_interval: Seconds = Field(default=0.005, gt=0)
     schedule: ScheduleName = "gauss-seidel"
-    micro_step: Seconds | None = Field(default=None, gt=0, le=0.1)
+    micro_step: Seconds | None = Field(default=None, gt=0, le=LONGEST_STEP)
     tolerance: Number | None = Field(default=None, ge=TOLERANCES[0], le=TOLERANCES[1])
     groups: list[list[str]] | None = None
     record: list[str] = ["*"]
@@ -86,7 +87,7 @@ class PowerFlowTable(Table):
     """
 
     grid: str
-    slack: str | None = None
+    slack: Bus | None = None
     reactive_limits: Annotated[bool | None, Field(strict=True)] = None
     sharing: Literal["droop", "rating", "slack"] = "droop"
 
@@ -130,8 +131,6 @@ LoadLaw = Literal["impedance", "current", "power"] | ZipTable
 
 
 class LoadModelTable(Table):
-    """How loads follow voltage and frequency."""
-
     active: LoadLaw | None = None
     reactive: LoadLaw | None = None
     k_pf: Number | None = Field(default=None, allow_inf_nan=False)
@@ -262,8 +261,6 @@ ImperfectionTable = Annotated[
 
 
 class EventBase(Table):
-    """Common part of all events: a time."""
-
     time: Seconds = Field(ge=0)
 
 
@@ -333,8 +330,6 @@ class LoadChangeTable(GridEventBase):
 
 
 class LoadTripTable(GridEventBase):
-    """A load is disconnected."""
-
     type: Literal["load_trip"]
     load: str
 
@@ -348,8 +343,6 @@ class LoadReconnectionTable(GridEventBase):
 
 
 class ShuntTripTable(GridEventBase):
-    """A shunt is disconnected."""
-
     type: Literal["shunt_trip"]
     shunt: str
 
@@ -407,8 +400,6 @@ class BusFaultTable(GridEventBase):
 
 
 class UnitTripTable(GridEventBase):
-    """A unit is disconnected."""
-
     type: Literal["unit_trip"]
     unit: str
 
@@ -430,8 +421,6 @@ class BranchChangeTable(GridEventBase):
 
 
 class ReferenceChangeTable(EventBase):
-    """A reference of a component steps."""
-
     type: Literal["reference_change"]
     component: str
     reference: str
@@ -439,8 +428,6 @@ class ReferenceChangeTable(EventBase):
 
 
 class ParameterChangeTable(EventBase):
-    """A parameter of a component changes."""
-
     type: Literal["parameter_change"]
     component: str
     parameter: str

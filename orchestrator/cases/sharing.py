@@ -77,8 +77,6 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 
     Parameters
     ----------
-    plan
-        Its values.
     reactive
         Reactive power that it feeds [pu, S_n]: the current that is left is active.
     """
@@ -114,15 +112,8 @@ def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
 
     Parameters
     ----------
-    reserves
-        The units that are left.
     change
         What they have to feed beside what they fed [MW].
-
-    Raises
-    ------
-    InputError
-        If they cannot; its kind is `ErrorKind.START`.
     """
     found = {one.name: one.before for one in reserves}
     free = [one for one in reserves if one.gain > 0]
@@ -143,7 +134,6 @@ def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
 
 
 def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
-    """Which unit would need most of its limit, and what is missing."""
     able = [one for one in reserves if one.gain > 0] or list(reserves)
     step = change / (sum(one.gain for one in able) or 1.0)
     worst = max(able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0)
@@ -165,6 +155,7 @@ def shared_flow(
     plans: Mapping[str, ComponentPlan],
     slack_bus: str,
     dispatch: Dispatch,
+    active: Mapping[str, tuple[float, float]],
 ) -> PowerFlow:
     """The power flow in which the units share what the dispatch before lacks now, with the change of the losses.
 
@@ -178,11 +169,13 @@ def shared_flow(
         As in `orchestrator.cases.power_flow.solve_power_flow`.
     dispatch
         What they fed before.
+    active
+        Least and most active power that data give units [MW], by name.
     """
     left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
     if dispatch.rule is SharingRule.SLACK:
         return solve(left)
-    reserves = _reserves(left, plans, dispatch)
+    reserves = _reserves(left, plans, dispatch, active)
     at_slack = {one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None}
     rating = {one.name: one.S_n for one in left}
     change, before = dispatch.change, (0.0, 0.0)
@@ -206,17 +199,23 @@ def shared_flow(
     )
 
 
-def _reserves(units: Sequence[FlowUnit], plans: Mapping[str, ComponentPlan], dispatch: Dispatch) -> list[Reserve]:
+def _reserves(
+    units: Sequence[FlowUnit],
+    plans: Mapping[str, ComponentPlan],
+    dispatch: Dispatch,
+    active: Mapping[str, tuple[float, float]],
+) -> list[Reserve]:
     """Of the units that are left. Where none answers to the frequency, ratings decide."""
     left = [one for one in units if one.connected]
     gains = {one.name: droop_gain(plans[one.name]) for one in left}
     if dispatch.rule is SharingRule.RATING or not any(gains.values()):
         gains = {one.name: 1.0 if one.Q_0 is None else 0.0 for one in left}
-    limits = {one.name: power_limits(plans[one.name], dispatch.powers[one.name].imag) for one in left}
-    return [
-        Reserve(one.name, one.P_0 * one.S_n, gains[one.name] * one.S_n, *(x * one.S_n for x in limits[one.name]))
-        for one in left
-    ]
+    found = []
+    for one in left:
+        least, most = (x * one.S_n for x in power_limits(plans[one.name], dispatch.powers[one.name].imag))
+        low, high = active.get(one.name, (-math.inf, math.inf))
+        found.append(Reserve(one.name, one.P_0 * one.S_n, gains[one.name] * one.S_n, max(least, low), min(most, high)))
+    return found
 
 
 def _as_shared(

@@ -33,6 +33,7 @@ def start_from_power_flow(
     keep_limits: bool = False,
     returning: Collection[str] = (),
     dispatch: Dispatch | None = None,
+    active: Mapping[str, tuple[float, float]] | None = None,
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -43,12 +44,8 @@ def start_from_power_flow(
     ----------
     system
         The coupled system. The plans of its grid and units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
-    network
-        Buses, lines and loads.
     grid
         The component that is the network.
-    units
-        Bus of every unit.
     slack
         The bus whose units feed the remaining power.
     limits
@@ -60,6 +57,8 @@ def start_from_power_flow(
         Units that an event connects; a limit of theirs must stay.
     dispatch
         What the units fed before an outage that they share; None where each feeds its own ``P_0``.
+    active
+        Least and most active power of units that share [MW], beside their models' own limits.
     """
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
 
@@ -75,7 +74,10 @@ def start_from_power_flow(
             keep_limits=keep_limits,
         )
 
-    flow = solve(feeding) if dispatch is None else shared_flow(solve, feeding, system.components, slack, dispatch)
+    if dispatch is None:
+        flow = solve(feeding)
+    else:
+        flow = shared_flow(solve, feeding, system.components, slack, dispatch, active or {})
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
     for name, bus in units.items():

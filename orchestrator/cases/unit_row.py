@@ -17,28 +17,24 @@ class UnitRow:
 
     Attributes
     ----------
-    label, bus
-        Name of the unit, and its bus.
     rating_mva, p_mw, v_pu
         Rating [MVA], active power [MW] and voltage [pu].
     alpha
         Share of the converter, if the row gives it; otherwise None.
-    parameters
-        Parameters of the generator and of the converter, by kind.
     place
         File and line of the row; empty where the unit comes from the network's source.
-    parts
-        Parts of the generator that the row itself chooses.
     partial
         Whether a record of it was left out, for which the case says what stands there.
-    q_min_mvar, q_max_mvar
-        Limits of reactive power [Mvar]; infinite without.
+    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
+        Limits of reactive and of active power; infinite without.
     converter
         Model of the converter that the whole unit is by its record.
     doubts
         Questions about the generator's data: parameter, place and text.
     replaced
         Lines of records for which the converter's model stands, each with what it leaves out.
+    lines
+        Lines of the records that give parameters, by parameter.
     """
 
     label: str
@@ -56,10 +52,12 @@ class UnitRow:
     converter: str | None = None
     doubts: tuple[tuple[str, str, str], ...] = ()
     replaced: tuple[tuple[int, str], ...] = ()
+    lines: Mapping[str, int] = field(default_factory=dict)
+    p_min_mw: float = -math.inf
+    p_max_mw: float = math.inf
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:
-    """The row itself."""
     if not row.rating_mva > 0:
         raise InputError(
             f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"

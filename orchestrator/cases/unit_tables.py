@@ -80,18 +80,13 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                     values = {**row.parameters.get(kind, {}), **own}
                 components[name] = ComponentTable(model=row.converter or model, bus=row.bus, parameters=values, **parts)
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
-                draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key)
+                draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key, row.lines)
+                draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
 
 
 def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Generation]) -> list[UnitRow]:
-    """The units of a units table. Figures that its file leaves out come from the network's source.
-
-    Raises
-    ------
-    InputError
-        If the file is missing or wrong, or neither it nor the source gives a figure that is needed.
-    """
+    """The units of a units table. Figures that its file leaves out come from the network's source."""
     if table.file is None:
         if not generation:
             raise InputError(
@@ -153,7 +148,6 @@ def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
 
 
 def _with_limits_of_bus(row: UnitRow, units: Sequence[UnitRow]) -> UnitRow:
-    """The row with the limits of all units of its bus, which hold for them together."""
     return replace(row, q_min_mvar=sum(u.q_min_mvar for u in units), q_max_mvar=sum(u.q_max_mvar for u in units))
 
 
@@ -234,7 +228,6 @@ def _parts_in(entry: Row) -> dict[str, str]:
 
 
 def _parts_of(table: UnitsTable) -> dict[str, str]:
-    """Parts that all units have in common."""
     return {part: name for part in PARTS if (name := getattr(table, part)) is not None}
 
 

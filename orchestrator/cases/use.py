@@ -19,12 +19,8 @@ def use_in_case(
 
     Parameters
     ----------
-    case
-        Name of a case, or path of its file.
     component
         Name of the component; None for the component that has this file.
-    fmu
-        Path of the FMU.
     step_size
         Communication step [s]; the case's where None.
     scenario
@@ -63,7 +59,6 @@ def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[OperatingAt | 
 
 
 def _scenario(case: Case, component: str, wanted: str | None) -> str:
-    """Name of a scenario that has the component."""
     having = [name for name, table in case.scenarios.items() if component not in table.remove]
     known = ", ".join(having) or "none"
     if wanted is None:
@@ -82,7 +77,6 @@ def _scenario(case: Case, component: str, wanted: str | None) -> str:
 
 
 def _component(case: Case, wanted: str | None, fmu: Path) -> str:
-    """Name of the component that is an FMU."""
     files = {n: case.directory / t.file for n, t in case.table.components.items() if t.file is not None}
     known = ", ".join(files) or "none"
     if wanted is not None:

@@ -9,7 +9,6 @@ _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")
 
 
 def connect(draft: Draft) -> None:
-    """Make all connections."""
     for index, wire in enumerate(draft.case.connections):
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
         if not ends & set(draft.scenario.remove):

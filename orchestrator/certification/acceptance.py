@@ -20,8 +20,6 @@ class Acceptance:
 
     Attributes
     ----------
-    faults
-        Names of the faults.
     report
         The whole report, as `gfor check --json` prints it.
     """
@@ -32,7 +30,6 @@ class Acceptance:
 
     @property
     def checks(self) -> list[dict[str, Any]]:
-        """The results of all checks."""
         return list(self.report["checks"])
 
     def keep(self, folder: Path) -> None:

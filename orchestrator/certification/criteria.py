@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
@@ -40,8 +39,6 @@ class ModeVerdict:
     similarity
         Similarity of the two modes, from 0 to 1, by their shapes over the states that both systems have. If the
         converter introduces the mode, the similarity of the best candidate that is not matched with another mode.
-    components
-        The components that take part most, in words.
     """
 
     eigenvalue: complex
@@ -77,7 +74,6 @@ class ModalTest:
 
 
 def is_judged(frequency_hz: float) -> bool:
-    """Whether the norm judges a mode of this frequency."""
     return FREQUENCIES[0] <= frequency_hz <= FREQUENCIES[1]
 
 
@@ -149,8 +145,10 @@ def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
     threshold are left out. If each row took its largest similarity, one mode without the converter could excuse several
     modes with it.
     """
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
     enough = np.where(alike >= THRESHOLD, alike, 0.0)
-    rows, columns = scipy.optimize.linear_sum_assignment(enough, maximize=True)
+    rows, columns = linear_sum_assignment(enough, maximize=True)
     return {int(k): int(j) for k, j in zip(rows, columns, strict=True) if enough[k, j] > 0}
 
 

@@ -55,12 +55,10 @@ class Details:
     date: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
-        """Label and text of each."""
         return [(label, getattr(self, name)) for name, label in _LABELS.items()]
 
 
 def read_details(path: Path) -> Details:
-    """Read a file of details."""
     text, raw = read_toml(path, "it", "`gfor certify --details-template` prints one", "--details")
     try:
         table = _Table.model_validate(raw)

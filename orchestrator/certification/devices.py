@@ -23,8 +23,6 @@ class Device:
         By which reports and folders call it; no two devices of a command share one, whatever the case of its letters.
     file
         An FMU, a vendor's DLL or a device's file.
-    values
-        Of its own variables, by name.
     """
 
     name: str
@@ -82,7 +80,6 @@ def _split(text: str) -> tuple[str | None, Path]:
 
 
 def _names(named: Sequence[tuple[str | None, Path]]) -> list[str]:
-    """Names of all devices, all of them different."""
     paths = [path.parent.resolve() / path.name for _, path in named]
     found = [given or path.stem for (given, _), path in zip(named, paths, strict=True)]
     unnamed = [k for k, (given, _) in enumerate(named) if given is None]

@@ -49,8 +49,6 @@ def write_sealed(content: Mapping[str, Any], path: Path) -> None:
 
 
 def read_record(file: Path) -> Any:
-    """What a certificate's JSON says."""
-
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         content = dict(pairs)
         if len(content) < len(pairs):

@@ -46,7 +46,6 @@ class TimeVerdict:
 
     @property
     def accepted(self) -> bool:
-        """Whether the criterion is met."""
         return self.swings.accepted or self.modal.accepted
 
 
@@ -79,12 +78,10 @@ class PointVerdict:
 
     @property
     def judged(self) -> bool:
-        """Whether all data for the judgement are known."""
         return not self.unknown
 
     @property
     def accepted(self) -> bool:
-        """Whether the criterion is met."""
         return self.judged and not self.faults
 
     @property
@@ -211,8 +208,6 @@ def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -
         [s], shape (n,).
     y
         The signal, shape (n,).
-    signal
-        Its name.
     event_time
         When the system was disturbed [s].
     """

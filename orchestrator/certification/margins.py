@@ -10,6 +10,9 @@ from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import LARGEST_RATIO
 
+MOST = 10.0
+"""Largest margin that is shown in parts of its limit."""
+
 
 @dataclass(frozen=True, slots=True)
 class CriterionMargin:
@@ -22,8 +25,6 @@ class CriterionMargin:
     margin
         How far the figure is on the good side of its limit, in parts of the limit (negative: on the bad side); None
         where the criterion has no figure, as with a loss of synchronism.
-    text
-        What was found.
     """
 
     place: str
@@ -78,9 +79,16 @@ def _of_response(time: TimeVerdict) -> float | None:
     return max((margin for accepted, margin in ways if margin is not None and accepted == time.accepted), default=None)
 
 
-def margin_text(margin: float | None) -> str:
-    """A margin in percent of its limit; a dash where there is none."""
+def margin_text(margin: float | None, limit: float | None = None, value: float | None = None) -> str:
+    """A margin in percent of its limit; a dash where there is none.
+
+    Beyond `MOST` the limit is next to nothing, and the distance from it says more: in the quantity's own unit where
+    that is given.
+    """
     if margin is None:
         return "–"
-    percent = 100 * margin
-    return f"{percent:{'+.0f' if abs(percent) >= 1000 else '+.3g'}} %".replace("-", "−")
+    if abs(margin) > MOST:
+        known = limit is not None and value is not None
+        good = "+" if margin > 0 else "−"
+        return f"{good}{abs((value or 0.0) - (limit or 0.0)):.3g} in its unit" if known else f"{good}> {MOST:.0f} times"
+    return f"{100 * margin:+.3g} %".replace("-", "−")

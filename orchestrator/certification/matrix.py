@@ -20,8 +20,6 @@ class MatrixCell:
 
     Attributes
     ----------
-    folder
-        Of the certificate, relative to the matrix.
     failure
         Why the device could not be tested; None where there is a certificate.
     margins
@@ -52,14 +50,12 @@ class MatrixCell:
     figures: Sequence[str] | None = None
 
     def take(self, found: Certification | CodeCertificate) -> None:
-        """Take the figures of a certificate."""
         self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
         self.margins, self.missing = margins_of(found), len(found.missing)
         self.judged = sum(1 for v in found.verdicts if v.judged)
 
     @property
     def narrowest(self) -> CriterionMargin | None:
-        """The criterion with the least margin."""
         return narrowest(self.margins)
 
     @property
@@ -83,8 +79,6 @@ class MatrixCell:
 
 @dataclass(frozen=True)
 class CertificateMatrix:
-    """All cells."""
-
     devices: tuple[str, ...]
     codes: tuple[str, ...]
     cells: dict[tuple[str, str], MatrixCell]
@@ -100,7 +94,6 @@ class CertificateMatrix:
         return next((code for code in WORST_FIRST if code in found), 0)
 
     def sentence(self) -> str:
-        """The matrix in a sentence."""
         verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
         counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))

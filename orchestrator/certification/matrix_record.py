@@ -85,10 +85,6 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
 
     Parameters
     ----------
-    matrix
-        All cells.
-    devices
-        What was compared.
     made
         When [UTC].
     """

@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.analysis.device_start import misfits_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
@@ -63,14 +64,10 @@ class PointResult:
     ----------
     modes
         From 0.05 to 3 Hz, least damped first.
-    components
-        The components that take part in each mode, in words.
     growth
         Largest real part of any eigenvalue [1/s], zeros left out.
     stability
         The verdict over the whole spectrum, as `Stability.as_json` has it.
-    residual
-        Of the steady state.
     identified
         Order of the identified model that replaces the converter in the modes; None if the converter's own states are
         used.
@@ -113,7 +110,6 @@ class PointResult:
 
     @classmethod
     def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
-        """The result of a point whose worker died."""
         return cls(task.X_L, task.scenario, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -136,13 +132,7 @@ class PointResult:
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
-    """Steady state, modes and response of one point; a failure becomes part of the result.
-
-    Raises
-    ------
-    InputError
-        As `same_case`.
-    """
+    """Steady state, modes and response of one point; a failure becomes part of the result."""
     case = same_case(task.case, task.fingerprint)
     result = PointResult(task.X_L, task.scenario)
     with failure_kept(result), alone():
@@ -154,6 +144,7 @@ def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> Non
     (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
     watch = Watch(prepared)
     with running(prepared) as master:
+        misfits = misfits_of(master)
         converter = master.components.get(CONVERTER)
         if converter is not None and (task.black_box or is_black_box(converter)):
             boxed = linearize_with_box(master, CONVERTER)
@@ -169,7 +160,7 @@ def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> Non
             master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:
             _keep_signals(result, watch.recorder, master, f_n)
-    result.findings = [finding.as_json() for finding in watch.findings()]
+    result.findings = [finding.as_json() for finding in watch.findings(misfits=misfits)]
 
 
 def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:

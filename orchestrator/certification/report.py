@@ -27,7 +27,6 @@ _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 
 
 def page(certification: Certification, hashes: Mapping[str, str | None], made: datetime) -> str:
-    """The page's text."""
     figures = Figures()
     content = [
         ("For whom and by whom", details(certification)),

@@ -26,7 +26,6 @@ def before(value: complex | None) -> str:
 
 
 def verdict(accepted: bool) -> str:
-    """In colour."""
     return '<span class="good">accepted</span>' if accepted else '<span class="bad">not accepted</span>'
 
 

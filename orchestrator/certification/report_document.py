@@ -96,7 +96,6 @@ def _text(value: Scalar | None) -> str:
 
 
 def binding(c: Certification, hashes: Hashes) -> str:
-    """The whole text of the binding."""
     if c.request.binding is None:
         return "<p>None: the FMU has the variables of our port.</p>"
     text = escape(c.request.binding.read_text(encoding="utf-8"))

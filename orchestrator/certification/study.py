@@ -31,8 +31,6 @@ class Certification:
 
     Attributes
     ----------
-    case
-        The study's case file.
     values
         Every value of the system with the converter at the first reactance, by ``component.variable``.
     points
@@ -96,7 +94,6 @@ class Certification:
 
     @property
     def passed(self) -> bool:
-        """Whether the converter passes the test."""
         return self.verdict == PASSES
 
     @property
@@ -200,7 +197,6 @@ def tasks_of(
 def _tasks(
     prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
 ) -> list[CertificatePointTask]:
-    """One scenario at all reactances."""
     # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
     content = {
         "case": BASE.read_text(encoding="utf-8"),

@@ -8,7 +8,6 @@ of damping, since e^(−2π·4·ζ/√(1 − ζ²)) = 0.25 at ζ = 0.0551.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from orchestrator.arrays import Numbers
 
@@ -67,12 +66,8 @@ class SwingTest:
     ----------
     dropped
         The first extremum, towards which the oscillation starts; None if no extremum was dropped.
-    swings
-        All swings that the record holds.
     ratio
         ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
-    reason
-        Reason of the verdict, in words.
     """
 
     dropped: Extremum | None
@@ -90,8 +85,10 @@ def slow_part(times: Numbers, signal: Numbers) -> Numbers:
     """
     if not np.isfinite(signal).all():
         return signal
-    sections = scipy.signal.butter(4, FASTEST, fs=1 / (times[1] - times[0]), output="sos")
-    return np.asarray(scipy.signal.sosfiltfilt(sections, signal))
+    from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415 - a second to import
+
+    sections = butter(4, FASTEST, fs=1 / (times[1] - times[0]), output="sos")
+    return np.asarray(sosfiltfilt(sections, signal))
 
 
 def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = RESOLUTION) -> list[Extremum]:

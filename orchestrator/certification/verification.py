@@ -38,14 +38,11 @@ _NEEDED = (FMU, CASE, RESPONSES, HTML)
 
 @dataclass
 class Verification:
-    """The result of a verification."""
-
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
 
     @property
     def holds(self) -> bool:
-        """Whether the certificate holds."""
         return not self.faults
 
 

@@ -212,6 +212,18 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Once(argparse._StoreAction):
+    """An option whose second value would put the first one away in silence."""
+
+    given = False
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
+        if option and self.given:
+            parser.error(f"argument {option}: it is given twice, and takes one value; give it once")
+        self.given = True
+        super().__call__(parser, namespace, values, option)
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose help opens with the examples."""
 
@@ -228,6 +240,8 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
     for name, words in COMMANDS.items():
         command = commands.add_parser(name, help=words)
         if name == chosen:
+            for kind in (None, "store"):
+                command.register("action", kind, _Once)
             module = import_module(f"orchestrator.cli.{name.replace('-', '_')}")
             module.add_arguments(command)
             command.set_defaults(command=module.run)

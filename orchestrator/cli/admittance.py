@@ -32,7 +32,6 @@ from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor admittance``."""
     parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device")
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument("--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",

@@ -2,11 +2,20 @@
 
 import argparse
 import math
+from typing import Any
 
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.errors import InputError
 from orchestrator.units import read_value, to_unit
+
+
+class Joined(argparse.Action):
+    """A list with commas, to which the option adds each time that it is given."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
+        before = getattr(namespace, self.dest)
+        setattr(namespace, self.dest, f"{before},{values}" if before else values)
 
 
 def assignment(text: str) -> tuple[str, bool | float | str]:

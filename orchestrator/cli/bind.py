@@ -12,7 +12,6 @@ from orchestrator.safe_files import write_text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor bind``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="binding file (default: FILE.toml, here)")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")

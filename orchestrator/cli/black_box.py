@@ -31,7 +31,6 @@ from orchestrator.study.modes import modes_of, running
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor black-box``."""
     add_case_arguments(parser)
     parser.add_argument("--component", required=True, metavar="NAME", help="the component to take for a black box")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_black_box)")

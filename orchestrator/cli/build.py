@@ -17,7 +17,6 @@ _SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabil
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor build``."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     parser.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
     parser.add_argument("--native", action="store_true", help="compiled FMUs with no Python in them")

@@ -74,7 +74,6 @@ def add_trust_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
-    """The scenarios of a case, as the options have them."""
     file, stop = load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "stop", None)
     scenarios = choose(
         file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
@@ -102,5 +101,4 @@ def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
 
 
 def parameters(options: argparse.Namespace) -> list[ParameterFile]:
-    """The parameter files that are given."""
     return [read_parameter_file(path) for path in options.parameters]

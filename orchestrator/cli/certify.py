@@ -17,7 +17,6 @@ from orchestrator.errors import INTERRUPTED, InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor certify``."""
     parser.epilog = (
         "Exit codes: 0 the converter passes; 1 it fails; 2 an input cannot be used; 3 the test is incomplete, as with "
         f"fewer than 13 reactances; 4 it passes, and an acceptance test of the FMU failed; {INTERRUPTED} interrupted. "

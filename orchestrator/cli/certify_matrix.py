@@ -30,12 +30,7 @@ from orchestrator.safe_files import made_folder
 
 
 def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
-    """Test every device by every code that is asked for, and write and print the matrix.
-
-    Returns
-    -------
-    As `CertificateMatrix.exit_code`.
-    """
+    """Test every device by every code that is asked for, and write and print the matrix."""
     codes, left_out = codes_of(options.code), tuple[str, ...]()
     if options.code == ALL and not options.declare:
         left_out = tuple(BY_DECLARATION)

@@ -23,15 +23,11 @@ from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.report.tables import PlainTable
+from orchestrator.watch.finding import MISFIT
 
 
 def run_norm(options: argparse.Namespace, device: Device) -> int:
-    """Run the test for one device, write its report and print the verdict.
-
-    Returns
-    -------
-    As `gfor certify`.
-    """
+    """Run the test for one device, write its report and print the verdict."""
     if options.declare:
         raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
                          f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
@@ -48,24 +44,24 @@ def run_norm(options: argparse.Namespace, device: Device) -> int:
 def certified_norm(
     options: argparse.Namespace, device: Device, folder: Path, console: Console
 ) -> tuple[Certification, list[Path]]:
-    """The certificate, and its files."""
     request = _request(options, device)
     return certified(
         options, request, folder, "orchestrator.certification.point",
         lambda executor, report: certify(request, executor, folder, report), partial(save, pdf=options.pdf), console,
-        (f"{device.name}, nts631", "points"),
+        (f"{device.name}, nts631: computing", "points"),
     )  # fmt: skip
 
 
 def show_norm(result: Certification, files: Sequence[Path], folder: Path, console: Console) -> None:
-    """Print a certificate."""
+    good = result.passed and not result.refused
+    console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
+    misfits = [str(f["message"]) for p in result.points.values() for f in p.findings if f["kind"] == MISFIT]
+    for text in dict.fromkeys(misfits):
+        console.print(escape(text), soft_wrap=True, highlight=False)
     console.print(_table(result), "")
     for v in result.verdicts:
         if said := v.of_base_critical():
             console.print(f"X_L = {v.X_L:g} pu: {escape(said)}", soft_wrap=True, highlight=False)
-    console.print("")
-    good = result.passed and not result.refused
-    console.print(f"[bold {'green' if good else 'red'}]{escape(result.sentence())}[/]", soft_wrap=True)
     if result.stored:
         console.print(f"{result.stored} of {len(result.points)} points were there already")
     console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)

@@ -34,7 +34,6 @@ _WORKER = ["orchestrator.certification.codes.change_point"]
 
 
 def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options."""
     group = parser.add_argument_group("what a failed criterion would take")
     group.add_argument("--sensitivities", action="store_true",
                        help="run every failed row again with each tunable parameter changed to either side, and say "

@@ -28,13 +28,13 @@ NOT_SUPPORTED = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor check``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
     parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what its variables mean (`gfor bind`)")
     parser.add_argument("--step", type=positive, metavar="H", help="communication step of use [s]")
     parser.add_argument("--case", metavar="CASE", help="with a case's step, operating point, values and binding")
     parser.add_argument("--component", metavar="NAME", help="which of the case's components it is")
     parser.add_argument("--scenario", metavar="NAME", help="which of the case's scenarios (default: the first with it)")
+    parser.add_argument("--frequency", type=positive, metavar="HZ", help="of the network (default: the FMU's f_n)")
     parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
     parser.add_argument(
         "--seed", type=int, metavar="N", help="of the random dips, jumps and points (default: of the file's bytes)"
@@ -66,6 +66,7 @@ def run(options: argparse.Namespace) -> int:
         component=options.component,
         scenario=options.scenario,
         seed=options.seed,
+        frequency=options.frequency,
         time_limit=options.time_limit,
         memory_limit=options.memory_limit,
     )
@@ -114,7 +115,8 @@ def _print(report: AcceptanceReport) -> None:
     if lacking := missing(report.protections):
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
     if report.trusted:
-        console.print(f"{escape(report.fmu.name)}: no check failed.")
+        left = f"; not judged: {', and '.join(report.not_judged)}" if report.not_judged else ""
+        console.print(f"{escape(report.fmu.name)}: no check failed{left}.")
     elif not report.failures:
         console.print(
             f"[bold yellow]{escape(report.fmu.name)}: not supported here: {', '.join(report.not_supported)}; "

@@ -23,10 +23,6 @@ class StudyCheckpoints:
 
     Parameters
     ----------
-    scenarios
-        All of them.
-    folder
-        Of the results.
     options
         As `with_request` gave them.
 

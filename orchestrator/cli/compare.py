@@ -14,7 +14,6 @@ from orchestrator.report.tables import PlainTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor compare``."""
     parser.add_argument("first", type=Path, metavar="A",
                         help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
@@ -25,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare two runs signal by signal."""
     with saying_warnings():
         found = compare(options.first, options.second, options.signal or (), options.start)
     if options.json:

@@ -26,7 +26,6 @@ from orchestrator.points.store import PointStore, any_kept
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor design``."""
     add_case_arguments(parser)
     defaults = DesignRequest(controller="")
     parser.add_argument(
@@ -188,7 +187,6 @@ def _how_it_goes_on(folder: Path) -> str:
 
 
 def _wanted(options: argparse.Namespace) -> Wanted:
-    """What the options ask of the design."""
     wanted = Wanted(
         delta_gain=options.delta_gain,
         gain_bounds=options.gain_bounds or DesignRequest(controller="").gain_bounds,

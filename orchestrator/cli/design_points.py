@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from orchestrator.api.coordinated_design import WORKERS_IMPORT, compute
 from orchestrator.cases.case import load_case
-from orchestrator.cli.arguments import whole_from_zero
+from orchestrator.cli.arguments import Joined, whole_from_zero
 from orchestrator.cli.case_arguments import parameters, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -33,7 +33,8 @@ def add_points_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--points", type=Path, metavar="FILE", help="operating points: a CSV file, as gfor screen has it"
     )
-    group.add_argument("--outages", metavar="WHICH", help="n-1, lines, units, or names, each at every point")
+    group.add_argument("--outages", action=Joined, metavar="WHICH",
+                       help="n-1, lines, units, or names, each at every point (repeatable)")  # fmt: skip
     group.add_argument(
         "--rank", type=whole_from_zero, default=3, metavar="N",
         help="converters for which a controller alone is designed to rank them (default: 3)",

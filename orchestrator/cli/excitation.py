@@ -22,7 +22,6 @@ def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def excitation_of(options: argparse.Namespace) -> Excitation:
-    """The excitation that the options describe."""
     if not options.from_hz < options.to_hz:
         raise InputError(f"--from-hz {options.from_hz:g} must be below --to-hz {options.to_hz:g}")
     return Excitation(options.method, options.from_hz, options.to_hz, amplitude=options.amplitude)

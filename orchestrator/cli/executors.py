@@ -10,7 +10,6 @@ from orchestrator.points.executor import Executor
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
-    """The three options."""
     parser.add_argument("--workers", type=count, metavar="N", help="processes to compute in (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
     parser.add_argument("--tls", metavar="DIR", help="folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")

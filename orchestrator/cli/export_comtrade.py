@@ -9,7 +9,6 @@ from orchestrator.cli.terminal import saying_warnings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor export-comtrade``."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a scenario's results, or its trajectory.nc")
     parser.add_argument("--signal", action="append", metavar="SIGNAL", help="'a.b' or 'a.b - c.d' (repeatable; all)")
     parser.add_argument("--out", type=Path, metavar="FILE.cfg", help="the recording (default: <RUN>/trajectory.cfg)")

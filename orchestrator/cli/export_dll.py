@@ -11,7 +11,6 @@ from orchestrator.units import read_value
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor export-dll``."""
     parser.add_argument("name", metavar="NAME", help="converter, such as gfor")
     parser.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
     parser.add_argument(

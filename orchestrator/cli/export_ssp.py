@@ -23,7 +23,6 @@ _TABLES: dict[str, Any] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor export-ssp``."""
     add_case_arguments(parser)
     parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s] (default: the case's)")
     parser.add_argument(

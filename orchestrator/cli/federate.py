@@ -13,7 +13,6 @@ from orchestrator.federation.ports import require_broker
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor federate``."""
     add_case_arguments(parser)
     parser.add_argument("--component", required=True, metavar="NAME", help="the component")
     parser.add_argument("--broker", required=True, metavar="ADDRESS", help="of the broker, such as tcp://host:23405")

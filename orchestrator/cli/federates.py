@@ -16,7 +16,6 @@ def port(text: str) -> int:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the engine."""
     group = parser.add_argument_group("federates over HELICS (extra `federation`)")
     group.add_argument("--engine", choices=ENGINES, default="local",
                        help="local: all components here; helics: some of them as federates")  # fmt: skip
@@ -35,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Names with commas between them."""
     found = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
     if not all(found):
         raise argparse.ArgumentTypeError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")

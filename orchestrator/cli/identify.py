@@ -13,13 +13,12 @@ from orchestrator.report.tables import PlainTable
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor identify``."""
     parser.epilog = (
         "Amplitudes are those at the start; an oscillation's is half of its peak, as it is one of two conjugate "
         "exponentials. '?' marks a mode in doubt, with the reasons below the table."
     )
     parser.add_argument("run", type=Path, metavar="RUN",
-                        help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
+                        help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
     parser.add_argument(
         "--start", type=seconds_or_none, default=2.0, metavar="T", help="beginning of the free response [s] (2)"

@@ -16,7 +16,6 @@ from orchestrator.report.tables import fmu_variables
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor info``."""
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
     parser.add_argument("--json", action="store_true", help="print JSON")
 

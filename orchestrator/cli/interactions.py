@@ -28,7 +28,6 @@ from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor interactions``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--threshold",
@@ -127,7 +126,6 @@ def _request(options: argparse.Namespace) -> InteractionsRequest:
 
 
 def _present(found: Interactions, folder: Path, console: Console, *, as_json: bool) -> None:
-    """Write the files and print the summary."""
     written, result, judgement = found.save(folder), found.result, found.judgement
     for text in found.warnings:
         make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")

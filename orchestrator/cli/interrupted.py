@@ -31,5 +31,4 @@ def is_interrupt(error: BaseException | None) -> bool:
 
 
 def ending(error: BaseException) -> str:
-    """How a command was ended and, where something was kept, how it goes on."""
     return ": ".join([calls.how, *getattr(error, "__notes__", ())])

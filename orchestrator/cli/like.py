@@ -37,12 +37,6 @@ def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path,
 
     Parameters
     ----------
-    scenarios
-        All of them.
-    rules
-        Of the master.
-    folder
-        For the results.
     turns
         Components with commas between them, in the order in which they step; the master's own where None.
     """

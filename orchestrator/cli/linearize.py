@@ -14,7 +14,6 @@ from orchestrator.study.linear_model_files import save_linear_model
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor linearize``."""
     add_case_arguments(parser, schedule=True)
     parser.add_argument(
         "--input",

@@ -27,12 +27,11 @@ from orchestrator.safe_files import made_folder
 from orchestrator.study import tables
 from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.answers import of_modes
-from orchestrator.study.load_model_weight import load_model_weight
+from orchestrator.study.load_model_weight import load_model_weights
 from orchestrator.study.modes import modes_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor modes``."""
     add_case_arguments(parser, schedule=True)
     parser.add_argument(
         "--range",
@@ -101,14 +100,14 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
         with staged(folder, new_run_id()) as staging:
             plots = [path.name for path in save_modes(results, staging)]
             written += [*sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
-    weight = None if options.black_box else load_model_weight(scenarios[0], results[0])
+    weights = [] if options.black_box else load_model_weights(scenarios, results, options.range)
     if options.json:
-        print(json.dumps(modes_json(results, [weight] if weight else []), indent=1, ensure_ascii=False))
+        print(json.dumps(modes_json(results, weights), indent=1, ensure_ascii=False))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_answers(console, [of_modes(r) for r in results], results)
     print_warnings(results)
-    if weight:
+    for weight in weights:
         make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(weight)}")
     for result in results:
         console.print(tables.all_modes(result), "")

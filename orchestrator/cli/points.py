@@ -56,10 +56,6 @@ class Progressing:
         ----------
         study
             Computes all points; it is given a callback for how many are done, of how many.
-        executor
-            Where the points are computed.
-        console
-            Shows the progress.
         told
             Of what, and what is counted, for lines on standard error where there is no terminal; no lines where None.
         """

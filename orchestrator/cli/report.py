@@ -8,7 +8,6 @@ from orchestrator.report.html.page import write_report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor report``."""
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of `gfor run`")
     parser.add_argument("others", type=Path, nargs="*", metavar="DIR", help="folders of sweeps and designs beside it")
     parser.add_argument("--out", type=Path, metavar="FILE.html", help="page (default: DIR/report.html)")

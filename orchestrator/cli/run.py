@@ -40,7 +40,6 @@ from orchestrator.study.run import RunResult
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor run``."""
     add_case_arguments(parser, optional=True, schedule=True)
     parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
     parser.add_argument(

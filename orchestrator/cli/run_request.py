@@ -32,7 +32,6 @@ _NOT_WITH_RESUME: Mapping[str, Any] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Both options, and what goes with them."""
     parser.add_argument(
         "--checkpoint",
         type=seconds_or_none,
@@ -134,8 +133,6 @@ def keep_request(folder: Path, options: argparse.Namespace) -> None:
 
     Parameters
     ----------
-    folder
-        Of the results.
     options
         As `with_request` gave them.
     """

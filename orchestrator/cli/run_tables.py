@@ -27,7 +27,6 @@ def on_one_thread(statistics: StepStatistics) -> str:
 
 
 def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
-    """What a tolerance made of the communication steps."""
     taken = f"{counts.accepted} steps" if counts.accepted else "no step"
     if counts.accepted:
         taken += f" of {1e3 * counts.shortest:.3g} to {1e3 * counts.longest:.3g} ms"
@@ -41,7 +40,6 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
 def print_run(
     console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None, *, details: bool = False
 ) -> None:
-    """How a study came out."""
     if early_end is not None:
         colour = "yellow" if early_end.interrupted else "red"
         words = f"[bold {colour}]{early_end.word}[/] {escape(early_end.place)}"

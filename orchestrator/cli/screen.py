@@ -13,7 +13,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.screening import WORKERS_IMPORT, Screening, compute
 from orchestrator.cases.case import load_case
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import frequency_range, percent
+from orchestrator.cli.arguments import Joined, frequency_range, percent
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -31,15 +31,15 @@ from orchestrator.screening.study import Shard, plan_screening
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor screen``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--points", type=Path, metavar="FILE",
         help="operating points: a CSV file, a row each (default: the case as it is)",
     )  # fmt: skip
     parser.add_argument(
-        "--outages", metavar="WHICH", help="n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3"
-    )
+        "--outages", action=Joined, metavar="WHICH",
+        help="n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
+    )  # fmt: skip
     parser.add_argument(
         "--sharing", choices=[str(rule) for rule in SharingRule],
         help="who feeds what an outage takes: units by droop and rating (default), by rating, or the slack alone",
@@ -111,7 +111,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _present(found: Screening, folder: Path, console: Console, options: argparse.Namespace) -> int:
-    """Write the files and print the summary."""
     written, result = found.save(folder), found.result
     if options.json:
         print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))

@@ -22,7 +22,6 @@ from orchestrator.sensitivities.tables import left_out, sensitivity_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor sensitivities``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--mode",

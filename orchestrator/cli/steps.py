@@ -15,7 +15,6 @@ from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor steps``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--error",

@@ -25,7 +25,6 @@ from orchestrator.sweep.axes import Vary, parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor sweep``."""
     add_case_arguments(parser)
     parser.add_argument(
         "--vary",

@@ -1,20 +1,23 @@
 """What all commands print, and where to."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.cases.facts import facts_of
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import Problem
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.manifest import ResultsWarning
-from orchestrator.study import tables
-from orchestrator.study.modes import ModesResult
-from orchestrator.study.run import RunResult
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.study.modes import ModesResult
+    from orchestrator.study.run import RunResult
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -30,8 +33,10 @@ def make_errors() -> Console:
 
 def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
+    from orchestrator.study import tables  # noqa: PLC0415 - imports all that a run needs
+
     reference = results[0].prepared.case.table.reference
-    if any(r.electromechanical for r in results):
+    if any(r.named or r.unnamed for r in results):
         title = reference.title if reference else None
         console.print(tables.named_modes(results, title))
         if reference and any(r.references for r in results):
@@ -53,6 +58,8 @@ def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> 
     """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
     that are most unusual.
     """
+    from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - imports the reading of cases
+
     facts = None if as_json else facts_of(scenarios[0])
     if facts is not None:
         make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
@@ -89,7 +96,7 @@ def print_findings(results: Sequence[RunResult]) -> None:
     console = make_errors()
     for result in results:
         for finding in result.findings:
-            if finding.message != str(result.failure):
+            if finding.message not in (str(result.failure), *result.modes.warnings):
                 name = result.modes.prepared.name
                 console.print(f"[bold yellow]found:[/bold yellow] {escape(f'scenario {name!r}: {finding.message}')}")
 

@@ -18,7 +18,6 @@ NOT_MET = 3
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
-    """``--fail-unstable``."""
     parser.add_argument(
         "--fail-unstable",
         action="store_true",
@@ -56,7 +55,6 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
 
 
 def add_details_argument(parser: argparse.ArgumentParser) -> None:
-    """``--details``."""
     parser.add_argument(
         "--details", action="store_true", help="print also the power flow, and each verdict with its eigenvalue"
     )

@@ -28,7 +28,6 @@ from orchestrator.report.progress import progress_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor verify``."""
     parser.epilog = (
         f"Exit codes: {DOES_NOT_HOLD} the certificate does not hold; 2 it cannot be read. Where it holds, that of its "
         "verdict as with gfor certify: 0 the converter passes; 1 it fails; 3 the test is incomplete; 4 it passes, and "
@@ -147,7 +146,6 @@ def _refused(content: dict[str, Any]) -> bool:
 
 
 def _verdict(content: dict[str, Any]) -> str:
-    """What the certificate says of the converter, in one line."""
     colour = "green" if content["verdict"] == PASSES and not _refused(content) else "red"
     tail = "; acceptance tests of the FMU failed" if _refused(content) else ""
     line = f"Its verdict: [bold {colour}]{escape(content['verdict'])}[/], "

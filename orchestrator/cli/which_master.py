@@ -38,7 +38,6 @@ _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor which-master``."""
     parser.add_argument("result", type=Path, nargs="?", metavar="RESULT.csv", help="what the tool gave")
     parser.add_argument("--build", type=Path, metavar="DIR", help="write the probe pair and how to run it")
     parser.add_argument("--platform", action="append", choices=sorted(TARGETS),

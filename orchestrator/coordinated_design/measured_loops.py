@@ -22,7 +22,6 @@ _RANK = 1e-6
 
 
 def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]) -> OpenLoops:
-    """The system with its loops open."""
     windows, known = blocks.state_windows(), blocks.components
     there = [place for place in places if place.component in known]
     p = len(blocks.output_names)

@@ -37,8 +37,6 @@ class Aim:
     ----------
     names
         Of the case's modes; none for all electromechanical ones.
-    least
-        Bound for the others.
     naming
         Gives the named modes; None where none is named.
     """
@@ -60,8 +58,6 @@ class Watched:
         Its column among the eigenvectors.
     floor
         Damping ratio that it may not fall below; None for a mode that the design damps.
-    hardly_moved
-        Whether the loops hardly move it.
     """
 
     value: complex
@@ -71,7 +67,6 @@ class Watched:
 
     @property
     def damping(self) -> float:
-        """Its damping ratio."""
         return damping_ratio(self.value)
 
 
@@ -162,12 +157,8 @@ def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, 
 
     Parameters
     ----------
-    watched
-        Its modes.
     growing, growing_before
         As `growth` gives them, with the setting and without it [1/s].
-    point
-        Number of the operating point.
     """
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
@@ -182,12 +173,6 @@ class RatedPoint:
 
     Parameters
     ----------
-    number
-        Of the point.
-    loops
-        Its open loops.
-    aim
-        Which modes are damped.
     largest
         The largest gain of every loop that may be closed [pu]; None where all modes count, also those that no loop
         moves.
@@ -247,7 +232,6 @@ class RatedPoint:
         return [k for k, mode in modes.items() if any(mode is one for one in wanted)]
 
     def worth(self, setting: Setting) -> Worth:
-        """The worth of a setting here."""
         if self._aim.naming is None:
             values, targets = self.loops.eigenvalues(setting), None
         else:

@@ -22,10 +22,6 @@ def search_settings(
 
     Parameters
     ----------
-    case, request, target, mode
-        What is designed, and the mode's name.
-    loop
-        The running system.
     frequency
         The mode's [rad/s], to which the centres of the lead/lag relate.
     """

@@ -40,8 +40,6 @@ Setting = Mapping["PodPlace", PodSetting]
 
 @dataclass(frozen=True, order=True)
 class PodPlace:
-    """One controller of one converter."""
-
     component: str
     controller: str
 
@@ -82,10 +80,6 @@ class OpenLoops:
     ----------
     A, U, V, D
         Shapes (r, r), (r, m), (m, r), (m, m).
-    places
-        Of the m loops.
-    names
-        Of all n states.
     right, left
         From the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same.
     rest
@@ -112,10 +106,6 @@ class OpenLoops:
         ----------
         A, U, V
             Shapes (n, n), (n, m), (m, n).
-        places
-            Of the m loops.
-        names
-            Of the n states.
         D
             Shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
         """
@@ -180,8 +170,6 @@ class OpenLoops:
         ----------
         vector
             As `solve` gives it, shape (r + k,).
-        left
-            Whether it is one of the left side.
         """
         if self.right is None or self.left is None:
             return vector

@@ -46,12 +46,8 @@ class PointsTask:
     ----------
     case, fingerprint, scenario, layers, step_size, trust_fmus
         As in `orchestrator.screening.point.StretchTask`.
-    items
-        What is computed.
     places
         Loops that are measured; none where only the modes are asked for.
-    key
-        Name of the points' file.
     """
 
     case: str
@@ -73,8 +69,6 @@ class PointModes:
     ----------
     status, text
         What became of it, and why.
-    warnings
-        What is to be borne in mind of it.
     doubtful
         Whether a limit is so close that the linear model is doubtful.
     values
@@ -110,7 +104,6 @@ class PointModes:
 
     @property
     def computed(self) -> bool:
-        """Whether the modes are known."""
         return self.status is Status.COMPUTED
 
     @property
@@ -132,12 +125,10 @@ class PointsRecord:
 
     @property
     def lasting(self) -> bool:
-        """Whether computing them again would give the same."""
         return all(point.lasting for point in self.points)
 
     @classmethod
     def lost(cls, task: Any, error: WorkerLostError) -> Self:
-        """The record of points whose worker died."""
         return cls(tuple(PointModes(Status.LOST, str(error), lasting=False) for _ in task.items))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:

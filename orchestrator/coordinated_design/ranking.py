@@ -18,8 +18,6 @@ class RankedConverter:
 
     Attributes
     ----------
-    place
-        The controller.
     shift
         How far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
         the residues' sizes over all points [rad/s per pu].
@@ -51,18 +49,12 @@ def ranked(
 
     Parameters
     ----------
-    places
-        The controllers.
     stages
         N_S of each.
-    points
-        The operating points.
     largest
         The largest gain [pu].
     frequency
         ω that the centres relate to [rad/s].
-    most
-        For how many a controller is designed.
     known
         A controller that was designed alone already, with its setting.
     """

@@ -11,7 +11,6 @@ from itertools import product
 
 import numpy as np
 import scipy.optimize
-import scipy.stats
 
 from orchestrator.arrays import Numbers
 from orchestrator.coordinated_design.objective import RatedPoint, Watched, Worth, together
@@ -58,8 +57,6 @@ class Tried:
 
 
 class SettingSearch:
-    """The search over the operating points."""
-
     def __init__(self, space: SettingSpace, points: Sequence[RatedPoint]) -> None:
         self._space, self._points = space, tuple(points)
         self.evaluations = 0
@@ -130,7 +127,9 @@ class SettingSearch:
             x[2::3] = share
             yield self._space.clipped(x)
         if count > 1:
-            spread = scipy.stats.qmc.Sobol(3 * count, seed=0).random(min(_SPREAD * count, _MOST_SPREAD))
+            from scipy.stats.qmc import Sobol  # noqa: PLC0415 - a second to import
+
+            spread = Sobol(3 * count, seed=0).random(min(_SPREAD * count, _MOST_SPREAD))
             yield from self._space.lowest + spread * (self._space.highest - self._space.lowest)
 
     def _wanted_turns(self) -> list[float]:
@@ -238,7 +237,6 @@ class _Program:
         self._matrix, self._right = np.array(matrix).reshape(len(right), len(lowest) + 3), np.array(right)
 
     def change(self, radius: float) -> Numbers | None:
-        """The change of x; None where there is none."""
         limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
         cost = np.zeros(len(limits) + 3)
         cost[-3:] = _BESIDE - 1.0, -_BESIDE, _PRICE

@@ -26,8 +26,6 @@ class PodGroup:
     ----------
     controller
         ``pod_p`` or ``pod_q``.
-    components
-        The converters.
     key
         Their names in a parameter file.
     stages
@@ -47,7 +45,6 @@ class PodGroup:
 
     @property
     def places(self) -> tuple[PodPlace, ...]:
-        """The loops of the group."""
         return tuple(PodPlace(component, self.controller) for component in self.components)
 
 
@@ -56,8 +53,6 @@ class SettingSpace:
 
     Parameters
     ----------
-    groups
-        Of controllers with one setting.
     gain_bounds
         Of every gain [pu].
     frequency
@@ -74,7 +69,6 @@ class SettingSpace:
         self.highest = np.array([x for turn in turns for x in (turn, high * turn, 1.0)])
 
     def of_group(self, group: PodGroup) -> "SettingSpace":
-        """The space of one group alone."""
         return SettingSpace([group], self._gain_bounds, self.frequency)
 
     def clipped(self, x: Numbers) -> Numbers:
@@ -90,7 +84,6 @@ class SettingSpace:
         return self.clipped(x)
 
     def group_settings(self, x: Numbers, *, searching: bool = False) -> list[PodSetting]:
-        """The setting of each group."""
         found = []
         for group, (turn, centre, gain) in zip(self.groups, x.reshape(-1, 3).tolist(), strict=True):
             angle = turn * LARGEST_STAGE_ANGLE * group.stages

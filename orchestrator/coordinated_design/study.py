@@ -90,8 +90,6 @@ class PointsDesignRequest:
 
 @dataclass(frozen=True)
 class PointsDesignPlan:
-    """What a design over operating points computes."""
-
     request: PointsDesignRequest
     case: Case
     prepared: PreparedScenario
@@ -117,8 +115,6 @@ def plan_points_design(
 
     Parameters
     ----------
-    case, request
-        Of what, and what is asked for.
     points
         CSV file with the operating points, as `gfor screen` takes it.
     outages
@@ -208,20 +204,14 @@ class PointsDesign:
 
     Attributes
     ----------
-    plan
-        What was computed.
     frequency
         ω that the centres relate to [rad/s].
-    settings
-        Of each group.
     found
         The search's own figures, on the linear models; nothing of the verdict rests on them.
     points
         Every operating point with every outage, without the controllers and with them, all modes computed anew.
     ranking
         Converters by what a controller there alone would give, the best first.
-    evaluations
-        How often all points were computed in the search.
     compared
         Number of settings of an exhaustive grid that were tried; 0 without one.
     """
@@ -237,7 +227,6 @@ class PointsDesign:
 
     @property
     def verdict(self) -> PointsVerdict:
-        """What it comes to over all points."""
         request = self.plan.request
         return PointsVerdict(self.points, request.damping, request.gain_bounds[1], self.compared)
 
@@ -255,14 +244,8 @@ def design_over_points(
     ----------
     plan
         As `plan_points_design` gives it.
-    executor
-        Where the points are computed.
-    store
-        Keeps points as soon as they are computed.
     report
         Called with the numbers of points done and in all, first without and then with the controllers.
-    stage
-        Called with the name of each stage when it begins.
     """
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))
@@ -367,16 +350,12 @@ def modes_at(
 
     Parameters
     ----------
-    plan
-        Points and outages.
     values
         By ``component.variable``; they go before all layers.
     places
         Loops that are measured as well.
     executor, store
         Where the points are computed, and what keeps them.
-    report
-        Called with the numbers of points done and in all.
     """
     layers = (*plan.layers, OptionValues.of(values))
     content = {

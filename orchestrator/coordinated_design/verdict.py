@@ -44,10 +44,6 @@ class JudgedPoint:
 
     Attributes
     ----------
-    point, outage
-        Which.
-    before, after
-        The modes there.
     target_before, target
         The least damped of the modes that the design damps; None where there is none.
     other
@@ -78,7 +74,6 @@ class JudgedPoint:
 
     @property
     def grows(self) -> bool:
-        """Whether the system grows with the controllers."""
         return growth(self.after.values) > 0
 
     @property
@@ -90,7 +85,6 @@ class JudgedPoint:
 
     @property
     def where(self) -> str:
-        """The point and the outage in words."""
         return f"{self.point.name}, {self.outage.name}"
 
     @property
@@ -126,7 +120,6 @@ def judged(
     aim: Aim,
     predicted: Mapping[int, Worth],
 ) -> Iterator[JudgedPoint]:
-    """Every point with what became of it."""
     for k, here in enumerate(where):
         yield _judged(here, before[k], after[k], aim, predicted.get(k))
 
@@ -179,8 +172,6 @@ class PointsVerdict:
 
     Parameters
     ----------
-    points
-        Every point with what became of it.
     wanted
         Damping ratio that is wanted everywhere; None for the best that there is.
     largest

@@ -21,7 +21,6 @@ def verdict_sentence(verdict: PointsVerdict) -> str:
 
 
 def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
-    """The verdict on all points and outages."""
     total, wanted = len(verdict.points), verdict.wanted
     limiting, worst = verdict.limiting, verdict.worst
     if limiting is None or limiting.target is None or worst is None:
@@ -75,7 +74,6 @@ def _reasons(verdict: PointsVerdict) -> list[str]:
 
 
 def what_it_rests_on(design: PointsDesign) -> str:
-    """How the setting was found, and what the verdict rests on."""
     request, steps = design.plan.request, design.found.steps
     modes = "all modes from 0.1 to 2 Hz" if not request.modes else "the modes " + ", ".join(request.modes)
     return (
@@ -88,7 +86,6 @@ def what_it_rests_on(design: PointsDesign) -> str:
 
 
 def settings_table(design: PointsDesign) -> Table:
-    """The setting of each group."""
     table = make_table("Settings", "Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
     for group, setting in zip(design.plan.groups, design.settings, strict=True):
         table.add_row(group.name, *_setting(setting), str(len(group.components)))

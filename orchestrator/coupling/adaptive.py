@@ -51,16 +51,12 @@ class AdaptiveLoop:
 
     Parameters
     ----------
-    inner
-        Does single steps of any length, with inputs on straight lines.
     groups
         Components that step together, in the order of the schedule.
     y
         All coupled outputs; the loops write them.
     tracks
         Where each output went; the loops write them.
-    schedule
-        With its tolerance.
     step_size
         The communication step [s].
     """

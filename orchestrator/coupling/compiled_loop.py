@@ -106,8 +106,6 @@ class CompiledLoop:
     ----------
     library
         `loop_library`.
-    groups, y, tracks
-        As `orchestrator.coupling.loop.make_loop`.
     threads
         How many step; None for as many as make a step shortest, up to one for each core, and only while they are seen
         to be faster than one.
@@ -211,8 +209,6 @@ class CompiledLoop:
         ----------
         steps, seconds
             Communication steps that were done just now, and the wall-clock time they took [s].
-        team
-            Who did them.
         """
         self._done += steps
         self._together += steps if team is not None else 0

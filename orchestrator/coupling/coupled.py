@@ -31,33 +31,18 @@ _SAME = 1e-6
 
 
 def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
-    """A component as its plan has it, on this machine."""
     return open_component(name, plan.description, directory, isolated=plan.isolated)
 
 
 class CoupledComponents:
     """Components at their common start; a context manager that releases every FMU.
 
-    Parameters
-    ----------
-    system, schedule, step_size, stop_time, opener
-        As `orchestrator.coupling.master.Master`.
-
     Attributes
     ----------
     y
         All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    late_starts
-        As `orchestrator.coupling.master.Master`.
-    exchanges
-        What each component sends and takes.
     wires
         The connections that do more than carry a value.
-
-    Raises
-    ------
-    InputError, ComponentError
-        As `orchestrator.coupling.master.Master`.
     """
 
     def __init__(
@@ -225,7 +210,6 @@ def _begin(component: Component, plan: ComponentPlan, stop_time: float | None) -
 
 
 def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
-    """Whether a component has the parameters that it was given."""
     try:
         values = component.values(plan.parameters)
     except ComponentError:

@@ -22,8 +22,6 @@ class Event:
     ----------
     time
         [s]
-    component
-        Whose variables are set.
     """
 
     time: float
@@ -50,7 +48,6 @@ class LoadChange(Event):
     scale: float
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {f"{self.load}.scale": self.scale}
 
 
@@ -62,7 +59,6 @@ class LoadSwitching(Event):
     scale: float = 0.0
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {f"{self.load}.scale": self.scale}
 
 
@@ -74,7 +70,6 @@ class LineSwitching(Event):
     connected: bool
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {line_variable(self.line, "connected"): self.connected}
 
 
@@ -86,7 +81,6 @@ class ShuntSwitching(Event):
     connected: bool
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {f"{self.shunt}.connected": self.connected}
 
 
@@ -99,7 +93,6 @@ class UnitSwitching(Event):
     has_breaker: bool = True
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {f"{self.unit}.connected": self.connected}
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
@@ -117,7 +110,6 @@ class BranchChange(Event):
     R: float | None = None
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         values = {line_variable(self.line, "X"): self.X}
         return values if self.R is None else values | {line_variable(self.line, "R"): self.R}
 
@@ -147,7 +139,6 @@ class ReferenceChange(Event):
     delta: float
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         scope, _, name = self.reference.rpartition(".")
         return {f"{scope}.delta_{name}" if scope else f"delta_{name}": self.delta}
 
@@ -160,7 +151,6 @@ class ParameterChange(Event):
     value: float | bool
 
     def settings(self) -> Mapping[str, float | bool]:
-        """The values that the event sets, by variable."""
         return {self.parameter: self.value}
 
 
@@ -185,10 +175,6 @@ class WireFault(Fault):
     ----------
     time, component
         As `Event`; the component is the one that the connection leads to.
-    connection
-        Which one.
-    imperfection
-        What it does from then on.
     """
 
     connection: Connection
@@ -200,15 +186,7 @@ class WireFault(Fault):
 
 @dataclass(frozen=True, slots=True)
 class WireRecovery(Fault):
-    """An imperfection of a connection ends; what it has permanently holds again.
-
-    Parameters
-    ----------
-    time, component, connection
-        As `WireFault`.
-    imperfection
-        What ends.
-    """
+    """An imperfection of a connection ends; what it has permanently holds again."""
 
     connection: Connection
     imperfection: Imperfection

@@ -37,12 +37,6 @@ class FilteredRecorder(Recorder):
 
     Parameters
     ----------
-    names
-        What is recorded.
-    interval
-        Communication steps between two rows.
-    sink
-        Where blocks of rows go.
     keep
         Each ``keep``-th row stays in memory.
     """

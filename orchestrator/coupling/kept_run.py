@@ -23,10 +23,6 @@ def state_of(
 
     Parameters
     ----------
-    stepper
-        What runs.
-    observers
-        Those that can go on in another process are asked for their position.
     components
         Serialised state of each FMU; by default they are asked for it.
     applied, seconds, spent

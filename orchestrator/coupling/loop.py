@@ -22,8 +22,6 @@ class PythonLoop:
 
     Parameters
     ----------
-    schedule
-        For what is special about its steps.
     hand_over
         Sets all inputs before each step; by default each component takes its own as it steps.
     """
@@ -119,10 +117,6 @@ def make_loop(
         All coupled outputs; the loop writes them.
     tracks
         Where each output went; the loop writes them.
-    schedule
-        What is special about its steps decides whether the compiled loop can do them.
-    hand_over
-        As for `PythonLoop`.
     threads
         As for `CompiledLoop`; the loop in Python has one.
     """

@@ -76,8 +76,6 @@ class Master(Stepper):
         ----------
         stop_time
             [s]
-        events, observers
-            What happens, and who looks on.
         keeper
             Says where an earlier run of the same system is taken up, and keeps this one's state when it is due, at
             the end, and where an interrupt ends it.

@@ -1,13 +1,16 @@
 """Observers watch a run from outside: recording, progress and anything a user adds."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.coupling.tracks import Tracks
-from orchestrator.fmi.component import Component
+if TYPE_CHECKING:
+    from orchestrator.coupling.tracks import Tracks
+    from orchestrator.fmi.component import Component
 
 
 class ObservedRun(Protocol):

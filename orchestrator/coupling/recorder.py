@@ -35,15 +35,11 @@ class Recorder:
 
     Parameters
     ----------
-    names
-        What is recorded.
     every
         Communication steps between two rows.
     after_exchange
         Hand every component the newest outputs of its partners before anything is read; else outputs are recorded as
         they were read at the end of the step, with the inputs that were held in it.
-    sink
-        Where blocks go.
     keep
         Each ``keep``-th row stays in memory, beginning with the first.
 
@@ -165,7 +161,6 @@ class Recorder:
         self._since = monotonic()
 
     def end(self, run: ObservedRun) -> None:
-        """What was recorded stays, and goes to the sink."""
         self._hand_over()
 
     # -- taking a run up again -------------------------------------------------------------------

@@ -32,11 +32,9 @@ class MemoryRows:
         self._values: list[NDArray[np.float64]] = []
 
     def clear(self) -> None:
-        """Forget all."""
         self._times, self._values = [], []
 
     def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """Take a whole block."""
         begin = -first % self._every
         self._times.append(times[begin :: self._every].copy())
         self._values.append(values[begin :: self._every].copy())

@@ -80,8 +80,6 @@ class Run:
 
         Parameters
         ----------
-        stop, due
-            As `until`.
         first
             Communication point at which the run began.
         """

@@ -32,8 +32,6 @@ class RunState:
 
     Attributes
     ----------
-    index
-        Communication steps that are done.
     applied
         Whether the events of this communication point have happened.
     handed_over
@@ -66,7 +64,6 @@ class RunState:
     wires: Sequence[Mapping[str, NDArray[np.float64]]]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The same as arrays by name."""
         found: dict[str, NDArray[Any]] = {
             "place": np.array([self.index, self.applied, self.handed_over], dtype=np.int64),
             "seconds": np.array([self.seconds, *self.spent]),
@@ -111,7 +108,6 @@ class RunState:
 
 
 def resume_observers(observers: Iterable[object], kept: RunState) -> None:
-    """Tell observers how far they had come."""
     resumable = [observer for observer in observers if isinstance(observer, Resumable)]
     if len(resumable) != len(kept.observers):
         raise InputError(
@@ -123,8 +119,6 @@ def resume_observers(observers: Iterable[object], kept: RunState) -> None:
 
 
 class Keeper(Protocol):
-    """Keeps the state of a run while it goes on."""
-
     def latest(self) -> RunState | None:
         """Where the run is to go on; None where it is to begin."""
 
@@ -167,7 +161,6 @@ def why_not_kept(description: FmuDescription) -> str | None:
 
 
 def state_as_bytes(component: Component) -> bytes:
-    """The present state of a component."""
     state = component.save_state()
     try:
         return component.serialize_state(state)

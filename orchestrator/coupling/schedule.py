@@ -74,8 +74,6 @@ class Schedule:
     ticks_per_second
         Of a master that keeps time in whole ticks: its FMUs are told differences of times, which rounding makes not
         quite equal. None tells them the communication step itself.
-    coupling
-        What inputs do during a step.
     micro_step
         Of second order: an FMU does a step in parts of at most this [s]; None does it in one.
     tolerance

@@ -44,8 +44,6 @@ Values = NDArray[np.float64]
 
 
 class _LineLoop:
-    """What both schedules share."""
-
     def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
         self._groups, self._y, self._tracks, self._schedule = groups, y, tracks, schedule
         self._turns = [exchange for group in groups for exchange in group]
@@ -158,15 +156,7 @@ class MidpointLoop(_LineLoop):
 
 
 class CompiledMidpointLoop(CompiledLoop):
-    """The same as `MidpointLoop` in C, to the last bit.
-
-    Parameters
-    ----------
-    library
-        The compiled loops.
-    groups, y, tracks, schedule
-        As `MidpointLoop`.
-    """
+    """The same as `MidpointLoop` in C, to the last bit."""
 
     def __init__(
         self, library: Any, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
@@ -302,13 +292,7 @@ class NewtonLoop(_LineLoop):
 def line_loop(
     groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
 ) -> MidpointLoop | CompiledMidpointLoop | NewtonLoop:
-    """The loop of a schedule of second order.
-
-    Parameters
-    ----------
-    groups, y, tracks, schedule
-        As `orchestrator.coupling.loop.make_loop`.
-    """
+    """The loop of a schedule of second order."""
     if schedule.coupling == "newton":
         return NewtonLoop(groups, y, tracks, schedule)
     library = compiled_loop.loop_library()

@@ -34,14 +34,10 @@ def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.flo
 
     Parameters
     ----------
-    calls
-        Numbers of the calls.
     bound
         Of every call, whether the calling thread alone may do it.
     costs
         Of every call [s].
-    threads
-        How many share them.
     """
     own = tuple(call for call in calls if bound[call])
     loads = [0.0] * threads
@@ -57,17 +53,7 @@ def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.flo
 def best_number(
     groups: Sequence[Sequence[int]], bound: NDArray[np.bool_], costs: NDArray[np.float64], most: int
 ) -> int:
-    """The number of threads, from 1 to ``most``, by which a step should take the least time.
-
-    Parameters
-    ----------
-    groups
-        The calls of each.
-    bound, costs
-        As for `shares`.
-    most
-        Threads that there can be.
-    """
+    """The number of threads, from 1 to ``most``, by which a step should take the least time."""
 
     def seconds(threads: int) -> float:
         found = (_of_group(group, bound, costs, threads) for group in groups)

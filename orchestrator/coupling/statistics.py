@@ -51,12 +51,8 @@ class StepStatistics:
         In the order of the schedule. What is left of the time is the coupling, the observers, and threads that wait.
     simulated
         Time that was simulated [s].
-    threads
-        How many stepped FMUs.
     one_thread
         By component, why only one thread may step it.
-    adaptive
-        The steps that a tolerance made, where there is one.
     """
 
     steps: int

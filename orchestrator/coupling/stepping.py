@@ -21,14 +21,6 @@ from orchestrator.fmi.component import Component, RealBatch
 
 
 class Stepper(CoupledComponents):
-    """Components that step together.
-
-    Parameters
-    ----------
-    system, schedule, step_size, stop_time, opener, threads
-        As `orchestrator.coupling.master.Master`.
-    """
-
     def __init__(
         self,
         system: System,
@@ -143,8 +135,6 @@ class Stepper(CoupledComponents):
 
         Parameters
         ----------
-        steps
-            How many it made.
         seconds
             How long it took [s].
         before

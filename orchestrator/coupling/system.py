@@ -11,8 +11,6 @@ from orchestrator.fmi.values import Scalar
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """One variable of one component."""
-
     component: str
     variable: str
 
@@ -82,8 +80,6 @@ class System:
         ----------
         name
             By which connections and signals mean it.
-        description
-            Of its FMU.
         parameters
             Values that are set before initialisation, by variable.
         inputs

@@ -23,7 +23,6 @@ class Tracks:
 
     @property
     def high(self) -> NDArray[np.float64]:
-        """Largest values."""
         return self._table[:, _HIGH]
 
     @property

@@ -11,8 +11,6 @@ _VALID = 5000
 
 
 class Trial:
-    """Which way the next communication steps are done."""
-
     def __init__(self) -> None:
         self._seconds, self._left = [0.0, 0.0], _BLOCK
         self._block: int | None = 0

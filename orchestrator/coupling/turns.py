@@ -16,8 +16,6 @@ class Exchange:
     ----------
     inputs, outputs
         Batches of the connected variables. The outputs' values are a window of the system's vector y.
-    window
-        Where in y that is.
     sources
         For each input the index in y of the output that feeds it.
     delivered
@@ -39,8 +37,6 @@ class Exchange:
 
 
 class Stepped(Protocol):
-    """What the loop calls of a component."""
-
     @property
     def name(self) -> str:
         """For errors."""
@@ -73,8 +69,6 @@ class Stepped(Protocol):
 
 
 class Batch(Protocol):
-    """What the loop needs of the values that a component takes or gives."""
-
     @property
     def names(self) -> tuple[str, ...]:
         """Of the variables."""
@@ -93,8 +87,6 @@ class Batch(Protocol):
 
 
 class Turn(Protocol):
-    """What takes its turn in the loop: a component with its connected values, or a bank of connections."""
-
     @property
     def component(self) -> Stepped:
         """What is stepped."""
@@ -157,10 +149,6 @@ def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
 
     Parameters
     ----------
-    outputs
-        Of the component.
-    index
-        Which of them.
     time
         At which it was read [s].
     """

@@ -74,8 +74,6 @@ class WireBank:
 
     Parameters
     ----------
-    plans
-        What each of them does.
     step_size
         Communication step [s].
     sources
@@ -128,7 +126,6 @@ class WireBank:
 
     @property
     def component(self) -> "WireBank":
-        """What the loop steps."""
         return self
 
     @property

@@ -25,8 +25,6 @@ _LONGEST_LOG = 20_000
 
 
 class Exchanges(Protocol):
-    """What a federation does for its components."""
-
     def begin_step(self, name: str, time: float, inputs: Sequence[float]) -> None:
         """A component's inputs for the step from a time [s]; the step begins when its whole slot has them."""
 
@@ -42,14 +40,10 @@ class FederatedComponent(Derived):
 
     Parameters
     ----------
-    part
-        What it exchanges.
     description
         Of the FMU; of a foreign federate only what it publishes and takes.
     inner
         The FMU in this process until `hand_over`; None of a foreign federate.
-    exchanges
-        The federation.
     published
         Outputs that the federate publishes, in this order.
     """

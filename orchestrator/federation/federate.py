@@ -40,12 +40,6 @@ class OwnFederate:
 
     Parameters
     ----------
-    name
-        Of the component and of the federate.
-    description
-        The FMU.
-    broker
-        Its address.
     to_join
         How long a broker is waited for [s].
     """
@@ -163,7 +157,6 @@ class OwnFederate:
             return {"number": asked["number"], "error": str(error)}
 
     def do_hello(self) -> dict[str, Any]:
-        """Say what this is."""
         return {"protocol": PROTOCOL, "version": version("gfor-cosim"), "guid": self._description.guid}
 
     def do_configure(self, setting: dict[str, Any]) -> None:
@@ -200,7 +193,6 @@ class OwnFederate:
         return self._real("get_real", references, [0.0] * len(references))
 
     def do_set(self, values: dict[str, float | bool]) -> None:
-        """Set variables by name."""
         self._fmu().set(values)
 
     def do_values(self, names: list[str]) -> dict[str, float | bool]:

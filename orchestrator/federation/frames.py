@@ -12,14 +12,11 @@ JOIN, COMMAND, FIRST, STEP, END, FAULT = b"J", b"C", b"1", b"S", b"E", b"F"
 
 
 class Frames:
-    """One end of the connection."""
-
     def __init__(self, connection: socket.socket) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket, self._rest = connection, b""
 
     def send(self, kind: bytes, content: bytes = b"") -> None:
-        """Send a frame."""
         self._socket.sendall(_HEAD.pack(kind, len(content)) + content)
 
     def receive(self, seconds: float | None = None) -> tuple[bytes, bytes]:
@@ -49,7 +46,6 @@ class Frames:
             self._rest += more
 
     def close(self) -> None:
-        """Close this end."""
         self._socket.close()
 
 

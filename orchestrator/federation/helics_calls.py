@@ -71,12 +71,10 @@ def optional_subscription(federate: Any, name: str, unit: str) -> Any:
 
 
 def publication(federate: Any, name: str, unit: str) -> Any:
-    """A publication of a double."""
     helics = library()
     return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_DOUBLE, unit)
 
 
 def text_publication(federate: Any, name: str) -> Any:
-    """A publication of a text."""
     helics = library()
     return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_STRING, "")

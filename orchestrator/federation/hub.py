@@ -150,7 +150,6 @@ class Hub:
         )  # fmt: skip
 
     def _published(self, part: dict[str, Any]) -> dict[str, Any]:
-        """What a federate publishes of its component."""
         name = part["name"]
         published = list(ask(self._federate, name, "publications") or ())
         for variable in part["needed"]:
@@ -204,7 +203,6 @@ class Hub:
         return json.dumps({p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}).encode()
 
     def _values(self, part: dict[str, Any]) -> list[float]:
-        """What a federate has just published."""
         helics, name = library(), part["name"]
         if helics.helicsInputIsUpdated(self._faults[name]) and (
             text := helics.helicsInputGetString(self._faults[name])

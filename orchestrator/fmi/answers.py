@@ -55,7 +55,6 @@ def number(answer: Any) -> int:
 
 
 def table(answer: Any) -> dict[str, float | bool]:
-    """Names and numbers."""
     if not isinstance(answer, dict) or not all(_is_number(value) for value in answer.values()):
         raise _not("a table of numbers", answer)
     return answer
@@ -79,14 +78,12 @@ def progress(answer: Any) -> tuple[bool, float | None]:
 
 
 def names(answer: Any) -> list[str]:
-    """A list of texts."""
     if not isinstance(answer, list) or not all(isinstance(text, str) for text in answer):
         raise _not("a list of texts", answer)
     return answer
 
 
 def hexadecimal(answer: Any) -> bytes:
-    """Bytes, written as hexadecimal digits."""
     try:
         return bytes.fromhex(answer)
     except (TypeError, ValueError):

@@ -74,13 +74,7 @@ def read_model_description_text(path: Path) -> bytes:
 
 
 def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
-    """The bytes of another file in an archive; None where there is no such file.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """The bytes of another file in an archive; None where there is no such file."""
     with _opened(path, kind) as archive:
         if name not in archive.namelist():
             return None
@@ -89,25 +83,13 @@ def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
 
 
 def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
-    """Names of all files in an archive, once they were found harmless.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """Names of all files in an archive, once they were found harmless."""
     with _opened(path, kind) as archive:
         return tuple(entry.filename for entry in archive.infolist())
 
 
 def listed_twice(path: Path) -> tuple[str, ...]:
-    """Names of files that an archive lists more than once, with the same bytes.
-
-    Raises
-    ------
-    FmuFileError
-        As `extract`.
-    """
+    """Names of files that an archive lists more than once, with the same bytes."""
     names = [name for name in names_in(path) if not name.endswith("/")]
     return tuple(name for name, count in Counter(names).items() if count > 1)
 
@@ -180,11 +162,11 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
 def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
     """The archive, with harmless names and sizes; whatever zipfile raises becomes one error."""
     ending = f".{kind.lower()}"
-    if path.is_dir():
-        raise FmuFileError(f"{path}: it is a folder; give the path of an {ending}")
-    if not path.is_file():
-        raise FmuFileError(f"{path}: there is no such file; give the path of an {ending}")
     try:
+        if path.is_dir():
+            raise FmuFileError(f"{path}: it is a folder; give the path of an {ending}")
+        if not path.is_file():
+            raise FmuFileError(f"{path}: there is no such file; give the path of an {ending}")
         if not zipfile.is_zipfile(path):
             raise FmuFileError(
                 f"{path}: it is not an {kind}: an {ending} is a zip archive and this file is not; export it again"
@@ -197,7 +179,7 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
             f"{path}: the archive is damaged ({told(error)}); export it again, or get the file anew"
         ) from error
     except OSError as error:
-        raise FmuFileError(f"{path}: the file cannot be unpacked: {error.strerror or error}") from error
+        raise FmuFileError(f"{path}: the file cannot be read: {error.strerror or error}") from error
 
 
 def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:

@@ -49,7 +49,6 @@ def binary_path(description: FmuDescription, directory: Path) -> Path:
 
 
 def load(description: FmuDescription, directory: Path) -> ctypes.CDLL:
-    """The binary of an extracted FMU, loaded."""
     library, before = binary_path(description, directory), os.getcwd()
     os.chdir(library.parent)  # where some binaries look for what they depend on
     try:

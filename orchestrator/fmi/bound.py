@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from fmus.toolchain.compiler import compile_here
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.errors import ComponentError, InputError
+from orchestrator.errors import ComponentError, InputError, NotFiniteError
 from orchestrator.fmi.component import Component, Derived, RealBatch
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.port import PORT, START, BoundDescription, PhasorMap
@@ -129,7 +129,16 @@ class BoundComponent(Derived):
         return self.inner.one_thread
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
-        self.inner.check(status, call, time)
+        try:
+            self.inner.check(status, call, time)
+        except NotFiniteError:
+            raise
+        except ComponentError as error:
+            unlike = self.description.unlike_delivered()
+            if not unlike:
+                raise
+            said = f"{error.log}; likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]"
+            raise ComponentError(error.component, error.call, error.status, said, error.time, error.kind) from error
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self.inner.progress_of_step()
@@ -153,13 +162,7 @@ class BoundComponent(Derived):
     # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool], *, own: bool = False) -> None:
-        """Set variables by name; ``own`` means the FMU's own names.
-
-        Raises
-        ------
-        InputError, ComponentError
-            As `Component.set`.
-        """
+        """Set variables by name; ``own`` means the FMU's own names."""
         for name, value in values.items():
             if not own and name in self._start:
                 self._start[name] = float(value)

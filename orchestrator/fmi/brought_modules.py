@@ -58,7 +58,6 @@ class BroughtModules:
                 builtins.__import__ = _import
 
     def holds(self, file: object) -> bool:
-        """Whether a file or folder lies in the FMU."""
         return isinstance(file, str) and (file == self.root or file.startswith((f"{self.root}/", f"{self.root}\\")))
 
     def offers(self, top: str) -> bool:
@@ -66,7 +65,6 @@ class BroughtModules:
         return top in (self._names or ())
 
     def may_stand_first(self, top: str) -> bool:
-        """Whether an import of this name has to do with the FMU."""
         return self.offers(top) or bool(self._shown) or self in _loading
 
     def settle(self) -> None:
@@ -104,7 +102,6 @@ class BroughtModules:
 
     @contextmanager
     def seen(self, top: str, own: bool) -> Iterator[None]:
-        """For one import of one name: the FMU's modules of that name, or those of all others."""
         self._note_folders()
         changed, first = (top in self._shown) != own, bool(sys.path) and self.holds(sys.path[0])
         if changed:
@@ -132,13 +129,16 @@ class BroughtModules:
         self._shown ^= {top}
 
 
+_known: dict[str, BroughtModules] = {}
 _living: dict[str, BroughtModules] = {}
 _loading: list[BroughtModules] = []
 
 
 def brought_by(resources: Path) -> BroughtModules:
-    """The modules of an FMU that lies in this folder; instances that share the folder share them."""
-    return _living.get(str(resources)) or BroughtModules(str(resources))
+    """The modules of an FMU that lies in this folder, for all its instances: a class made for each would never go."""
+    for place in [place for place in _known.keys() - _living.keys() if not Path(place).exists()]:
+        del _known[place]
+    return _known.setdefault(str(resources), BroughtModules(str(resources)))
 
 
 def _modules_in(place: str) -> set[str]:

@@ -146,8 +146,6 @@ class RealBatch:
 
     Attributes
     ----------
-    component
-        Whose they are.
     values
         Array of shape (n,), the caller's to read or fill.
     """

@@ -31,8 +31,6 @@ class ConfinedProcess:
     ----------
     worker
         Module whose function ``main`` does what the mailbox asks.
-    request
-        What it is told, beside what is told to every worker.
     readable
         Files and folders that it may read.
     limits
@@ -42,8 +40,6 @@ class ConfinedProcess:
 
     Attributes
     ----------
-    box
-        The mailbox between this process and the worker.
     protections
         What keeps it from the rest of the machine; empty until the worker has told.
     """
@@ -100,7 +96,6 @@ class ConfinedProcess:
 
     @property
     def group(self) -> int:
-        """Number of the process group that all of its processes are in."""
         return self._process.pid
 
     def wait(self, seconds: float) -> bool:
@@ -138,6 +133,5 @@ class ConfinedProcess:
             process.stdin.close()
 
     def close(self) -> None:
-        """End it, and remove what was written for it."""
         self.end()
         remove(self.folder)

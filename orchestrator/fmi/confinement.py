@@ -56,8 +56,6 @@ class Means:
         Whether /proc shows its own processes only.
     read_only
         Whether it sees every folder but its own read-only, with a limit on the size of its own.
-    version
-        Of Landlock.
     supervised
         Whether another process watches over its end.
     """

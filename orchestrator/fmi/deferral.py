@@ -61,7 +61,6 @@ class Deferral:
 
     @property
     def waits(self) -> bool:
-        """Whether something waits."""
         return self._frame is not None
 
     def until(self, frame: FrameType) -> None:

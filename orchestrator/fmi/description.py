@@ -86,10 +86,6 @@ class FmuDescription:
 
     Attributes
     ----------
-    path
-        The .fmu file.
-    variables
-        By name.
     states
         Names of the continuous states, in the order of ``ModelStructure/Derivatives``, then of the discrete states that
         a sampled controller declares under ``VendorAnnotations``.
@@ -161,7 +157,6 @@ class FmuDescription:
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs."""
         return self._names("input")
 
     @cached_property
@@ -170,12 +165,10 @@ class FmuDescription:
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs."""
         return self._names("output")
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the parameters."""
         return self._names("parameter")
 
     def _names(self, causality: str) -> tuple[str, ...]:

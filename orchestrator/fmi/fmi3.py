@@ -88,7 +88,6 @@ class _Table(ctypes.Structure):
 
 @cache
 def adapter_path() -> Path:
-    """The compiled adapter."""
     try:
         return compile_here(*(Path(__file__).with_name(name) for name in SOURCES))
     except (OSError, RuntimeError) as error:

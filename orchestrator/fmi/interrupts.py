@@ -58,7 +58,6 @@ class _Calls:
 
     @property
     def how(self) -> str:
-        """How a command was ended, in words."""
         return "ended by SIGTERM" if self.terminated else "interrupted"
 
     @contextmanager

@@ -44,8 +44,6 @@ class IsolatedComponent(RemoteCalls, Derived):
 
     Parameters
     ----------
-    name, description, directory
-        As `LoadedComponent`.
     limits
         What it may take.
     """

@@ -25,6 +25,12 @@ TOO_MUCH_MEMORY, TOO_MANY_TASKS, TOO_MUCH_DISK = 93, 94, 95
 """Exit codes of a supervisor that ended an FMU's processes for what they took together."""
 
 
+def crowded() -> float:
+    """How many programs want to run for each processor, 1 to 8: so many times later an FMU may answer."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    return min(8.0, max(1.0, load / (os.cpu_count() or 1)))
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Limits of a foreign FMU.
@@ -32,7 +38,7 @@ class Limits:
     Attributes
     ----------
     seconds
-        Wall-clock time for one call.
+        Wall-clock time for one call; in acceptance tests times `crowded`.
     memory
         Address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
         together have in use [bytes].

@@ -42,8 +42,6 @@ class EmbeddedModel:
         Values at the operating point by name, in the order of rows and columns.
     parameters
         Those that differ from the FMU's start values. With them and the inputs the FMU comes to this point.
-    units
-        Of all these variables.
     origin
         The case, scenario and component that the operating point is of, in words and figures.
     """
@@ -61,7 +59,6 @@ class EmbeddedModel:
 
 
 def linear_model_members(model: EmbeddedModel) -> dict[str, bytes]:
-    """What is to be packed into the FMU, by path."""
     return {
         f"{FOLDER}/fmi-ls-manifest.xml": _manifest(),
         f"{FOLDER}/linear_model.json": _json(model),

@@ -24,7 +24,6 @@ def libc() -> Any:
 
 
 def call(number: int, *arguments: Any) -> int:
-    """A system call by its number."""
     found = int(libc().syscall(ctypes.c_long(number), *arguments))
     if found < 0:
         error = ctypes.get_errno()
@@ -53,8 +52,6 @@ def mount(source: str | None, target: str, kind: str | None, flags: int = 0, dat
 
     Parameters
     ----------
-    source, target, kind
-        What, where, and the file system's name.
     flags, data
         As ``mount(2)`` takes them.
     """
@@ -78,7 +75,6 @@ def no_new_privileges() -> None:
 
 
 def drop_capabilities() -> None:
-    """Give up every capability, for good."""
     for number in range(_CAPABILITIES):
         libc().prctl(_DROP_CAPABILITY, ctypes.c_ulong(number), 0, 0, 0)
     header = (ctypes.c_uint32 * 2)(0x20080522, 0)

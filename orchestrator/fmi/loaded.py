@@ -39,8 +39,6 @@ class LoadedComponent(Derived):
     ----------
     name
         Name of the instance, used in errors and results.
-    description
-        The FMU.
     directory
         Where its archive is extracted; by default a new temporary folder of its own.
     ours

@@ -168,7 +168,6 @@ class Mailbox:
         self.head.text_length = len(content)
 
     def read_text(self) -> Any:
-        """What the other side left."""
         length = self.head.text_length
         if not 0 <= length <= _TEXT:
             raise ValueError("the length of the text is out of bounds")

@@ -22,13 +22,6 @@ class Origin:
 
 
 def read_origin(path: Path) -> Origin:
-    """Read them from an FMU.
-
-    Raises
-    ------
-    FmuFileError
-        As `read_model_description_text`.
-    """
     root = ElementTree.fromstring(read_model_description_text(path))
     names = ("author", "version", "description", "generationTool", "generationDateAndTime", "copyright", "license",
              "fmiVersion")  # fmt: skip

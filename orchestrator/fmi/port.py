@@ -21,6 +21,9 @@ PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 START = tuple(variable.name for variable in START_VALUES)
 """Its parameters: the rating and the power flow's start values."""
 
+_SAME, _OTHER = 0.01, 2.0
+"""How far the rating of a binding may be from the FMU's own, and the factor from which on its start is another's."""
+
 Matrix2 = tuple[float, float, float, float]
 """A real 2×2 matrix, by rows."""
 
@@ -40,8 +43,6 @@ class PhasorMap:
 
     Attributes
     ----------
-    form, variables
-        Two variables, or three phases.
     matrix
         Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
         its own rating. Magnitude and angle, phases and powers are taken behind or before it.
@@ -139,8 +140,6 @@ class BoundDescription(FmuDescription):
 
     Attributes
     ----------
-    inner
-        What its file says.
     inner_names
         For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of
         the port's is called ``native.<name>`` here.
@@ -149,6 +148,24 @@ class BoundDescription(FmuDescription):
     inner: FmuDescription
     port: PortMap
     inner_names: Mapping[str, str]
+
+    def unlike_delivered(self) -> dict[str, str]:
+        """Ratings of the binding, by name, that do not fit to what the FMU starts with by itself, and why."""
+        found, port = {}, self.port
+        for name in ("S_n", "v_0", "P_0"):
+            for target in port.start.get(name, ()):
+                info = self.inner.variables[target.variable]
+                if isinstance(info.start, bool | str) or info.start in (None, 0, 1) or not target.factor:
+                    continue
+                value = abs(float(info.start or 0) - target.offset) / abs(target.factor)
+                itself = f"{info.name} is {info.start:g} {info.unit or 'pu'} by itself, {value:.3g} times"
+                if name == "S_n" and info.name not in port.settings and abs(value / port.rating - 1) > _SAME:
+                    found["S_n"] = f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
+                if name == "v_0" and not 1 / _OTHER < value < _OTHER:
+                    found["V_n"] = f"another V_n than the FMU starts with: its {itself} what is bound"
+                if name == "P_0" and value > _OTHER:
+                    found.setdefault("S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much")
+        return found
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:
@@ -234,5 +251,4 @@ def _dependencies(
 
 
 def without_binding(description: FmuDescription) -> FmuDescription:
-    """What an FMU's file says: where it is behind a binding, of the FMU there."""
     return description.inner if isinstance(description, BoundDescription) else description

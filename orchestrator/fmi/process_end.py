@@ -13,8 +13,6 @@ _WINDOWS_FAULTS = 0x80000000
 
 
 class ProcessFault(StrEnum):
-    """Every way in which the process of an FMU can end, or be given up."""
-
     CRASH = "crash"
     EXIT = "exit"
     HANG = "hang"
@@ -33,8 +31,6 @@ def fault_of_exit(code: int, limits: Limits) -> tuple[ProcessFault, str]:
     ----------
     code
         As `subprocess.Popen.wait` returns it: the negative number of a signal where one ended the process.
-    limits
-        What the process was allowed.
 
     Examples
     --------

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Protection:
-    """One protection."""
-
     name: str
     in_force: bool
     how: str

@@ -27,8 +27,6 @@ def refusal(component: Component, said_by: Said, status: int, call: str, time: f
 
     Parameters
     ----------
-    component
-        The one that was called.
     said_by
         The FMU's log since the call.
     status

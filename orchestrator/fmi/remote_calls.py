@@ -29,6 +29,5 @@ class RemoteCalls(ABC):
         self._remote("fmi2Reset", "reset")
 
     def set(self, values: Mapping[str, float | bool]) -> None:
-        """Set variables by name."""
         if values:
             self._remote(f"setting {', '.join(values)}", "set", dict(values))

@@ -1,6 +1,7 @@
 """A vendor's DLL, or a device's file around one, wherever an FMU can stand: its FMU is built once and kept."""
 
 import hashlib
+import json
 import logging
 import sys
 from functools import cache
@@ -10,6 +11,7 @@ from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
 from orchestrator.fmi import wine
+from orchestrator.safe_files import file_hash
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"
@@ -71,20 +73,42 @@ def as_fmu(path: Path) -> Path:
         if path.suffix.lower() == DEVICE_ENDING:
             library, table = read_device_file(path)
         kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
-        if intact(kept):
+        if intact(kept) and _unchanged(kept, path):
             return kept
         if (for_now := _tried_now.get(kept)) is not None and intact(for_now):
             return for_now
-        dll = read_dll(library, READER, foreign_platforms(library))
+        texts = (table or {}).get("texts")
+        given = texts if isinstance(texts, dict) else {}
+        dll = read_dll(library, READER, foreign_platforms(library), given, path.parent)
         device = None if table is None else device_of(path, table, dll.interface)
         content = _archive(dll_members(dll, device=device))
         if not dll.trial.passing:
+            if dll.looked:
+                noted = {str(place): _hash(place) for place in (path.parent.resolve(), *dll.looked)}
+                keep(_noted(kept), json.dumps(noted).encode())
             return keep(kept, content)
         _log.warning("%s: its state is not saved this time: %s; the next call tries it anew", path, dll.trial.why)
         _tried_now[kept] = keep(kept.parent / _FOR_NOW / kept.name, content)
         return _tried_now[kept]
     except (DllError, DeviceFileError) as error:
         raise InputError(str(error)) from error
+
+
+def _noted(kept: Path) -> Path:
+    """Where the places of files are noted that the DLL's text parameters name."""
+    return kept.with_suffix(".files.json")
+
+
+def _unchanged(kept: Path, path: Path) -> bool:
+    """Whether it was made in the same folder, from the same files; what was not there then must not be there now."""
+    if not _noted(kept).exists():
+        return True
+    noted: dict[str, str | None] = json.loads(_noted(kept).read_text(encoding="utf-8"))
+    return str(path.parent.resolve()) in noted and all(_hash(Path(place)) == found for place, found in noted.items())
+
+
+def _hash(place: Path) -> str | None:
+    return file_hash(place) if place.is_file() else None
 
 
 def _archive(members: dict[str, bytes]) -> bytes:
@@ -94,7 +118,6 @@ def _archive(members: dict[str, bytes]) -> bytes:
 
 
 def _digest(path: Path, library: Path) -> str:
-    """Of everything that the FMU is made of."""
     found = hashlib.sha256(_own_code())
     for file in (path, library):
         try:
@@ -108,7 +131,6 @@ def _digest(path: Path, library: Path) -> str:
 
 @cache
 def _own_code() -> bytes:
-    """Of the code that makes the FMU."""
     import fmus  # noqa: PLC0415 - the place alone
 
     root = Path(fmus.__file__).parent

@@ -56,8 +56,6 @@ class NoWineError(RuntimeError):
 
 @dataclass(frozen=True)
 class Wine:
-    """An installation."""
-
     loader: str
     server: str
     libraries: Path
@@ -170,8 +168,6 @@ class Server:
         Where `prepare` made the prefix.
     tied
         Whether the kernel ends it, and its programs, with the thread that started them.
-    programs
-        How many can be started.
     """
 
     def __init__(self, folder: Path, *, tied: bool, programs: int = 1) -> None:
@@ -224,7 +220,6 @@ class Server:
             )  # fmt: skip
 
     def close(self) -> None:
-        """End it, and with it what runs in it."""
         for connection in self._connections:
             connection.close()
         if self.process.poll() is None:

@@ -87,12 +87,8 @@ class WineProgram:
 
     Parameters
     ----------
-    library
-        The library for Windows.
     patience
         Time for one answer [s].
-    note
-        Told when Wine has started, and the library is loaded.
     """
 
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
@@ -146,12 +142,6 @@ class WineProgram:
         ----------
         command
             One of those of `wine_talk.c`.
-        arguments
-            Its numbers.
-        data
-            Its bytes.
-        answer
-            How many bytes are wanted.
         """
         for k, value in enumerate(arguments):
             self._talk.a[k] = value
@@ -223,7 +213,6 @@ class WineLibrary:
         self._note(doing)
 
     def _named(self, error: WineEndedError) -> WineEndedError:
-        """With what the DLL was doing, and what that means."""
         if error.passing:
             return WineEndedError(f"while {self._doing}, {error}", passing=True)
         remedy = "ask its author for a DLL that does not"
@@ -243,7 +232,6 @@ class WineLibrary:
         return self._functions[name]
 
     def has(self, name: str) -> bool:
-        """Whether it has a function."""
         return self._function(name) != 0
 
     def call(self, name: str, argument: int = 0) -> int:

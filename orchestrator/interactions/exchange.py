@@ -120,8 +120,6 @@ def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario)
     ----------
     wanted
         Voltages of all buses [pu]; empty for a case without a power flow.
-    prepared
-        The system with other devices.
 
     Raises
     ------

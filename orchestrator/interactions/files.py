@@ -13,7 +13,6 @@ SUMMARY, PAGE = "interactions.json", "interactions.html"
 
 
 def save(judgement: JudgedInteractions, folder: Path) -> list[Path]:
-    """Write all files of a study into a folder, and give their paths."""
     tables = {MODES: mode_rows(judgement), PAIRS: pair_rows(judgement), ASSIGNMENTS: assignment_rows(judgement)}
     wanted = {name: rows for name, rows in tables.items() if rows}
     with staged(folder, new_run_id()) as staging:

@@ -25,15 +25,12 @@ SAME = 0.01
 
 @dataclass(frozen=True)
 class JudgedMode:
-    """A mode of the system as it is, with who takes part in it."""
-
     mode: SharedMode
     groups: dict[str, float]
     vendors: tuple[str, ...]
 
     @property
     def is_interaction(self) -> bool:
-        """Whether two vendors or more take part."""
         return len(self.vendors) > 1
 
 
@@ -71,7 +68,6 @@ class JudgedSystem:
 
     @property
     def is_known(self) -> bool:
-        """Whether there is a verdict and a damping."""
         return self.stable is not None and self.least_damping is not None
 
     @property
@@ -87,8 +83,6 @@ class JudgedSystem:
 
 @dataclass(frozen=True)
 class JudgedPair:
-    """Two vendors together, and each alone."""
-
     vendors: tuple[str, str]
     joint: JudgedSystem
     alone: tuple[JudgedSystem, JudgedSystem]
@@ -120,7 +114,6 @@ class JudgedPair:
         return " + ".join(self.vendors)
 
     def sentence(self) -> str:
-        """What the pair does, with figures."""
         if self.fall is None or not self.is_known:
             return f"{self.text}: not known: {self._missing()}"
         joint, least = self.joint.least_damping, min(one.least_damping or 0.0 for one in self.alone)
@@ -144,13 +137,10 @@ def _where(system: JudgedSystem) -> str:
 
 
 def place_of(mode: SharedMode) -> str:
-    """The frequency of a mode in words."""
     return f"{mode.frequency_hz:.4g} Hz" if mode.imag else "no oscillation"
 
 
 class JudgedInteractions:
-    """What a study's systems come to."""
-
     def __init__(self, result: InteractionsResult) -> None:
         self.result = result
         plan = result.plan
@@ -170,22 +160,18 @@ class JudgedInteractions:
 
     @property
     def whole(self) -> JudgedSystem:
-        """The system as the case has it."""
         return self.systems[WHOLE]
 
     @property
     def none(self) -> JudgedSystem:
-        """The system with the stand-in at all places."""
         return self.systems[NONE]
 
     @property
     def alone(self) -> dict[str, JudgedSystem]:
-        """By vendor: the system with its converters alone."""
         return {vendor: self.systems[SystemName(Kind.ALONE, (vendor,))] for vendor in self.result.plan.vendors}
 
     @property
     def interaction_modes(self) -> list[JudgedMode]:
-        """The modes in which two vendors or more take part."""
         return [mode for mode in self.modes if mode.is_interaction]
 
     @property
@@ -249,7 +235,6 @@ def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
 
 
 def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
-    """What is to be borne in mind of a study as a whole."""
     result, found = judgement.result, []
     plan = result.plan
     if identified := list(dict.fromkeys(name for one in result.records.values() for name in one.identified)):

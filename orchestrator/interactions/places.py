@@ -25,8 +25,6 @@ _OF_THE_GRID = ("external_grid", "static_generation")
 
 @dataclass(frozen=True)
 class Place:
-    """Where a converter stands."""
-
     name: str
     vendor: str
     table: ComponentTable
@@ -93,8 +91,6 @@ def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str
 
     Parameters
     ----------
-    shares
-        Of every component.
     groups
         Of every component; one that is not there counts to `OTHERS`.
     """

@@ -72,7 +72,6 @@ class SharedMode:
 
     @classmethod
     def of(cls, mode: Mode) -> Self:
-        """Of a mode of the linear model."""
         return cls(mode.eigenvalue.real, mode.eigenvalue.imag, dict(mode.by_component))
 
     @property
@@ -104,12 +103,8 @@ class SystemRecord:
     stability, because
         The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where it
         failed.
-    warnings
-        What is to be borne in mind of it.
     identified
         Components that hide their states and were identified.
-    states
-        Their number.
     residual
         Of the steady state, as in `OperatingPoint`.
     failure
@@ -133,7 +128,6 @@ class SystemRecord:
 
     @property
     def lasting(self) -> bool:
-        """Whether computing it again would give the same."""
         return self.failure is None or self.failure.lasting
 
     @property
@@ -144,7 +138,6 @@ class SystemRecord:
 
     @classmethod
     def lost(cls, _: SystemTask, error: WorkerLostError) -> Self:
-        """The record of a system whose worker died."""
         return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:

@@ -29,8 +29,6 @@ class InteractionsPlan:
 
     Attributes
     ----------
-    prepared
-        The scenario as it is.
     layers
         Parameter files, and after them the values of the command line; weakest first.
     step_size
@@ -73,7 +71,6 @@ class InteractionsPlan:
         return frozenset(self.places) - frozenset(self.systems[name])
 
     def task(self, exchanged: Exchanged) -> SystemTask:
-        """The task of one system."""
         tables = {name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()}
         content = {
             "case": self.case.text,
@@ -121,10 +118,6 @@ def plan_interactions(
 
     Parameters
     ----------
-    case
-        The case.
-    request
-        What is studied.
     scenario
         Name of the scenario; None for the only one.
     overrides
@@ -175,12 +168,6 @@ def run_interactions(
     ----------
     plan
         A plan that `plan_interactions` has checked.
-    executor
-        Where they are computed.
-    store
-        Keeps every system as soon as it is computed.
-    report
-        Progress.
     """
     result = InteractionsResult(plan)
     tasks: dict[str, SystemTask] = {}
@@ -253,5 +240,4 @@ def _tried(
 
 
 def _content_name(table: ComponentTable) -> str:
-    """What a device is made of, by its model, or its file and binding."""
     return f"{table.model or table.file or ''}{'' if table.binding is None else f' ({table.binding})'}"

@@ -19,8 +19,6 @@ MOST_VENDORS = 12
 
 
 class Kind(StrEnum):
-    """What a system of a study is."""
-
     WHOLE = "as in the case"
     NONE = "no vendor"
     ALONE = "alone"

@@ -24,14 +24,12 @@ def frequency_text(system: JudgedSystem) -> str:
 
 
 def verdict_of(judgement: JudgedInteractions) -> VerdictSentence:
-    """The verdict on the system as it is."""
     whole = judgement.whole.record
     word = {True: "stable", False: "UNSTABLE", None: "not known"}[whole.stable]
     return VerdictSentence(whole.stable, word, whole.error or whole.because)
 
 
 def modes_sentence(judgement: JudgedInteractions) -> str:
-    """How many modes vendors share."""
     plan, found = judgement.result.plan, judgement.interaction_modes
     low, high = plan.request.frequency_range
     percent = f"{100 * plan.request.threshold:g} %"
@@ -90,7 +88,6 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
 
 
 def stand_in_sentence(judgement: JudgedInteractions) -> str:
-    """What the systems are compared by."""
     plan = judgement.result.plan
     return (
         f"at the places of the vendors that a system does without stands {plan.stand_in}, at the same power flow; of "

@@ -50,10 +50,6 @@ def emulate(
 
     Parameters
     ----------
-    system
-        Components, connections and start values.
-    rules
-        The rules of the other master.
     step_size, stop_time
         [s]
     record
@@ -66,8 +62,6 @@ def emulate(
     order
         Order in which the components step, for a master that steps them one after the other; by default the order of
         the system.
-    observers
-        Further observers of the run, besides the recorder.
     """
     disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
     if disturbed:

@@ -129,7 +129,6 @@ MASTERS = {
 
 
 def master_rules(name: str) -> MasterRules:
-    """Rules by name."""
     if name not in MASTERS:
         raise InputError(f"there is no master {name!r} to run like; known are: {', '.join(MASTERS)}")
     return MASTERS[name]

@@ -32,8 +32,6 @@ class Identified:
     ----------
     fits
         Every schedule that gives the recorded values; empty if none does.
-    nearest, difference
-        The schedule that comes nearest, and its largest difference from the recorded values.
     rows
         How many rows were at communication points and so were compared.
     last_row
@@ -56,7 +54,6 @@ class Identified:
 
     @property
     def intervals(self) -> int:
-        """How many steps the duration has."""
         return round(self.stop_time / self.step_size)
 
     @property

@@ -48,7 +48,6 @@ class Placed:
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio of the mode."""
         return damping_ratio(self.eigenvalue)
 
 
@@ -57,10 +56,6 @@ class PodLoop:
 
     Parameters
     ----------
-    master
-        A running system at its operating point.
-    components
-        Names of the components that have the controller.
     controller
         ``pod_p`` or ``pod_q``.
     kept
@@ -81,7 +76,6 @@ class PodLoop:
         self._latest: tuple[PodSetting, LinearModel] | None = (off, self._off)
 
     def model(self, setting: PodSetting) -> LinearModel:
-        """The linear model of the whole system with this setting."""
         if setting.gain == 0:
             return self._off
         return self._model(setting)
@@ -171,8 +165,6 @@ def check_tunable(name: str, description: FmuDescription, controller: str) -> No
 
     Parameters
     ----------
-    name, description
-        Of the component.
     controller
         ``pod_p`` or ``pod_q``.
     """

@@ -169,7 +169,6 @@ class PodDesign:
 
     @property
     def damping_met(self) -> bool:
-        """Whether the required damping is achieved."""
         return self.achieved_damping >= self.required_damping - _MET
 
     @property
@@ -184,7 +183,6 @@ class PodDesign:
 
     @property
     def achieved_damping(self) -> float:
-        """Damping ratio that the design achieves."""
         return damping_ratio(self.achieved)
 
     @property
@@ -206,10 +204,6 @@ def design_pod(
 
     Parameters
     ----------
-    case, request
-        Of what, and what is asked for.
-    report
-        Called with the name of each stage when the stage begins.
     store
         Keeps figures on the way as soon as they are there; those that are there already are not computed again.
     search

@@ -53,7 +53,6 @@ class Surroundings:
 
     @property
     def is_unstable(self) -> bool:
-        """Whether the system grows."""
         return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":
@@ -77,7 +76,6 @@ class Surroundings:
         return min(rest, key=lambda m: m.damping_ratio, default=None)
 
     def below(self, damping: float) -> int:
-        """How many modes have less than this damping ratio."""
         return sum(mode.damping_ratio < damping for mode in self.others)
 
 

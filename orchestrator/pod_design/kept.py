@@ -10,8 +10,6 @@ from orchestrator.points.store import Arrays, PointStore
 
 
 class KeptFigures:
-    """Arrays by all that they depend on."""
-
     def __init__(self, store: PointStore | None = None, content: Mapping[str, Any] | None = None) -> None:
         self._store, self._content = store, dict(content or {})
 
@@ -29,7 +27,6 @@ class KeptFigures:
 
 
 def figures_of(prepared: PreparedScenario, store: PointStore | None) -> KeptFigures:
-    """Figures of a scenario."""
     groups = [list(group) for group in prepared.schedule.groups]
     content = {
         "design": prepared.case.text,

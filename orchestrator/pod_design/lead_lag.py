@@ -25,8 +25,6 @@ class LeadLag:
     ----------
     T_S1, T_S2
         Lead and lag time constants [s]; both 0 for no compensation.
-    N_S
-        Number of stages.
     """
 
     T_S1: float
@@ -40,7 +38,6 @@ class LeadLag:
 
     @property
     def is_lead(self) -> bool:
-        """Whether the lead/lag advances the phase."""
         return self.T_S1 > self.T_S2
 
     @property

@@ -62,10 +62,6 @@ class GainSweep:
 
     Attributes
     ----------
-    why
-        Where the lead/lag comes from.
-    points
-        The points of the sweep, with rising gain.
     chosen
         The smallest gain that meets the requirement, else the gain of the best damping.
     unstable
@@ -131,18 +127,10 @@ def refine(
 
     Parameters
     ----------
-    loop
-        The running system with the controller to be set.
-    off
-        The target with the controller off.
-    filters
-        The design's lead/lag, to begin with.
     required
         Damping ratio of the target.
     bounds
         Of the gain [pu].
-    judge
-        Judges a setting by all modes of the system.
     others
         The other modes without the controller [rad/s].
     search
@@ -200,12 +188,8 @@ def sweep(
 
     Parameters
     ----------
-    loop
-        The running system with the controller to be set.
     off
         The target with the controller off; following begins there.
-    filters
-        The lead/lag, the same at every gain.
     required
         Damping ratio of the target.
     bounds

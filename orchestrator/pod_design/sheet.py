@@ -156,7 +156,6 @@ def _margins(m: Margins, d: PodDesign) -> Table:
 
 
 def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
-    """Names and values of the loop's margins."""
     if m.loop is None:
         yield "Phase and delay margin", f"not known: {m.no_loop}"
         return
@@ -240,7 +239,6 @@ def _other(mode: Mode | None) -> str:
 
 
 def percent(ratio: float) -> str:
-    """A ratio in percent."""
     return f"{100 * ratio:.2f} %"
 
 

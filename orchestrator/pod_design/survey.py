@@ -37,8 +37,6 @@ _HOPELESS = 1.0
 
 @dataclass(frozen=True)
 class Survey:
-    """The result of a survey."""
-
     best: tuple[PodSetting, ...]
     damping: float
     settings: int
@@ -51,8 +49,6 @@ def survey(
 
     Parameters
     ----------
-    loop
-        The running system with the controller to be set.
     initial, others
         The target and the other modes without the controller [rad/s].
     stages

@@ -46,8 +46,6 @@ def find_target(
 
     Parameters
     ----------
-    case
-        The case for which the controller is designed.
     controller
         ``pod_p`` or ``pod_q``.
     scenario
@@ -118,7 +116,6 @@ def check_range(
 
 
 def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
-    """Names of the components that have a controller."""
     wanted = [f"{controller}.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
     return [name for name, c in plan.items() if all(v in c.description.variables for v in wanted)]
 

@@ -22,8 +22,6 @@ class ClusterWatch:
     ----------
     client
         Of `distributed`.
-    address
-        Of the scheduler, for messages.
     patience
         Seconds without any worker after which the run ends.
     """

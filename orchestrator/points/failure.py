@@ -20,7 +20,6 @@ class Failure:
 
     @classmethod
     def of(cls, error: BaseException) -> Self:
-        """What an error means for the point at which it happened."""
         if isinstance(error, CosimError):
             text = "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
             return cls(error.kind, text, error.kind.lasting)
@@ -30,7 +29,6 @@ class Failure:
 
     @classmethod
     def lost(cls, error: Exception) -> Self:
-        """Of a point whose worker died."""
         return cls(ErrorKind.WORKER_LOST, str(error), False)
 
     @classmethod

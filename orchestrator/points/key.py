@@ -35,7 +35,6 @@ def key_of(content: Mapping[str, Any]) -> str:
 
 
 def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
-    """What a key is to hold of a scenario: its FMUs with their bindings, all values, and what connections do."""
     fmus = {name: component_content(plan.description) for name, plan in prepared.system.components.items()}
     wires = described(prepared.system.wires)
     return {"scenario": prepared.name, "fmus": fmus, "values": prepared.values} | ({"wires": wires} if wires else {})
@@ -73,8 +72,6 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
     ----------
     reference, wanted
         Name or path of the case, and its fingerprint.
-    trust_fmus
-        As `load_case`.
     """
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)

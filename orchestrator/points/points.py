@@ -11,8 +11,6 @@ CountReport = Callable[[int, int], None]
 
 
 class Keyed(Protocol):
-    """The task of one point."""
-
     @property
     def key(self) -> str:
         """Name of the point's file, as `key_of` makes it."""
@@ -20,8 +18,6 @@ class Keyed(Protocol):
 
 
 class Keepable(Protocol):
-    """The result of one point."""
-
     @property
     def lasting(self) -> bool:
         """Whether computing the point again would give the same result. Only such results are kept."""

@@ -175,8 +175,6 @@ _ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
 
 
 class _Work:
-    """What a worker is at: whether it has a task, and whether it takes another one."""
-
     busy = leaving = False
 
 

@@ -19,8 +19,6 @@ def exceptions_in_words(sources: Mapping[str, str], fit_errors: Mapping[str, flo
     ----------
     sources
         By component, as in `LinearModel`.
-    fit_errors
-        Of those that were identified.
     """
     parts = []
     for source, how in _HOW.items():

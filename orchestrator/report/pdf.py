@@ -18,7 +18,6 @@ def find_browser() -> str | None:
 
 
 def print_pdf(page: Path, target: Path) -> Path:
-    """Print an HTML file."""
     browser = find_browser()
     if browser is None:
         raise InputError(

@@ -1,14 +1,16 @@
 """The look that all plots share."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
-from matplotlib.text import Text
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.safe_files import write_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 STYLE: dict[Any, Any] = {
     "axes.grid": True,
@@ -40,7 +42,6 @@ def colour(index: int) -> str:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure, with the folder it belongs in."""
     _to_the_letter(figure)
     picture = BytesIO()
     figure.savefig(picture, dpi=_DPI, format=path.suffix.removeprefix("."))
@@ -49,6 +50,8 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def _to_the_letter(figure: Figure) -> None:
     """Titles, labels and legends are foreign text: two dollar signs in it begin no formula. Ticks keep theirs."""
+    from matplotlib.text import Text  # noqa: PLC0415 - a second to import
+
     numbers: set[Any] = set()
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):

@@ -46,7 +46,6 @@ def share_text(entry: tuple[str, float]) -> str:
 
 
 def fmu_variables(description: FmuDescription) -> Iterable[Table]:
-    """The variables of an FMU, one table a causality."""
     for causality in ("input", "output", "parameter", "calculatedParameter", "local"):
         variables = [
             v for v in description.variables.values() if v.causality == causality and not v.name.startswith("der(")

@@ -55,8 +55,6 @@ def dataset_of(
     ----------
     pieces
         Files with the rows, in their order.
-    attributes
-        Of the whole.
     units
         Attributes of columns, by name; those of ``time`` as well.
     """

@@ -30,8 +30,6 @@ class WrittenFile:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a manifest says."""
-
     folder: Path
     files: dict[str, WrittenFile]
     scenarios: dict[str, str] = field(default_factory=dict)
@@ -82,12 +80,6 @@ def write_manifest(
 
     Parameters
     ----------
-    folder
-        With the files.
-    run
-        The run's id.
-    names
-        Of the files.
     scenarios
         Folders beside them that are of the same run.
     before

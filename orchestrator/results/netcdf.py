@@ -49,18 +49,12 @@ def netcdf_image(
 
     Parameters
     ----------
-    names
-        Of the columns.
     times
         [s], shape (n,).
     values
         Shape (n, number of names).
     units
         Attributes of columns, by name; those of ``time`` as well.
-    attributes
-        Of the whole file.
-    chunk
-        Rows of a chunk.
     """
     import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
 
@@ -114,7 +108,6 @@ class ReservedFile(RawIOBase):
         return len(view)
 
     def write(self, buffer: Any) -> int:
-        """Write."""
         view = memoryview(buffer).cast("B")
         try:
             if self.error is None:
@@ -129,11 +122,9 @@ class ReservedFile(RawIOBase):
         return self._file.seek(self.size + offset) if whence == os.SEEK_END else self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The place."""
         return self._file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """Note the size that the file is to have."""
         self.size = self._file.tell() if size is None else size
         return self.size
 

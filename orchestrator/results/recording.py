@@ -1,22 +1,26 @@
 """A recording on the disk while it grows: a folder of small files, each of them whole, that are joined at the end."""
 
+from __future__ import annotations
+
 import atexit
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.rows import Block
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, stored_name
 from orchestrator.results.room import require_room
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
 
 FOLDER = "recording"
 """Of the files of a recording that is not finished, in its scenario's folder."""
@@ -83,8 +87,6 @@ class RecordingFolder:
 
         Parameters
         ----------
-        path
-            The file.
         further
             More attributes of it, such as `ENDED_EARLY`.
 

@@ -1,11 +1,16 @@
 """Whether there is room on the disk for what a run is about to record."""
 
+from __future__ import annotations
+
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
 
 _NUMBER, _CSV_NUMBER = 8, 13
 """Bytes of a recorded value: compressed parts and the joined file together, and its digits in the table."""

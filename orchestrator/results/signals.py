@@ -41,15 +41,6 @@ def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.
     """A signal to be drawn: all of it, or of a long one the least and the largest value in each of many short spans.
 
     A long one is read piece by piece.
-
-    Parameters
-    ----------
-    dataset
-        What was recorded.
-    expression
-        As `signal`.
-    most
-        Rows up to which a signal is drawn as it is.
     """
     rows = dataset.sizes["time"]
     if rows <= most:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
 from orchestrator.late import Late
@@ -23,6 +22,8 @@ from orchestrator.safe_files import replacing, write_bytes, write_text
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from orchestrator.cases.prepare import PreparedScenario
 else:
     xr = Late("xarray")
 
@@ -158,7 +159,6 @@ def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
 
 
 def save_json(content: Any, path: Path) -> None:
-    """Write indented JSON."""
     write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
 
 

@@ -29,7 +29,6 @@ class Elements:
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
-        """Those of a prepared scenario."""
         network, table = prepared.network, prepared.case.table.power_flow
         if network is None or table is None:
             raise InputError(
@@ -51,7 +50,6 @@ class Elements:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All of them."""
         return (*self.units, *self.lines, *self.loads, *self.shunts)
 
 
@@ -80,6 +78,9 @@ class Setting:
     drawn: Mapping[str, float] = field(default_factory=dict)
 
 
+_PERCENT = 10.0
+"""Factor of a power from which it looks like percent."""
+
 Reading = Callable[[str], Setting]
 """What the text of a cell sets.
 
@@ -88,17 +89,24 @@ Raises `ValueError` where the text has no meaning in this column.
 
 
 def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
-    """How the cells of a column are read."""
     if column == "load":
-        return lambda text: Setting(scale=_positive(column, text))
+        return lambda text: Setting(scale=_factor(column, text))
     if column == "generation":
-        return lambda text: _generation(_positive(column, text), elements, prepared)
+        return lambda text: _generation(_factor(column, text), elements, prepared)
     name, dot, quantity = column.partition(".")
     if dot and quantity == IN_SERVICE:
         return _service(column, name, elements, prepared)
     if dot and quantity in (ACTIVE, REACTIVE):
         return _power(column, name, quantity, elements, prepared)
     return _variable(column, prepared)
+
+
+def _factor(column: str, text: str) -> float:
+    """A factor of the case's own power; percent would be far above."""
+    factor = _positive(column, text)
+    if factor >= _PERCENT:
+        raise ValueError(f"{column} = {text!r} is a factor of the case's own; write {factor / 100:g} for {factor:g} %")
+    return factor
 
 
 def _service(column: str, name: str, elements: Elements, prepared: PreparedScenario) -> Reading:

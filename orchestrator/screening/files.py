@@ -14,7 +14,6 @@ _OF_MODES = ("point", "outage", "mode", "real", "imag", "frequency_hz", "damping
 
 
 def save(summary: Summary, folder: Path) -> list[Path]:
-    """Write all files of a screening into a folder."""
     names = {id(one.item): {} for mode in summary.modes for one in mode.at}  # type: dict[int, dict[int, str]]
     for mode in summary.modes:
         for one in mode.at:

@@ -51,7 +51,6 @@ class CriticalRegion:
 
     @property
     def wider(self) -> "CriticalRegion":
-        """The region in which modes are followed."""
         damping = min(_MOST, _BEYOND * self.damping)
         return CriticalRegion(self.lowest_hz / _BEYOND, self.highest_hz * _BEYOND, damping)
 
@@ -62,8 +61,6 @@ class FoundModes:
 
     Attributes
     ----------
-    modes
-        All that are followed, as rows.
     searched
         Whether they come from a search of their own rather than from a neighbour's.
     growing_elsewhere
@@ -91,7 +88,6 @@ class FoundModes:
 
     @property
     def grows(self) -> bool:
-        """Whether a mode is known to grow."""
         return bool((self.modes.eigenvalues.real > UNSTABLE).any()) or bool(self.growing_elsewhere)
 
 
@@ -102,12 +98,8 @@ def find_modes_here(
 
     Parameters
     ----------
-    model
-        Continuous.
     alone
         Eigenvalues of the components alone [rad/s], as `count_growing` takes them.
-    wanted
-        What is looked for.
     neighbour
         Modes of a similar operating point; None searches from scratch.
     count
@@ -182,7 +174,6 @@ def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
 
 
 def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
-    """From all eigenvalues."""
     spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
     modes = _kept(ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted)
     growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
@@ -226,8 +217,6 @@ def residue(modes: ModeSet, entry: Vector, exit: Vector) -> NDArray[np.complex12
 
     Parameters
     ----------
-    modes
-        The modes.
     entry, exit
         Column of B and row of C for the whole system, shape (n,).
     """

@@ -39,8 +39,6 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     text
         ``n-1`` (each line, transformer and unit), ``lines``, ``units``, or names with commas between them, where
         ``line_1_2+sg3`` loses two elements together; None for none.
-    elements
-        Of the scenario.
     """
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
@@ -77,8 +75,6 @@ class Remains:
         The grid's variables of the charging of dead lines.
     ties
         Lost branches that stay closed, because a dead part hangs on each: nothing flows there.
-    dead
-        Buses that are dead.
     """
 
     none: str = ""
@@ -144,7 +140,6 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
 
 
 def _parts(buses: Sequence[str], ends: Sequence[Sequence[str]]) -> dict[str, int]:
-    """By bus, the number of its connected part."""
     row = {bus: k for k, bus in enumerate(buses)}
     starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
     links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))

@@ -36,8 +36,6 @@ class StretchTask:
     ----------
     case, fingerprint, scenario, layers, step_size, trust_fmus
         As in `orchestrator.sweep.point.SweepPointTask`.
-    wanted
-        Which modes are looked for.
     anchor
         The intact network at the first point, from which the rest is reached.
     items

@@ -28,8 +28,6 @@ class OperatingCase:
         By ``component.variable``.
     out
         Elements out of service.
-    place
-        File and line.
     """
 
     name: str

@@ -67,12 +67,6 @@ class ItemPreparation:
 
     Parameters
     ----------
-    case
-        The case.
-    scenario
-        Its name.
-    layers
-        Parameter files whose values hold at every point.
     step_size
         Communication step [s]; the case's where None.
     sharing
@@ -172,7 +166,6 @@ def lost_and_shared(
     dispatch: Dispatch,
     after: PreparedScenario,
 ) -> str:
-    """What an outage takes away, and who feeds most of it, in words."""
     plans, flow = before.system.components, after.power_flow
     assert flow is not None
     rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
@@ -185,7 +178,6 @@ def lost_and_shared(
 
 
 def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
-    """What an error at an item means: its status, the text, and whether the same would come out again."""
     found = Failure.of(error)
     if not isinstance(error, (CosimError, np.linalg.LinAlgError)):
         return Status.INTERNAL, unexpected(error), found.lasting

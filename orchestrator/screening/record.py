@@ -33,8 +33,6 @@ class Item:
 
     Attributes
     ----------
-    point, outage
-        Places in the lists of both.
     values
         Of the operating point, by ``component.variable``.
     out
@@ -148,12 +146,10 @@ class StretchRecord:
 
     @property
     def lasting(self) -> bool:
-        """Whether computing the stretch again would give the same."""
         return all(item.lasting for item in self.items)
 
     @classmethod
     def lost(cls, task: Any, error: WorkerLostError) -> Self:
-        """The record of a stretch whose worker died."""
         return cls(tuple(ItemRecord(Status.LOST, str(error), lasting=False) for _ in range(1 + len(task.items))))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:

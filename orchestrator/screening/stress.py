@@ -19,16 +19,12 @@ class OutageRow:
 
     Attributes
     ----------
-    name
-        Of the outage, or "intact".
     worst
         The item with the least damping, or that grows; None where none has modes.
     least
         Its least damped mode; None where it has none in the range.
     unjudged
         Items without modes.
-    points
-        Number of its items.
     """
 
     name: str
@@ -87,7 +83,6 @@ def not_judged(summary: Summary) -> str:
 
 
 def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
-    """What is out of service at all of them."""
     elements = Elements.of(summary.result.plan.prepared)
     names = {item.outage.name for item in items}
     if len(names) == 1:

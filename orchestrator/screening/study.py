@@ -49,7 +49,6 @@ class Shard:
         return cls(number, total)
 
     def has(self, place: int) -> bool:
-        """Whether a stretch belongs to the part."""
         return place % self.total == self.number - 1
 
 
@@ -65,10 +64,6 @@ class ScreeningPlan:
         As in `orchestrator.sweep.sweep.SweepPlan`.
     points, outages
         Operating points, and outages; the first outage is the intact network.
-    wanted
-        Which modes are critical.
-    tasks
-        The stretches.
     """
 
     case: Case
@@ -102,8 +97,6 @@ def plan_screening(
 
     Parameters
     ----------
-    case
-        The case.
     points
         CSV file with the operating points; None for the case's own.
     outages
@@ -116,8 +109,6 @@ def plan_screening(
         Communication step [s]; the case's where None.
     wanted
         Which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
-    parameters
-        Parameter files whose values hold at every point.
     whole
         Whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of stretches.
     sharing
@@ -152,7 +143,6 @@ def _tasks(
     whole: bool,
     sharing: SharingRule | None,
 ) -> list[StretchTask]:
-    """Stretches of the flat list, point by point and there outage by outage."""
     items = [
         Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))),
              tuple(name for name in outage.elements if name not in point.out))
@@ -186,8 +176,6 @@ def _tasks(
 
 @dataclass(frozen=True)
 class ScreenedItem:
-    """One operating point with one outage, and the trajectory of each of its modes."""
-
     point: OperatingCase
     outage: Outage
     record: ItemRecord
@@ -217,7 +205,6 @@ class ScreeningResult:
 
     @property
     def complete(self) -> bool:
-        """Whether all points and outages are there."""
         return len(self.items) == self.plan.number_of_items
 
 
@@ -234,12 +221,6 @@ def run_screening(
     ----------
     plan
         As `plan_screening` gives it.
-    executor
-        Where the stretches are computed.
-    store
-        Keeps every stretch as soon as it is computed.
-    report
-        Called with the numbers of items done and in all.
     shard
         The part to compute; all where None.
     """
@@ -264,7 +245,6 @@ def run_screening(
 
 
 def _joined(plan: ScreeningPlan, found: Mapping[int, StretchRecord]) -> list[ScreenedItem]:
-    """All items, with trajectories that go on from stretch to stretch."""
     count = 0
     before: StretchRecord | None = None
     before_numbers: dict[int, list[int]] = {}

@@ -65,8 +65,6 @@ class ModeAt:
 
 @dataclass(frozen=True)
 class ScreenedMode:
-    """A mode that was followed over a screening."""
-
     name: str
     worst: ModeAt
     at: tuple[ModeAt, ...]
@@ -78,8 +76,6 @@ class ScreenedMode:
 
 
 class Summary:
-    """Figures of a screening."""
-
     def __init__(self, result: ScreeningResult) -> None:
         self.result = result
         self.counts = Counter(item.record.status for item in result.items)

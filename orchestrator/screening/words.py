@@ -59,7 +59,6 @@ def verdict_of(summary: Summary) -> VerdictSentence:
 
 
 def what_was_counted(summary: Summary) -> str:
-    """What the verdict rests on."""
     wanted, computed = summary.result.plan.wanted, summary.counts[Status.COMPUTED]
     searched = sum(item.record.searched for item in summary.result.items)
     return (
@@ -98,7 +97,6 @@ def _but_slowly(summary: Summary) -> str:
 
 
 def where(item: ScreenedItem) -> str:
-    """An item in words."""
     return f"{item.point.name}, {item.outage.name}"
 
 

@@ -51,8 +51,6 @@ def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eige
 
     Parameters
     ----------
-    parameter
-        By which.
     shift_at
         The shift of the eigenvalue for a changed value of the parameter.
     eigenvalue

@@ -17,7 +17,6 @@ def limits_that_act(master: Master) -> dict[str, tuple[str, ...]]:
 
 
 def _acts(limit: Limit, plan: ComponentPlan, component: Component) -> bool:
-    """Whether a signal at rest stands at its limit."""
     if not limit.represented or (limit.enabled is not None and not plan.value(limit.enabled)):
         return False
     names = [limit.signal, *([] if limit.scale is None else [limit.scale])]

@@ -59,8 +59,6 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
 
     Parameters
     ----------
-    master
-        Initialised: it gives the values.
     patterns
         Names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without patterns all
         tunable ones are taken.
@@ -84,17 +82,8 @@ def parameters_in(
 
     Parameters
     ----------
-    descriptions
-        By component.
     value_of
         Value of a component's variable, in its unit; asked for the chosen ones only.
-    patterns, fixed
-        As `parameters_of`.
-
-    Raises
-    ------
-    InputError
-        As `parameters_of`.
     """
     everything = {
         f"{component}.{info.name}": (component, info)

@@ -5,8 +5,7 @@ leaves the running system where it stands is changed in its running FMU, and thi
 any other one the case is started anew, from the power flow on, as `gfor modes --set` starts it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,14 +20,16 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Numbers
+from orchestrator.cases.idle_values import why_idle
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, CaseError, CosimError, InputError
 from orchestrator.fmi.component import RealBatch
+from orchestrator.report.tables import first_few
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
 from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
-from orchestrator.study.modes import ModesResult, modes_from, running
+from orchestrator.study.modes import ModesResult, changed, modes_from, running
 
 CRITICAL = "critical"
 """Stands for the least damped mode of the range."""
@@ -144,23 +145,15 @@ def find_sensitivities(
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    again
-        Prepares it with other values.
     mode
         Name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the first
         named one, else the critical one.
-    patterns, fixed
-        As `parameters_of`.
     held
         Hold the operating point, which leaves the tunable parameters alone.
     directional
         Linearise with the FMUs' own directional derivatives instead of by perturbation.
     frequency_range
         In which the mode is [Hz].
-    report
-        Called with how many parameters are done, of how many.
     """
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -190,20 +183,34 @@ def find_sensitivities(
     for parameter in anew:
         rows[parameter] = _row(parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional))
         report(len(rows), len(parameters))
+    unknown_name = next((text for text in found.unnamed.values() if mode is None and not found.named), None)
+    about_mode: tuple[str, ...] = (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
+    if patterns:
+        about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
     ordered = sorted(rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name))
     doubted = (_limited(_doubted(row, warnings), acting) for row in ordered)
-    return SensitivityResult(found, chosen, tuple(doubted), held, warnings)
+    return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
+
+
+def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> tuple[str, ...]:
+    """What was asked for by name and cannot act, with the reason."""
+    names: dict[str, list[str]] = {}
+    for parameter, row in rows.items():
+        why = "" if row.derivative else why_idle(prepared.system, parameter.component, parameter.variable)
+        names.setdefault(why, []).append(parameter.name)
+    return tuple(f"{first_few(found, str)} cannot act: {why}" for why, found in names.items() if why)
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:
-    """The mode that is asked for."""
     if name is None and found.electromechanical is not None:
         return found.electromechanical
     if name not in (None, CRITICAL):
         if name in found.named:
             return found.named[name]
         known = ", ".join([*found.named, CRITICAL])
+        if name in found.unnamed:
+            raise InputError(f"--mode {name}: {found.unnamed[name]}; there are: {known}")
         raise InputError(f"--mode {name}: scenario {found.prepared.name!r} has no mode of this name; it has: {known}")
     swinging = [mode for mode in found.modes if mode.is_oscillation]
     if not swinging:
@@ -223,7 +230,6 @@ class _Mode:
         self._exact = exact if same else None
 
     def shift(self, blocks: Blocks, master: Master) -> Shift:
-        """How far the mode moves in a system of these blocks."""
         varied = model_of(master, blocks)
         if varied.names != self._model.names:
             raise AnalysisError("with another value the outputs depend on other inputs, which changes the states")
@@ -241,20 +247,6 @@ def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
 # -- in the running system ---------------------------------------------------------------------------
 
 
-@contextmanager
-def _changed(master: Master, parameter: Parameter, value: float) -> Iterator[None]:
-    """Inside, a running FMU has another value of a parameter; it is put back with its state."""
-    component = master.components[parameter.component]
-    saved = component.save_state()
-    try:
-        component.set({parameter.variable: value})
-        yield
-    finally:
-        component.restore_state(saved)
-        component.free_state(saved)
-        component.set({parameter.variable: parameter.value})
-
-
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
     of it a period [communication steps] later where sampled controllers make the steps differ.
@@ -267,7 +259,7 @@ def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     before = answer()
     for value in (parameter.value + sign * change for sign in (1, -1) if parameter.allows(sign * change)):
         try:
-            with _changed(master, parameter, value):
+            with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
                 after = answer()
         except CosimError:  # it will not have the value while it runs; perhaps at a start
             return False
@@ -308,7 +300,7 @@ def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter)
     """Shifts by linearising the parameter's own component again."""
 
     def shift(value: float) -> Shift:
-        with _changed(master, parameter, value):
+        with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
             return at.shift(blocks.with_component(master, parameter.component), master)
 
     return shift

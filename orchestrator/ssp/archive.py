@@ -16,8 +16,6 @@ _KIND = "SSP"
 
 
 class SspArchive:
-    """An .ssp file on disk."""
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self._members = set(names_in(path, _KIND))
@@ -27,7 +25,10 @@ class SspArchive:
 
     def member(self, source: str) -> str:
         """Name of the member that a relative URI means."""
-        uri = urlsplit(source)
+        try:
+            uri = urlsplit(source)
+        except ValueError as error:
+            raise InputError(f"the source {source!r} is not a URI: {error}; export it again") from error
         path = unquote(uri.path)
         if uri.scheme or uri.netloc or path.startswith("/") or "\\" in path or ".." in path.split("/"):
             raise InputError(
@@ -44,14 +45,12 @@ class SspArchive:
         return name
 
     def read(self, member: str) -> bytes:
-        """Contents of a member."""
         content = read_member(self.path, member, _KIND)
         if content is None:
             raise InputError(f"{self.path}: the archive has no {member!r}; export it again with all its resources")
         return content
 
     def xml(self, member: str) -> Element:
-        """Root element of a member."""
         text = self.read(member)
         check_xml(self.path, member, text)
         try:

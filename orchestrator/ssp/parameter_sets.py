@@ -55,8 +55,6 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
         Takes the group of units as its last element.
     name
         Name of the group of units, with its namespace.
-    used
-        Units, each once.
     known
         Attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes.
     """
@@ -68,7 +66,6 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
 
 
 def read_parameter_set(root: Element) -> dict[str, SspValue]:
-    """Values of a parameter set by name."""
     if root.tag != tag("ssv:ParameterSet"):
         raise InputError(f"{root.tag!r} is not a parameter set of SSP 1.0")
     values = {}
@@ -87,7 +84,7 @@ def _value(name: str, element: Element) -> float | bool | str:
         match kind:
             case "Real":
                 return float(text)
-            case "Integer":
+            case "Integer" if len(text) <= 20:
                 return int(text)
             case "Boolean" if text in ("true", "false", "1", "0"):
                 return text in ("true", "1")

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.ssp.archive import SspArchive
-from orchestrator.ssp.names import SYSTEM_FILE, children, plain_name, tag
+from orchestrator.ssp.names import STUDY_TYPE, SYSTEM_FILE, children, plain_name, tag
 from orchestrator.ssp.parameter_sets import SspValue
 from orchestrator.ssp.structure import Owner, Structure, read_structure
 from orchestrator.ssp.study import SspStudy, foreign_step, read_study
@@ -65,7 +65,7 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
         for owner, member in structure.sources.items()
     }
     if study is not None:
-        _add_study(tables, study)
+        _add_study(tables, study, path)
     else:
         suggested = [d.default_step_size for d in descriptions.values() if d is not None and d.default_step_size]
         tables["solver"] |= {"step_size": step or min(suggested)} if step or suggested else {}
@@ -129,9 +129,11 @@ def _converted(value: SspValue, unit: str) -> float | bool | str:
     return f"{value.value!r} {value.unit}"
 
 
-def _add_study(tables: dict[str, Any], study: SspStudy) -> None:
+def _add_study(tables: dict[str, Any], study: SspStudy, path: Path) -> None:
     """Add the tables of our annotation to those that SSP itself gives."""
     for name, content in study.tables.items():
+        if not isinstance(content, type(tables.get(name, content))):
+            raise InputError(f"{path}: the annotation {STUDY_TYPE} gives {name} as {content!r}; export the SSP again")
         tables[name] = tables.get(name, {}) | content if isinstance(content, dict) else content
     tables["solver"] |= {
         "step_size": study.step_size,

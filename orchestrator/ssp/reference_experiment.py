@@ -60,7 +60,6 @@ _PLATFORMS_2 = {"linux": "linux64", "win32": "win64", "darwin": "darwin64"}
 
 
 def platform_of(fmi_version: str) -> str:
-    """Name of this machine in a version of FMI."""
     if fmi_version == "2.0":
         return _PLATFORMS_2.get(sys.platform, sys.platform)
     machine = machine_of().lower()
@@ -112,7 +111,6 @@ def _csv(rows: list[list[str]]) -> bytes:
 
 
 def _parameters(description: FmuDescription) -> bytes:
-    """Every parameter at its start value."""
     root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name="smoke test")
     listed = SubElement(root, tag("ssv:Parameters"))
     for v in description.variables.values():

@@ -209,7 +209,6 @@ class _Reader:
 
 
 def _inside(system: Element, owner: Owner) -> Iterator[tuple[Element, Owner]]:
-    """Components and systems of a system."""
     for group in children(system, "ssd:Elements"):
         for element in group:
             if element.tag in (tag("ssd:Component"), tag("ssd:System")):

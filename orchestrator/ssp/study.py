@@ -3,7 +3,6 @@
 It travels as an annotation, which other tools ignore. The step is written in libcosim's form as well.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,6 +14,7 @@ from orchestrator.coupling.events import Event, faults_among
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import OSP_TYPE, STUDY_TYPE, children, tag
+from orchestrator.toml_files import parsed
 
 _OMS_TYPE = "org.openmodelica"
 
@@ -51,8 +51,6 @@ def study_of(
 
     Parameters
     ----------
-    scenario, title
-        Name of the scenario, and its title for people.
     step_size
         Communication step [s].
     schedule
@@ -109,7 +107,7 @@ def read_study(description: Element) -> SspStudy | None:
         if annotation.get("type") == STUDY_TYPE:
             try:
                 return _read(annotation)
-            except (AttributeError, KeyError, ValueError) as error:
+            except (AttributeError, KeyError, ValueError, RecursionError) as error:
                 raise InputError(
                     f"the annotation {STUDY_TYPE} cannot be read ({error}); export the SSP again"
                 ) from error
@@ -133,7 +131,7 @@ def _read(annotation: Element) -> SspStudy:
         schedule.attrib["name"],
         groups,
         settings,
-        tomllib.loads("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
+        parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
     )
 
 

@@ -21,8 +21,6 @@ def ssp_members(name: str, title: str, system: System, stop_time: float, study: 
     ----------
     name, title
         Name and title of the system, as tools show them.
-    system
-        The system, with all values that its components start from.
     stop_time
         Stop time of the default experiment [s].
     study

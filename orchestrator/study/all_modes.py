@@ -26,13 +26,6 @@ def compute_all_modes(
 
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
 
-    Parameters
-    ----------
-    scenarios
-        Of one case.
-    frequency_range, critical, directional
-        As `compute_modes`.
-
     Raises
     ------
     CosimError
@@ -67,6 +60,5 @@ def compute_all_modes(
 
 
 def _all_ours(prepared: PreparedScenario) -> bool:
-    """Whether all FMUs are our own, in this process."""
     plans = prepared.system.components.values()
     return all(plan.isolated is not True for plan in plans) and all(map(is_ours, {p.description.path for p in plans}))

@@ -32,12 +32,8 @@ class ScenarioAnswer:
 
     Attributes
     ----------
-    subject
-        What it is about, such as a scenario's title.
     good
         Whether that is good; None where it is not known.
-    verdict
-        In a word or two.
     mode
         The least damped mode of the range.
     """
@@ -49,7 +45,6 @@ class ScenarioAnswer:
     remark: str
 
     def as_json(self) -> dict[str, Any]:
-        """For a summary."""
         return {
             "stable": self.good,
             "verdict": self.verdict,
@@ -60,7 +55,6 @@ class ScenarioAnswer:
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:
-    """By the eigenvalues at the operating point."""
     verdict, mode = result.stability, min(result.modes, key=lambda m: m.damping_percent, default=None)
     swing = "" if mode is None else _swing(result, mode)
     remark = swing
@@ -74,7 +68,20 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
         because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
         remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
         remark += f"; {swing}" if swing and not where else ""
-    return ScenarioAnswer(result.prepared.title, verdict.stable, verdict.verdict, mode, _short(remark))
+    told = [remark] if remark else []
+    told += [
+        f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %" for name, m in _named_elsewhere(result, mode)
+    ]
+    told += [f"which mode is {name!r} is not known" for name in result.unnamed]
+    return ScenarioAnswer(
+        result.prepared.title, verdict.stable, verdict.verdict, mode, _with_misfits(result, "; ".join(told))
+    )
+
+
+def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:
+    """The only mode that the case looks for, where another one is damped less."""
+    looked_for = list(result.named.items()) if len(result.prepared.case.table.analysis.modes) == 1 else []
+    return [(name, mode) for name, mode in looked_for if mode is not least]
 
 
 def of_run(result: RunResult) -> ScenarioAnswer:
@@ -86,7 +93,7 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
-        return ScenarioAnswer(title, False, "UNSTABLE", mode, what)
+        return ScenarioAnswer(title, False, "UNSTABLE", mode, _with_misfits(result.modes, what))
     if result.failure is not None:
         return ScenarioAnswer(title, False, "failed", mode, _short(str(result.failure)))
     if by_modes.good is False:
@@ -102,6 +109,12 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     rest = f"; {by_modes.remark}" if by_modes.remark else ""
     end = result.modes.prepared.stop_time
     return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+
+
+def _with_misfits(result: ModesResult, remark: str) -> str:
+    """A remark behind what does not fit between devices and their bindings."""
+    faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
+    return _short("; ".join([*faults, remark] if remark else faults))
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:

@@ -54,10 +54,6 @@ class Checkpoints:
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    folder
-        Where the checkpoints lie.
     every
         Wall-clock time between two of them [s].
     resume
@@ -103,7 +99,6 @@ class Checkpoints:
 
     @property
     def exist(self) -> bool:
-        """Whether a run could go on from here."""
         return self._written or self._kept is not None
 
     def recording(self, prepared: PreparedScenario) -> RecordingFolder:
@@ -130,7 +125,6 @@ class Checkpoints:
         self._kept = None
 
     def clear(self) -> None:
-        """Remove what is there."""
         for path in (self._path, previous(self._path)):
             path.unlink(missing_ok=True)
         if not any(path.suffix == self._path.suffix for path in self._path.parent.glob("*")):
@@ -180,7 +174,6 @@ class Checkpoints:
     # -- what was left ---------------------------------------------------------------------------
 
     def _found(self) -> RunState | None:
-        """The newest state that is whole."""
         damaged = []
         for path in (self._path, previous(self._path)):
             try:

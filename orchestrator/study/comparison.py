@@ -15,6 +15,7 @@ from orchestrator.analysis.window_halves import WindowPart, part_of
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
+from orchestrator.results.csv_recording import read_csv
 from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
 from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
@@ -62,7 +63,7 @@ class Comparison:
 def open_trajectory(path: Path) -> xr.Dataset:
     """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
 
-    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE.
+    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV is read as well.
 
     Warns
     -----
@@ -71,6 +72,8 @@ def open_trajectory(path: Path) -> xr.Dataset:
     """
     if is_comtrade(path):
         return read_comtrade(path)
+    if path.suffix.lower() == ".csv" and path.is_file():
+        return read_csv(path)
     if parts_of(path / FOLDER):
         dataset = open_recording(path / FOLDER)
         if not dataset.sizes["time"]:
@@ -87,7 +90,10 @@ def open_trajectory(path: Path) -> xr.Dataset:
     try:
         dataset = open_whole(file)
     except (OSError, ValueError) as error:
-        raise InputError(f"{file}: it cannot be read as NetCDF: {error}") from error
+        raise InputError(
+            f"{file}: it cannot be read as NetCDF, or is damaged; give the folder of a scenario's results, its "
+            "trajectory.nc, a measured recording in COMTRADE (.cfg, .cff) or in CSV (.csv)"
+        ) from error
     if not dataset.sizes.get("time"):
         raise InputError(f"{file}: nothing was recorded in it; run the scenario again")
     return dataset
@@ -170,19 +176,12 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
 
     Parameters
     ----------
-    a, b
-        Trajectories of the two runs.
     expression
         The signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
     start
         Oscillations are looked for from this time on [s].
     labels
         Names of the two runs for tables and errors.
-
-    Raises
-    ------
-    InputError
-        If a run does not have the signal, it is not all numbers there, or they have no time in common.
     """
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
     for curve, label in zip((first, second), labels, strict=True):
@@ -217,10 +216,6 @@ def most_different(
     ----------
     a, b
         Trajectories of the two runs, compared at the times of `common_times`.
-    count
-        Most signals to be named.
-    labels
-        Names of the two runs for errors.
     """
     times = common_times(a["time"].values, b["time"].values, labels)
 

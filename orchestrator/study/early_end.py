@@ -16,7 +16,6 @@ class EarlyEnd:
 
     @property
     def word(self) -> str:
-        """How it ended."""
         return "interrupted" if self.interrupted else "failed"
 
     @property
@@ -26,5 +25,4 @@ class EarlyEnd:
         return f"in {self.scenario}{'' if self.kept else ', of which nothing is kept'}{rest}"
 
     def as_json(self) -> dict[str, Any]:
-        """For a summary."""
         return {"word": self.word, "place": self.place, "not_begun": list(self.not_begun)}

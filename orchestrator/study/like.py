@@ -26,15 +26,6 @@ def run_like(
     ----------
     prepared
         The scenario; its own schedule is not used.
-    rules
-        The other master's.
-    order, observers
-        As `emulate`.
-
-    Raises
-    ------
-    InputError, ComponentError
-        As `emulate`.
     """
     emulation = emulate(
         prepared.system, rules, prepared.step_size, prepared.stop_time, prepared.record, prepared.record_every,

@@ -66,8 +66,6 @@ def linear_model(
 
     Parameters
     ----------
-    prepared
-        The scenario.
     inputs, outputs
         Names ``component.variable``.
     as_continuous
@@ -92,13 +90,7 @@ def linear_model(
 
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
-    """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals.
-
-    Raises
-    ------
-    InputError
-        If an event switches something or is a fault, or there is none: a linear model has no answer to that.
-    """
+    """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals."""
     switching = [
         str(event)
         for event in prepared.events

@@ -1,8 +1,10 @@
 """How much an open load model moves the least damped mode, where that is cheap to say."""
 
+from collections.abc import Sequence
 from typing import Protocol, Self
 
 from orchestrator.analysis.modes import Mode
+from orchestrator.cases.load_models import is_open
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import CosimError
 from orchestrator.study.modes import ModesResult, compute_modes
@@ -12,8 +14,6 @@ _MOST_STATES = 200
 
 
 class Choosable(Protocol):
-    """A scenario that can be prepared with loads of constant power."""
-
     @property
     def prepared(self) -> PreparedScenario:
         """As it was asked for."""
@@ -22,21 +22,38 @@ class Choosable(Protocol):
         """The other one; None where the load model is not open."""
 
 
-def load_model_weight(scenario: Choosable, result: ModesResult) -> str | None:
-    """The least damped mode with both load models; None where the model is not open, or the system is large."""
-    if result.model.number_of_states > _MOST_STATES:
+def load_model_weights(
+    scenarios: Sequence[Choosable], results: Sequence[ModesResult], frequency_range: tuple[float, float]
+) -> list[str]:
+    """The least damped mode of the range with both load models, of every scenario whose model is open."""
+    weights = [_weight(*each, frequency_range) for each in zip(scenarios, results, strict=True)]
+    texts = {result.prepared.name: text for result, text in zip(results, weights, strict=True) if text}
+    if len(texts) > 1 and len(set(texts.values())) > 1:
+        return [f"scenario {name!r}: {text}" for name, text in texts.items()]
+    return list(dict.fromkeys(texts.values()))
+
+
+def _weight(scenario: Choosable, result: ModesResult, frequency_range: tuple[float, float]) -> str | None:
+    network = result.prepared.case.table.network
+    if not is_open(network) or result.prepared.network is None or not result.prepared.network.loads:
         return None
+    if (states := result.model.number_of_states) > _MOST_STATES:
+        return (
+            f"the load model is open, and how much it moves the modes was not computed, as the system has {states} "
+            f"states, more than {_MOST_STATES}; write which in [network], as load_model, once as each, and compare"
+        )
     try:
         other = scenario.with_loads_as_powers()
-        found = None if other is None else compute_modes(other.prepared)
+        found = None if other is None else compute_modes(other.prepared, frequency_range)
     except CosimError as error:
         return f"the load model: with constant powers there are no modes: {str(error).splitlines()[0]}"
     here, there = _least_damped(result), None if found is None else _least_damped(found)
     if here is None or there is None:
         return None
+    low, high = frequency_range
     return (
-        f"the load model moves the least damped mode: impedance {_figures(here)}, power {_figures(there)}; write which "
-        "in [network], as load_model"
+        f"the load model moves the least damped mode from {low:g} to {high:g} Hz: impedance {_figures(here)}, power "
+        f"{_figures(there)}; write which in [network], as load_model"
     )
 
 

@@ -3,15 +3,18 @@
 import fnmatch
 import math
 from cmath import phase
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.examination import examine
 from orchestrator.analysis.external_exciters import settled_warnings, start_warnings
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
@@ -29,6 +32,7 @@ from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
+from orchestrator.binding.misfits import Misfit
 from orchestrator.cases.areas import areas_of
 from orchestrator.cases.facts import facts_of
 from orchestrator.cases.fault_tables import component_faults
@@ -60,10 +64,6 @@ class ModesResult:
         Somebody else's figures for them, where their conditions hold.
     swing
         States that show who swings against whom, mostly speeds.
-    areas
-        Area of every component that has one.
-    stability
-        The verdict over the whole spectrum.
     hidden
         The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
     system
@@ -88,6 +88,7 @@ class ModesResult:
     system: LinearModel | None
     fit_errors: dict[str, float] = field(default_factory=dict)
     unnamed: Mapping[str, str] = field(default_factory=dict)
+    misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -108,7 +109,6 @@ class ModesResult:
         return dict(self.model.sources)
 
     def name_of(self, mode: Mode) -> str | None:
-        """Name of a mode, if it has one."""
         return next((name for name, named in self.named.items() if named is mode), None)
 
     def by_area(self, mode: Mode) -> dict[str, float]:
@@ -132,10 +132,6 @@ def compute_modes(
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    frequency_range
-        [Hz]
     critical
         Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
         knows too little to give modes their names.
@@ -147,17 +143,7 @@ def compute_modes(
 
 
 def running(prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1) -> Master:
-    """The scenario's FMUs, initialised; those of a federation still in this process.
-
-    Parameters
-    ----------
-    prepared
-        The scenario.
-    federation
-        The federates that take part.
-    threads
-        As `orchestrator.coupling.master.Master`.
-    """
+    """The scenario's FMUs, initialised; those of a federation still in this process."""
     opener = open_plan if federation is None else federation.open
     try:
         return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener, threads)
@@ -173,21 +159,7 @@ def modes_of(
     *,
     directional: bool = False,
 ) -> ModesResult:
-    """Steady state and modes of a running system; see `compute_modes`.
-
-    Parameters
-    ----------
-    prepared
-        The scenario that runs.
-    master
-        Its FMUs, initialised; afterwards they stand at the operating point.
-    frequency_range
-        Modes of these frequencies are shown [Hz].
-    critical
-        Damping ratio below which a sparse search looks for modes; None computes the whole spectrum.
-    directional
-        Linearise with the FMUs' own directional derivatives.
-    """
+    """`compute_modes` of a running system, whose FMUs stand at the operating point afterwards."""
     return _computed(linearised(prepared, master, frequency_range, critical, directional=directional))
 
 
@@ -199,18 +171,14 @@ def linearised(
     *,
     directional: bool = False,
 ) -> "Linearised":
-    """A running system at its operating point, before its eigenvalues are computed.
-
-    Parameters
-    ----------
-    prepared, master, frequency_range, critical, directional
-        As `modes_of`.
-    """
+    """The same before its eigenvalues are computed."""
     said = start_warnings(master)
+    misfits = misfits_of(master)
+    said = (*sentences(misfits), *start_warnings(master))
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return Linearised(prepared, master, point, blocks, frequency_range, critical, said)
+    return Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits)
 
 
 def modes_from(
@@ -220,21 +188,12 @@ def modes_from(
     blocks: Blocks,
     frequency_range: tuple[float, float],
     critical: float | None = None,
+    black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
 ) -> ModesResult:
-    """The modes of components that were linearised at an operating point.
-
-    Parameters
-    ----------
-    prepared, master
-        The scenario, and its FMUs at the operating point.
-    point
-        The operating point.
-    blocks
-        The linearised components.
-    frequency_range, critical
-        As for `modes_of`.
-    """
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical))
+    """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
+    misfits = misfits_of(master)
+    said = sentences(misfits)
+    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits, black_boxes))
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -247,12 +206,7 @@ def _computed(system: "Linearised") -> ModesResult:
 class Linearised:
     """A linearised scenario, whose eigenvalues other threads compute meanwhile.
 
-    Parameters
-    ----------
-    prepared, master, point, blocks, frequency_range, critical
-        As `modes_from`.
-    said
-        Warnings that come before those of the modes.
+    ``said`` are earlier warnings, ``misfits`` as `misfits_of`.
     """
 
     def __init__(
@@ -264,20 +218,18 @@ class Linearised:
         frequency_range: tuple[float, float],
         critical: float | None,
         said: tuple[str, ...] = (),
+        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
+        black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
     ) -> None:
+        self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
         self._range, self._critical, self._said = frequency_range, critical, said
+        self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
         self.named: NamedSystem | None = None
 
     def begin(self, pool: Executor) -> None:
-        """Submit the eigenvalues.
-
-        Parameters
-        ----------
-        pool
-            As `side_by_side` gives it.
-        """
+        """Submit the eigenvalues."""
         if self._system is not None and len(self._model.names) <= ALL_VECTORS:
             # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
             # its way, in NumPy's `eigvals`, before that begins.
@@ -298,6 +250,15 @@ class Linearised:
         first, last = _named_range(self._range)
         return find_spectrum(self._model, first, max(last, HIGHEST_SWING_HZ)), []
 
+    def _at_gains(self, gains: Mapping[str, float]) -> LinearModel:
+        """The model with other values of parameters that leave the operating point where it is."""
+        before = {name: _value(self._prepared, name) for name in gains}
+        blocks = self._blocks
+        with changed(self._master, gains, before):
+            for name in {name.partition(".")[0] for name in gains}:
+                blocks = blocks.with_component(self._master, name)
+            return model_of(self._master, blocks)
+
     def finished(self, known: Mapping[str, NamedSystem] = MappingProxyType({})) -> ModesResult:
         """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
         prepared, model = self._prepared, self._model
@@ -309,7 +270,10 @@ class Linearised:
             swinging = [mode for mode in oscillating if first <= mode.frequency_hz <= last]
             shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
             directional = self._blocks.directional
-            self.named = identified(prepared, self._point, model, swinging, self._range, known, directional=directional)
+            self.named = identified(
+                prepared, self._point, model, swinging, self._range, known, self._at_gains,
+                directional=directional, black_boxes=self._black_boxes,
+            )  # fmt: skip
             naming = self.named.naming
             named = {name: mode for name, mode in naming.named.items() if low <= mode.frequency_hz <= high}
         else:
@@ -329,6 +293,7 @@ class Linearised:
             modes=shown,
             named=named,
             references=dict(prepared.references),
+            misfits=self._misfits,
             warnings=(
                 *self._said,
                 *map(str, prepared.questions),
@@ -362,36 +327,69 @@ def identified(
     modes: Sequence[Mode],
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     known: Mapping[str, NamedSystem] = MappingProxyType({}),
+    at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None,
     *,
     directional: bool = False,
+    black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     Parameters
     ----------
-    prepared, point, model
-        The scenario, its operating point, and its linear model there.
-    modes
-        That can bear a name.
-    frequency_range
-        That is shown [Hz].
-    known
-        Other scenarios of the same case and values that have their names.
+    at_gains
+        The linear model with other gains of damping controllers, where the scenario still runs.
     directional
         As `modes_of`, for scenarios that have to be computed.
+    black_boxes
+        Identifies components of such a scenario that hide their states.
     """
     first, last = _named_range(frequency_range)
 
-    def computed(other: PreparedScenario) -> NamedSystem:
-        with running(other) as master:
-            at = find_operating_point(master)
-            linear = model_of(master, Blocks(master, directional=directional))
+    def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
         found = [mode for mode in find_spectrum(linear, first, last).modes if mode.is_oscillation]
         return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
 
+    def computed(other: PreparedScenario) -> NamedSystem:
+        with running(other) as master:
+            boxes = black_boxes(master) if black_boxes else {}
+            at = OperatingPoint(math.nan, math.nan, math.nan, 0, {}) if boxes else find_operating_point(master)
+            linear = model_of(master, Blocks(master, directional=directional, known=boxes))
+        return named(other, at, linear)
+
     return settled(
-        NamedSystem(prepared, point, model, modes, named_modes(prepared.case, model, modes)), computed, known
+        NamedSystem(prepared, point, model, modes, named_modes(prepared.case, model, modes)),
+        computed,
+        known,
+        undamped=None if at_gains is None else lambda gains: named(prepared, point, at_gains(gains)),
     )
+
+
+@contextmanager
+def changed(master: Master, values: Mapping[str, float], before: Mapping[str, float]) -> Iterator[None]:
+    """Inside, running FMUs have other values of tunable parameters; they are put back with their states."""
+    saved = {name: master.components[name].save_state() for name in {key.partition(".")[0] for key in values}}
+    try:
+        for key, value in values.items():
+            _set(master, key, value)
+        yield
+    finally:
+        for name, state in saved.items():
+            master.components[name].restore_state(state)
+            master.components[name].free_state(state)
+        for key, value in before.items():
+            _set(master, key, value)
+
+
+def _value(prepared: PreparedScenario, key: str) -> float:
+    name, _, variable = key.partition(".")
+    value = prepared.system.components[name].value(variable)
+    assert not isinstance(value, str | None)
+    return value
+
+
+def _set(master: Master, key: str, value: float) -> None:
+    name, _, variable = key.partition(".")
+    master.components[name].set({variable: value})
 
 
 def _named_range(shown: tuple[float, float]) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
+from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.external_exciters import start_warnings
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.linearization import Blocks, compose
@@ -72,12 +73,6 @@ class RunResult:
 
     Attributes
     ----------
-    dataset
-        What was recorded, up to the failure if there was one.
-    ring_down
-        The electromechanical mode as identified from the response.
-    linear
-        The linear model's response to the same events, where it was asked for.
     failure
         The error that ended the run before its time.
     findings
@@ -133,8 +128,6 @@ def run_scenario(
 
     Parameters
     ----------
-    prepared
-        The scenario.
     frequency_range
         Modes of these frequencies are shown [Hz].
     observers
@@ -145,10 +138,6 @@ def run_scenario(
         Where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
     checkpoints
         Keep the run while it goes on, and go on from the newest where one was left; not with federates.
-    federates
-        Components that run as federates at HELICS.
-    threads
-        As `orchestrator.coupling.master.Master`.
     """
     if federates is not None:
         if federates.announce is not None:
@@ -181,9 +170,10 @@ def _run(
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
-        started = start_warnings(master) if reasons else ()
+        misfits = misfits_of(master)
+        started = (*sentences(misfits), *start_warnings(master)) if reasons else ()
         modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
-        modes = replace(modes, warnings=(*started, *modes.warnings))
+        modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
@@ -201,7 +191,7 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    findings = watch.findings(failure, master.late_starts)
+    findings = watch.findings(failure, master.late_starts, misfits)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"

@@ -46,12 +46,8 @@ def draw_signal(axis: Any, results: Sequence[RunResult], expression: str, scale:
     ----------
     axis
         Matplotlib Axes.
-    results
-        One for each scenario.
     expression
         ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    scale
-        Factor on the values.
     first
         Index of the first run's colour: the number of runs that the Axes show already.
     """

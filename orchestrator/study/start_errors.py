@@ -8,6 +8,8 @@ from orchestrator.fmi.instance import is_ours
 _INITIALISATION = "InitializationMode"
 _PREFACE = "parameters cannot be used: "
 """Begins what our models say of values that do not fit together."""
+_FULL = 1.0
+"""Apparent power [pu] beyond which a unit is asked for more than its rating."""
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
@@ -22,7 +24,8 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
     )
     given = {v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables}
     most = power_limits(plan, given["Q_0"])[1] if {"P_0", "Q_0"} <= set(given) else float("inf")
-    need = f"would need {100 * given['P_0'] / most:.0f} % and " if 0 < most < given.get("P_0", 0.0) else ""
+    share = given["P_0"] / most if "P_0" in given and most > 0 else 0.0
+    need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
     text = f"scenario {prepared.name!r}: {name} {need}cannot start: {said}"
     if {"P_0", "Q_0", "S_n"} <= set(given):
         computed = prepared.power_flow is not None and name in prepared.power_flow.powers
@@ -31,21 +34,11 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         text += (
             f"; {by} P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu of S_n = {given['S_n']:g} MVA{voltage}"
         )
-        if computed:
+        if computed and (need or abs(complex(given["P_0"], given["Q_0"])) > _FULL):
             text += (
-                f". Where that is too much for it, raise {_rating(prepared, name)}, change the voltages or loads "
-                "around it, or give a component its Q_0 in place of v_0"
+                ". Give others more of the power (P_0 of units), lower the loads or the reactive power around it, or "
+                "correct a limit that is wrong in its data"
             )
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
     return StartError(str(prepared.case.path), Problem(prepared.places[name], text, kind), name)
-
-
-def _rating(prepared: PreparedScenario, name: str) -> str:
-    """What the case calls the rating of a component."""
-    if name not in prepared.of_units:
-        return "its S_n"
-    units = prepared.case.table.units
-    if units is not None and units.dyr is not None:
-        return "MBASE of its machine in the RAW file"
-    return f"rating_mva of its unit ({prepared.places[name]})"

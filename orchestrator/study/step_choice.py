@@ -94,8 +94,6 @@ class StepChoice:
 
     Attributes
     ----------
-    prepared
-        The scenario.
     critical
         The continuous system's critical modes [rad/s], least damped first.
     growth
@@ -113,7 +111,6 @@ class StepChoice:
 
     @property
     def schedules(self) -> tuple[ScheduleName, ...]:
-        """The schedules that were tried."""
         return tuple(dict.fromkeys(trial.schedule for trial in self.trials))
 
     def of(self, schedule: ScheduleName) -> list[TriedStep]:
@@ -147,10 +144,6 @@ def choose_step(
 
     Parameters
     ----------
-    prepared
-        The scenario.
-    allowed
-        The error that is accepted.
     steps
         Communication steps [s]; by default `MULTIPLES` of the case's own.
     schedules

@@ -32,7 +32,7 @@ def steady_states(results: Sequence[ModesResult]) -> Table:
 
 def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> Table:
     """The modes that a case looks for, beside somebody else's figures where there are any."""
-    names = list(dict.fromkeys(name for r in results for name in [*r.named, *r.references]))
+    names = list(dict.fromkeys(name for r in results for name in [*r.named, *r.unnamed, *r.references]))
     compared = any(r.references for r in results)
     columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
     if compared:
@@ -43,7 +43,7 @@ def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> 
             mode, reference = r.named.get(name), r.references.get(name)
             row = [f"{name}: {r.prepared.title}" if len(names) > 1 else r.prepared.title]
             if mode is None:
-                row += ["none in range", "", ""]
+                row += ["not known" if name in r.unnamed else "none in range", "", ""]
             else:
                 row += [eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
             if reference is not None:

@@ -33,12 +33,8 @@ class Vary:
         ``component.parameter``; the component may be a pattern such as ``gfor*``.
     limits
         START and STOP; None for a list.
-    count
-        Number of values of a range.
     logarithmic
         Whether these are equally spaced on a logarithmic scale.
-    values
-        Of a list.
     """
 
     key: str

@@ -4,7 +4,7 @@ Everything here can be sent to another process or another machine.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Self
 
 from orchestrator.analysis.mode_tracking import ModeSet
@@ -101,7 +101,6 @@ class PointRecord:
 
     @classmethod
     def lost(cls, _: SweepPointTask, error: WorkerLostError) -> Self:
-        """The record of a point whose worker died."""
         return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
@@ -166,7 +165,10 @@ def compute_point(task: SweepPointTask) -> PointRecord:
     with alone():
         try:
             (prepared,) = case.prepare([task.scenario], task.overrides, task.step_size, None, task.layers)
-            return _record(compute_modes(prepared, task.frequency_range))
+            asked = tuple(question for question in prepared.questions if question not in prepared.idle.values())
+            # A sweep follows modes from point to point itself, and asks of all scenarios together.
+            alone_here = replace(prepared, beside=None, questions=asked)
+            return _record(compute_modes(alone_here, task.frequency_range))
         except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
             return PointRecord(failure=Failure.of(error))
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.case import Case
+from orchestrator.cases.idle_values import Idle, idle_everywhere
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
@@ -42,6 +43,8 @@ class SweepPlan:
         Communication step [s]; None for the case's.
     frequency_range
         [Hz]
+    idle
+        Questions about values that act in no scenario.
     """
 
     case: Case
@@ -50,6 +53,7 @@ class SweepPlan:
     layers: tuple[ParameterFile, ...]
     step_size: float | None
     frequency_range: tuple[float, float]
+    idle: tuple[Problem, ...] = ()
 
     @property
     def overrides(self) -> dict[str, Value]:
@@ -66,7 +70,6 @@ class SweepPlan:
         return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
-        """The task of one point."""
         varied = self.values(place)
         return make_task(prepared, self.layers, varied, self.step_size, self.frequency_range)
 
@@ -154,8 +157,6 @@ def plan_sweep(
 
     Parameters
     ----------
-    case
-        The case that is swept.
     vary
         The varied parameters, one for each axis. Modes are followed along the last axis.
     scenarios
@@ -175,20 +176,21 @@ def plan_sweep(
     plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range)
     refuse_doubles(axes, prepared)
     ends = [{axis.key: axis.values[end] for axis in axes} for end in (0, -1)]
-    for varied in ends if any(axis.key == ALPHA for axis in axes) else ends[:1]:
-        _check_end(plan, varied)
-    return plan
+    idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]
+    return replace(plan, idle=tuple(idle[0]))
 
 
-def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> None:
-    """Prepare one point of every scenario at an end of the grid. This finds parameters that cannot be varied, and
-    builds FMUs that only this end needs.
+def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
+    """Prepare one point of every scenario at an end of the grid. This finds parameters that cannot be varied, and those
+    that cannot act, and builds FMUs that only this end needs.
     """
     marks = {f"--set {key}": f"--vary {key}" for key in varied}
     found: dict[Problem, list[str]] = {}
+    idle: list[Idle] = []
     for name in [prepared.name for prepared in plan.scenarios]:
         try:
-            plan.case.prepare([name], varied, plan.step_size, None, plan.layers)
+            (one,) = plan.case.prepare([name], varied, plan.step_size, None, plan.layers)
+            idle.append(one.idle)
         except CaseError as error:
             for problem in error.problems:
                 if problem.place in marks:
@@ -200,6 +202,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> None:
             for p, names in found.items()
         ]
         raise CaseError(str(plan.case.path), wrong)
+    return [Problem(marks.get(p.place, p.place), p.text) for p in idle_everywhere(idle)]
 
 
 def run_sweep(
@@ -215,12 +218,6 @@ def run_sweep(
     ----------
     plan
         A plan that `plan_sweep` has checked.
-    executor
-        Where the points are computed.
-    store
-        Keeps every point as soon as it is computed.
-    report
-        Progress.
     """
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
@@ -245,7 +242,6 @@ def _fill(
     store: PointStore,
     report: CountReport,
 ) -> None:
-    """Load or compute some points."""
     tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
     before = result.stored + result.computed
 

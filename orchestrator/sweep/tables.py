@@ -75,7 +75,7 @@ def stability(samples: Samples) -> list[str]:
 
 def remarks(samples: Samples) -> list[str]:
     """Sentences on points that failed, on trajectories that break, and on refining points."""
-    result, texts = samples.result, []
+    result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
     failures = list(result.failures())
     if failures:
         texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")

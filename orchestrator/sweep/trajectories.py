@@ -14,8 +14,6 @@ GridPlace = tuple[float, ...]
 
 
 class Beginning(IntEnum):
-    """How a mode at a point came into its trajectory."""
-
     START = 0
     """The first point of the grid, or the first after points that failed."""
     FOLLOWED = 1
@@ -29,8 +27,6 @@ class Beginning(IntEnum):
 
 @dataclass(frozen=True)
 class TrajectoryPoint:
-    """A trajectory at one point of the grid."""
-
     mode: int
     similarity: float
     beginning: Beginning

@@ -28,8 +28,6 @@ def disturbances(system: System, events: Sequence[Event], end: float) -> list[Un
 
     Parameters
     ----------
-    system
-        With the permanent imperfections of its connections.
     events
         Those of the run; some begin or end an imperfection.
     end
@@ -68,7 +66,6 @@ def _kind(imperfection: Imperfection, *, least: bool = True) -> str:
 
 
 def among(found: Iterable[Unrest], stretch: Stretch) -> list[Unrest]:
-    """The disturbances that act in a stretch."""
     return [d for d in found if d.begin < stretch.end and d.end > stretch.begin]
 
 

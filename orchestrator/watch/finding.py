@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_away", "undisturbed_motion",
-               "active_limit", "loss_of_synchronism", "not_judged", "not_finite", "failure"]  # fmt: skip
+               "active_limit", "loss_of_synchronism", "not_judged", "not_finite", "failure", "misfit"]  # fmt: skip
 
 UNSTABLE: frozenset[Kind] = frozenset(
     {
@@ -19,7 +19,9 @@ UNSTABLE: frozenset[Kind] = frozenset(
     }
 )
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
-be, or the run ends too early after an event."""
+be, or the run ends too early after an event; ``misfit`` is of a device and its binding, whatever the run does."""
+
+MISFIT: Kind = "misfit"
 
 NOT_JUDGED: Kind = "not_judged"
 
@@ -34,8 +36,6 @@ class Finding:
         When it began [s].
     component, variable
         The component and variable that show the fault most, or whose limit acts.
-    message
-        The whole finding in words.
     until
         Its end [s]; None if it lasts to the end of the run, or has no duration.
     figures
@@ -54,7 +54,6 @@ class Finding:
     represented: bool = True
 
     def as_json(self) -> dict[str, Any]:
-        """The finding for a summary."""
         return {
             "kind": self.kind,
             "time": self.time,

@@ -14,8 +14,6 @@ class Lead:
 
     Attributes
     ----------
-    state
-        The state whose derivative is read.
     time, gain
         Parameters with T [s] and the gain; None stands for 1.
     lag
@@ -35,10 +33,6 @@ class Limit:
 
     Attributes
     ----------
-    name
-        Name of the limit in messages.
-    signal
-        The limited signal, or a signal that follows it.
     limit
         Parameter with the limit of the magnitude, or the upper one where there is a lower one; None if the signal is
         given as a part of the limit.
@@ -54,8 +48,6 @@ class Limit:
         Signal that both limits are multiplied by.
     unless
         Parameter that is above 0 where another limit acts instead. An FMU need not have it.
-    knows, lacks
-        Variables by which a part is told from others with the same names of signals and limits.
     """
 
     name: str
@@ -71,7 +63,6 @@ class Limit:
     lacks: tuple[str, ...] = ()
 
     def variables(self) -> tuple[str, ...]:
-        """Signals to be read."""
         derivative = None if self.lead is None else f"der({self.lead.state})"
         return tuple(name for name in (self.signal, derivative, self.scale) if name is not None)
 
@@ -82,5 +73,4 @@ class Limit:
         return (*self.variables(), *self.knows, *(p for p in parameters if p is not None))
 
     def fits(self, variables: Container[str]) -> bool:
-        """Whether an FMU with these variables has the limit."""
         return all(name in variables for name in self.needed()) and not any(name in variables for name in self.lacks)

@@ -57,14 +57,12 @@ SCALED = 1e-3
 
 
 def limits_of(plan: ComponentPlan) -> Iterator[Limit]:
-    """The limits that can be seen in a component."""
     for limit in LIMITS:
         if limit.fits(plan.description.variables):
             yield limit
 
 
 def limit_signals(system: System) -> list[str]:
-    """Signals that the limits of all components need."""
     return [f"{name}.{variable}" for name, plan in system.components.items()
             for limit in limits_of(plan) for variable in limit.variables()]  # fmt: skip
 

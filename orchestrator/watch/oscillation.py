@@ -67,7 +67,6 @@ def crossings_hz(times: Numbers, signal: Numbers) -> float:
 
 
 def too_fast(times: Numbers, signal: Numbers) -> bool:
-    """Whether a signal swings too fast for its samples to show the oscillation."""
     return crossings_hz(times, signal) * float(times[1] - times[0]) * _PER_PERIOD > 1
 
 

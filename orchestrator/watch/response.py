@@ -122,7 +122,6 @@ def judgements(found: Sequence[Finding]) -> list[Finding]:
 
 
 def enough_looks(seen: Seen, stretch: Stretch) -> bool:
-    """Whether the judged part of a stretch has the looks that any judgement needs."""
     judged = (seen.times >= _judged_from(stretch)) & (seen.times <= stretch.end * (1 + 1e-12))
     return int(judged.sum()) >= FEWEST_LOOKS
 

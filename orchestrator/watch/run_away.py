@@ -125,14 +125,6 @@ def run_away(
 
     Parameters
     ----------
-    seen
-        What was seen of the run.
-    system
-        What ran.
-    settings
-        The parameters' values over the run.
-    stretches
-        The parts of the run between its events.
     slipped
         Whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be reported.
     """
@@ -209,10 +201,6 @@ def still_moving_away(
 
     Parameters
     ----------
-    seen, system, settings
-        As `run_away`.
-    last
-        The stretch that ends with the run.
     limits
         The findings on limits; those of governors that act at the end count.
     """

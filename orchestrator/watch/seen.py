@@ -3,12 +3,13 @@ two looks.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
+from orchestrator.binding.misfits import Misfit
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
@@ -19,6 +20,10 @@ LOOK_INTERVAL = 5e-3
 
 MOST_LOOKS = 20_000
 """Largest number of looks; in longer runs the looks are farther apart."""
+
+
+_AT_REST, _STILL = 0.05, 0.2
+"""Time at the start in which a slip moves the current [s], and the part of it by which it moves it at least."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,24 @@ class Seen:
     def interval(self) -> float:
         """Between two looks [s]."""
         return float(self.times[1] - self.times[0]) if len(self.times) > 1 else 0.0
+
+
+def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
+    """With a frequency that was scaled for another one as the device has it, in pu of its own: it is 1 at rest.
+
+    A device that slips from the start stays as it is: its current moves, and at rest it does not.
+    """
+    values = dict(seen.values)
+    for name, found in misfits.items():
+        rest = next((m.figures["omega"] for m in found if "omega" in m.figures), None)
+        signal, current = values.get(f"{name}.omega"), seen.last.get(f"{name}.i_re")
+        if rest is None or signal is None or current is None:
+            continue
+        looks = max(2, int(_AT_REST / seen.interval) if seen.interval else 2)
+        size = np.hypot(current, seen.last[f"{name}.i_im"])
+        if np.ptp(size[:looks]) < _STILL * max(size[0], _STILL):
+            values[f"{name}.omega"] = signal / rest
+    return replace(seen, values=values)
 
 
 def is_derivative(name: str) -> bool:

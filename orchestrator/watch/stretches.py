@@ -31,8 +31,6 @@ class Stretch:
     ----------
     breaks
         Times of unnoticed events inside the stretch [s].
-    last
-        Whether it ends with the run.
     """
 
     begin: float
@@ -52,8 +50,6 @@ def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]
 
     Parameters
     ----------
-    signals
-        Signals in which events are noticed, at the looks.
     times
         Of the events [s].
     """

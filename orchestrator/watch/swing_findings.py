@@ -32,7 +32,6 @@ def _since(swing: Swing, frequency: float | None) -> float:
 
 
 def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    """An oscillation that grows."""
     message = (
         f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
@@ -42,13 +41,7 @@ def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch)
 
 
 def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    """An oscillation that neither decays nor grows.
-
-    Parameters
-    ----------
-    swing, oscillation, unit, stretch
-        As `growing`.
-    """
+    """An oscillation that neither decays nor grows."""
     since = _since(swing, oscillation.frequency_hz)
     message = (
         f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
@@ -63,8 +56,6 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
 
     Parameters
     ----------
-    swing, oscillation, stretch
-        As `growing`.
     why
         The reason; see `confirmation.doubt`.
     """
@@ -83,13 +74,7 @@ def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> 
 
 
 def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
-    """A swing at no single frequency.
-
-    Parameters
-    ----------
-    swing, unit, stretch
-        As `growing`.
-    """
+    """A swing at no single frequency."""
     amplitude, since = _irregular_amplitude(swing), _since(swing, None)
     fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
     grows = swing_rises(swing)
@@ -107,8 +92,6 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
 
     Parameters
     ----------
-    swing, unit, stretch
-        As `growing`.
     why
         The reason; see `confirmation.irregular_doubt`.
     """

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
+from orchestrator.fmi.port import BoundDescription
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
@@ -149,7 +150,9 @@ def _angle(seen: Seen, system: System, settings: Settings, name: str) -> Numbers
     variable = _angle_variable(system, name)
     signal = seen.values[f"{name}.{variable}"].copy()
     if variable == _SPEED:
-        steps = 2 * np.pi * _start(system, settings, name, "f_n", 50.0) * seen.interval * (signal - 1.0)
+        described = system.components[name].description
+        f_n = described.port.f_n if isinstance(described, BoundDescription) else 50.0
+        steps = 2 * np.pi * _start(system, settings, name, "f_n", f_n) * seen.interval * (signal - 1.0)
         turned = np.concatenate([[0.0], np.cumsum((steps[1:] + steps[:-1]) / 2)])
         signal = _start(system, settings, name, "theta_0", 0.0) + turned
     return signal

@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
+from types import MappingProxyType
 
 import numpy as np
 
+from orchestrator.binding.misfits import Misfit
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.filtered_recorder import FilteredRecorder
@@ -15,11 +17,11 @@ from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
-from orchestrator.watch.finding import UNSTABLE, Finding, Kind
+from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
 from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
 from orchestrator.watch.run_away import run_away, speed_signals, still_moving_away
-from orchestrator.watch.seen import Seen, Watcher, look_every
+from orchestrator.watch.seen import Seen, Watcher, look_every, rescaled
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.short_stretches import is_short, still_departing, too_short
 from orchestrator.watch.stretches import Stretch, stretches
@@ -57,21 +59,22 @@ class Watch:
         self.observers = (self.recorder, self._watcher)
 
     def findings(
-        self, failure: CosimError | None = None, late_starts: Mapping[str, LateStart] | None = None
+        self,
+        failure: CosimError | None = None,
+        late_starts: Mapping[str, LateStart] | None = None,
+        misfits: Mapping[str, Sequence[Misfit]] = MappingProxyType({}),
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
         Parameters
         ----------
-        failure
-            What ended the run.
-        late_starts
-            As `Master` has them.
+        misfits
+            Of devices and their bindings, by component.
         """
-        seen = self._watcher.seen(self.recorder if self._looks_at_records else None)
+        seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
         told = judged(seen, self._prepared.system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
-        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), told)
+        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
         return sorted(found, key=lambda finding: finding.time)
 
 
@@ -80,8 +83,6 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
     Parameters
     ----------
-    seen, system, events
-        What was seen of the run, what ran, and what happened in it.
     whole
         Whether the run came to its end; of one that did not, nobody asks whether it settles.
     """
@@ -167,6 +168,11 @@ def _late(starts: Mapping[str, LateStart]) -> Iterator[Finding]:
             "`gfor check --only initial_outputs` shows it alone"
         )
         yield Finding("undisturbed_motion", 0.0, component, late.variable, message)
+
+
+def _misfits(found: Mapping[str, Sequence[Misfit]]) -> Iterator[Finding]:
+    for name, misfits in found.items():
+        yield from (Finding(MISFIT, 0.0, name, "", m.sentence(name), None, m.figures) for m in misfits)
 
 
 def _failure(error: CosimError | None) -> Sequence[Finding]:

@@ -1,5 +1,6 @@
 """`gfor bind`, `gfor check`, and a vendor's FMU in a case, as a user meets them."""
 
+import ast
 import json
 import shutil
 import zipfile
@@ -51,6 +52,22 @@ def test_every_check_has_its_place_in_the_order():
     assert set(ORDER) == set(ENTERED) == set(CHECKS)
     for name, check in CHECKS.items():
         assert all(ORDER.index(needed) < ORDER.index(name) for needed in check.needs)
+
+
+RESULTS = ("passed", "failed", "remarked", "not_applicable", "not_supported", "provoked")
+
+
+def test_every_result_stands_under_the_name_of_a_check():
+    """Where the reason stood in its place, a table would have a row that no check has and `--only` cannot ask for."""
+    folder, named = Path(MODULES[0].__file__).parent, []
+    for path in sorted(folder.glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") in RESULTS:
+                first = node.args[0]
+                if isinstance(first, ast.Constant | ast.JoinedStr):
+                    named.append((getattr(first, "value", ""), f"{path.name}, line {node.lineno}"))
+    assert len(named) > 100
+    assert [where for name, where in named if name not in CHECKS] == []
 
 
 def test_a_draft_tells_what_is_left_to_fill_in(gfor, gallery, tmp_path):

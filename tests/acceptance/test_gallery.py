@@ -13,7 +13,9 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
+from orchestrator.acceptance.checks import signs
 from orchestrator.acceptance.runner import check_fmu
+from orchestrator.api.acceptance import Acceptance
 from orchestrator.fmi.limits import Limits
 from tests.acceptance.gallery.build import build, check_macros
 from tests.acceptance.gallery.hostile import HOSTILE
@@ -40,8 +42,10 @@ def checked(path, binding=None, only=()):
         ("base_of_own_rating", "ratings"),
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
+        ("droop_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
+        ("feedthrough_of_high_voltage", "feedthrough"),
         ("hidden_state", "state"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),
@@ -98,6 +102,34 @@ def test_a_crash_is_told_with_the_checks_that_led_to_it(tmp_path):
     assert "not so in a new process: what came before it, repeatability, reset, damaged" in failure.evidence
     alone = check_fmu(path, None, LIMITS, ("sample_time",), run_for=0.3)
     assert alone.faults == []
+
+
+def test_an_omega_that_lags_is_told(tmp_path):
+    found = check_fmu(build(converter("lags", FAULT_OMEGA_LAGS=2.0), tmp_path), None, LIMITS, ("signs",), run_for=0.3)
+    assert found.results[-1].verdict == "remark"
+    assert "still on its way to the network's 0.999, and its power rests" in found.results[-1].evidence
+
+
+def test_power_that_moves_in_steps_is_told(tmp_path):
+    path = build(converter("coarse", FAULT_COARSE_POWER=0.01), tmp_path)
+    found = check_fmu(path, None, LIMITS, ("steady_state", "power_balance", "operating_points"), run_for=0.3)
+    assert found.results[-1].verdict == "remark"
+    assert "it takes its power in steps" in found.results[-1].evidence
+
+
+def test_what_was_not_judged_stands_in_the_verdict(gallery, monkeypatch):
+    """A droop of reactive power whose law is not seen, of the wrong sign besides."""
+    monkeypatch.setattr(signs, "droop", lambda found: None)
+    found = check_fmu(*gallery("q_measured"), LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3)
+    assert found.trusted
+    assert found.not_judged == ["the sign of its droop of reactive power"]
+    assert "no check failed; not judged: the sign of its droop of reactive power" in repr(Acceptance(found))
+
+
+def test_a_crowded_machine_makes_no_good_fmu_hang(gallery, monkeypatch):
+    monkeypatch.setattr(os, "getloadavg", lambda: (3.0 * os.cpu_count(), 0.0, 0.0))
+    found = check_fmu(*gallery("hang"), Limits(seconds=1.0), ("runs",), run_for=0.3)
+    assert "no answer within 3 s in fmi2DoStep" in found.failures[0].evidence
 
 
 @pytest.mark.slow

@@ -51,6 +51,13 @@ def quick(monkeypatch):
         monkeypatch.setattr(resources, name, lambda *_: 0.0)
 
 
+def test_a_python_backed_fmu_of_ours_passes_by_the_common_rule(fmu_path):
+    """Each instance kept a class that was made for it, 28 kB, and a rule of its own excused that."""
+    found = checked(fmu_path("infinite_bus"))
+    assert found.fault == "", found.evidence
+    assert found.figures["instance"] < 2500
+
+
 def test_resets_that_could_not_be_measured_are_no_pass(gallery, quick, monkeypatch):
     def refuses(self):
         raise ComponentError("fmu", "fmi2Reset", "fmi2Error", "no room")

@@ -46,6 +46,11 @@ def test_a_current_that_moves_in_steady_state(judged, angle, verdict):
     assert judged(converter("slight", FAULT_DRIFT=angle), "steady_state")[0] == verdict
 
 
+def test_a_start_that_fits_at_one_angle_alone_is_no_steady_state(judged):
+    """At an angle of 0 it is exact; by 0.4 rad the angle behind its impedance is wrong by 0.01 rad."""
+    assert judged(converter("slight", FAULT_SMALL_ANGLE=1), "steady_state") == ("fail", "no steady state")
+
+
 @pytest.mark.parametrize(
     ("leak", "verdict"),
     [

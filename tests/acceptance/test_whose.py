@@ -234,14 +234,32 @@ def test_an_fmu_that_leaves_a_process_with_each_instance_gets_a_verdict(tmp_path
 
 
 def faults_of(function):
-    """Names of faults that calls of a function state literally, in all modules."""
-    for path in (*Path("orchestrator/acceptance").rglob("*.py"), *Path("orchestrator/fmi").rglob("*.py")):
+    """Names of faults that calls of a function state, in all modules: one, or one of two by a condition."""
+    rooms = ("acceptance", "binding", "fmi")
+    for path in (p for room in rooms for p in Path("orchestrator", room).rglob("*.py")):
         for call in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") == function:
-                yield from (a.value for a in call.args[1:2] if isinstance(a, ast.Constant))
+                inside = [part for a in call.args[1:2] for part in (a, *ast.walk(a))]
+                choices = [c for part in inside if isinstance(part, ast.IfExp) for c in (part.body, part.orelse)]
+                yield from (c.value for c in (*call.args[1:2], *choices) if isinstance(c, ast.Constant))
+
+
+def faults_returned():
+    """First words of pairs of texts that functions of the checks return: a fault, and what shows it."""
+    for path in (*Path("orchestrator/acceptance/checks").glob("*.py"), *Path("orchestrator/binding").glob("*.py")):
+        for part in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(part, ast.FunctionDef) and "tuple[str, str]" in ast.unparse(part.returns or ast.Constant("")):
+                for end in ast.walk(part):
+                    pair = end.value if isinstance(end, ast.Return) else None
+                    if isinstance(pair, ast.Tuple) and isinstance(pair.elts[0], ast.Tuple):
+                        pair = pair.elts[0]
+                    if isinstance(pair, ast.Tuple) and isinstance(pair.elts[0], ast.Constant) and pair.elts[0].value:
+                        yield pair.elts[0].value
 
 
 def test_every_fault_that_is_named_has_a_remedy():
-    named = {*faults_of("failed"), *faults_of("HostileFmuError"), "hostile archive", *_REFUSED.values()}
+    returned = {fault for fault in faults_returned() if fault is not None}
+    assert {"wrong sign", "keeps moving", "wrong axes"} <= returned
+    named = {*returned, *faults_of("failed"), *faults_of("HostileFmuError"), "hostile archive", *_REFUSED.values()}
     assert len(named) > 40
     assert named - set(REMEDIES) == set()

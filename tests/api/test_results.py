@@ -256,8 +256,9 @@ def test_data_that_are_most_unusual_are_questioned_where_the_caller_stands():
     ):
         with pytest.warns(UnusualDataWarning, match=r"gfor.pod_p.K") as caught:
             prepare()
-        assert len(caught) == 1
-        assert caught[0].filename == __file__
+        assert sum("pod_p.K = 50000 pu is outside" in str(one.message) for one in caught) == 1
+        assert len(caught) <= 2  # the POD is off besides
+        assert {one.filename for one in caught} == {__file__}
 
 
 def test_a_run_that_ends_early_warns_and_keeps_what_it_has(monkeypatch):

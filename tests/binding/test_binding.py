@@ -145,7 +145,7 @@ def test_our_converter_behind_a_binding_is_our_converter(fmu_path, binding):
         ('["v_re", "v_im"]', '["v_re", "v_im"]\nbase = "33 kV"', "V_n under"),
         ('base = "100 MVA"', 'base = "100 kV"', "base: .*MVA is needed"),
         ('base = "100 MVA"', 'bass = "100 MVA"', "current.bass: this key is unknown"),
-        ('"rectangular"\nvariables = ["v', '"sideways"\nvariables = ["v', "voltage.form: Input should be"),
+        ('"rectangular"\nvariables = ["v', '"sideways"\nvariables = ["v', "voltage.form: it must be"),
         ("P_0 = {", "P_1 = {", "start.P_1: there is no start value of that name; choose from S_n"),
         ('P_0 = { variable = "P_0" }', 'P_0 = { variable = "Q_0" }', "Q_0: bound more than once"),
         ('P_0 = { variable = "P_0"', 'P_0 = { variable = "REQUIRED"', "start.P_0.*: still to be filled in: variable"),

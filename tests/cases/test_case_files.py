@@ -208,8 +208,8 @@ def test_a_file_without_what_nothing_can_be_checked_without(written, text, expec
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ('"1 ms"', "0", "line 3, solver.step_size: Input should be greater than 0 (value seen: 0)"),
-        ('"1 ms"', "1", "line 3, solver.step_size: Input should be less than or equal to 0.1 (value seen: 1)"),
+        ('"1 ms"', "0", "line 3, solver.step_size: it must be greater than 0 s (value seen: 0 s)"),
+        ('"1 ms"', "1", "line 3, solver.step_size: it must be less than or equal to 0.1 s (value seen: 1 s)"),
         ('to = "k.u"', 'to = "k.u"\nvia = "z"', "line 14, connections.0.via: this key is unknown; check its spelling"),
         ('fmu = "fmus/k.fmu"', "", "line 8, components.k: give either 'model'"),
         ("K = -3.0", 'K = "minus"', "line 10, components.k.parameters.K: K: 'minus' is not a number with a unit"),
@@ -262,7 +262,7 @@ def test_a_wrong_event_does_not_hide_the_other_mistakes(written, event):
 
 def test_a_wrong_value_of_a_key_that_must_be_there_is_one_problem(written):
     problem = the_problem(lambda: written(LOOP + EVENT.replace("time = 0.01", "time = -1")).prepare())
-    assert problem.startswith("line 19, events.0.time: Input should be greater than or equal to 0")
+    assert problem.startswith("line 19, events.0.time: it must be greater than or equal to 0")
 
 
 def test_the_value_of_an_event_may_have_a_unit(written):

@@ -198,7 +198,7 @@ def test_an_outage_from_the_start_has_its_own_operating_point(prepared, opened):
         ('type = "branch_change"\nX = 1\nline = "l99"', "component 'grid' has no line 'l99'"),
         ('type = "unit_trip"\nunit = "vcs"', "component 'grid' has no unit 'vcs'; did you mean vsc?"),
         ('type = "line_trip"\nline = "l12"\ncomponent = "net"', "there is no component 'net'; the case has: sg, vsc"),
-        ('type = "line_trip"\nline = "l12"\nreclose_after = 0', "reclose_after: Input should be greater than 0"),
+        ('type = "line_trip"\nline = "l12"\nreclose_after = 0', "reclose_after: it must be greater than 0"),
         ('type = "line_trip"\nline = "l12"\nreclose_after = 0.00015', "the event at 0.10015 s is not a communication"),
     ],
 )  # fmt: skip

@@ -211,7 +211,7 @@ def test_a_mistake_in_the_file(case, units, words):
         (("matpower =", 'pandapower = "case9"\nmatpower ='), "give either 'matpower' or 'pandapower', not both"),
         (("small.m", "large.m"), "large.m: there is no such file; give the path of a MATPOWER case"),
         (("stray_B = 0.05", "stray_B = -1"), "stray_B = -1 pu; it must not be negative"),
-        (("frequency = ", "frequency = 0 # "), "network.frequency: Input should be greater than 0"),
+        (("frequency = ", "frequency = 0 # "), "network.frequency: it must be greater than 0"),
     ],
 )
 def test_a_mistake_in_the_network_table(case, change, words):

@@ -1,10 +1,12 @@
 """``--set`` given more than once: a value overrides those before it."""
 
+import argparse
 import json
 from argparse import Namespace
 
 import pytest
 
+from orchestrator.cli import screen
 from orchestrator.cli.case_arguments import values_set
 
 
@@ -33,3 +35,21 @@ def test_the_last_value_counts_in_a_sweep_and_for_modes(gfor, tmp_path):
     repeated, alone = modes("gfor.P_0=0.5", "gf*.P_0=0.2", "gfor.P_0=0.5"), modes("gfor.P_0=0.5")
     assert repeated == alone
     assert repeated != modes("gfor.P_0=0.2")
+
+
+def test_an_option_of_one_value_is_refused_a_second_time(gfor):
+    for words in (
+        ["run", "infinite_bus", "--out", "a", "--out", "b"],
+        ["screen", "x", "--points", "a", "--points", "b"],
+    ):
+        code, _, error = gfor(*words)
+        assert code == 2
+        assert f"argument {words[-2]}: it is given twice, and takes one value; give it once" in error
+
+
+def test_kinds_of_outages_that_are_given_apart_are_all_taken():
+    parser = argparse.ArgumentParser()
+    screen.add_arguments(parser)
+    assert parser.parse_args(["case"]).outages is None
+    both = parser.parse_args(["case", "--outages", "lines", "--outages", "units,load_3"])
+    assert both.outages == "lines,units,load_3"

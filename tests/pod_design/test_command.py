@@ -150,7 +150,8 @@ def test_a_tie_of_two_modes_is_no_target(gfor):
     """At this reactance two modes fit the name, and no gain leads here from where one does."""
     code, _, err = gfor("design", "two_area", "--controller", "pod_q", "--set", "grid.X_L=0.7")
     assert code == 2
-    assert "no mode is named 'electromechanical': those at 0.1993 Hz and 0.177 Hz fit it about equally" in err
+    assert "no mode is named 'electromechanical': the mode of 0.582 Hz, 10.59 %" in err
+    assert "meets another one 50% of the way from there, at 0.276 Hz, 37.35 %" in err
 
 
 def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):

@@ -89,6 +89,9 @@ def test_what_is_no_folder_of_a_run_is_said(tmp_path, page):
         write_report(tmp_path)
     with pytest.raises(InputError, match="no such file or folder"):
         write_report(page.parent, [tmp_path / "nowhere"])
+    (tmp_path / "screening.html").write_text("a page")
+    with pytest.raises(InputError, match=r"nothing in it belongs into a run's report.*own: screening.html"):
+        write_report(page.parent, [tmp_path])
 
 
 def test_names_cannot_break_the_page():

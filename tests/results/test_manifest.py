@@ -194,3 +194,12 @@ def test_each_file_is_listed_with_its_run(tmp_path):
     assert content["files"]["trajectory.nc"]["bytes"] == len("one 0.3")
     assert len(content["files"]["trajectory.nc"]["sha256"]) == 64
     assert content["made_by"]["gfor-cosim"]
+
+
+def test_a_folder_within_is_listed_by_its_files(tmp_path):
+    """Neither the folder itself nor a manifest that another command left in it is a file of this run."""
+    with staged(tmp_path, "r1") as staging:
+        (staging / "inner").mkdir()
+        (staging / "inner" / "a.txt").write_text("x", encoding="utf-8")
+        (staging / "inner" / MANIFEST).write_text("{}", encoding="utf-8")
+    assert [*read_manifest(tmp_path).files] == ["inner/a.txt"]

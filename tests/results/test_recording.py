@@ -105,6 +105,14 @@ def test_a_netcdf_file_of_another_form_is_read_as_well(tmp_path):
         assert np.array_equal(open_whole(tmp_path / name)["a"], np.eye(3))
 
 
+def test_another_programs_file_over_time_is_read_with_its_packing(tmp_path):
+    """Whole numbers with a scale, as archives keep them; a recording of ours has none."""
+    data = xr.Dataset({"v": ("time", [1.01, 0.98, 1.03])}, coords={"time": [0.0, 0.1, 0.2]})
+    packed = {"v": {"dtype": "int16", "scale_factor": 0.01, "add_offset": 1.0, "_FillValue": -999}}
+    data.to_netcdf(tmp_path / "packed.nc", engine="h5netcdf", encoding=packed)
+    assert open_whole(tmp_path / "packed.nc")["v"].values == pytest.approx([1.01, 0.98, 1.03])
+
+
 def test_no_rows_at_all(tmp_path, prepared):
     recording = RecordingFolder(tmp_path / "recording", prepared)
     recording.begin(NAMES)

@@ -31,15 +31,16 @@ alpha = 0.0
 """
 
 
-def five_machines(folder, highest=1.2, flow="", ratings=RATINGS):
-    """The case in a folder; ``highest`` is the machines' V_MAX [pu], ``flow`` more of the table [power_flow]."""
+def five_machines(folder, highest=1.2, flow="", ratings=RATINGS, most=None):
+    """The case in a folder; ``highest`` is V_MAX [pu], ``flow`` goes to [power_flow], ``most`` is PT [MW]."""
     rates = ",".join("000")
     found = {section: [] for section in ORDER}
     kinds = dict.fromkeys(range(1, 5), 2) | {5: 3} | dict.fromkeys(range(11, 17), 1)
     found["BUS"] = [f"{n},'BUS {n}     ',230.0,{kind},1,1,1,1.0,0.0,1.1,0.9,1.1,0.9" for n, kind in kinds.items()]
     found["LOAD"] = [f"{n},'1 ',1,1,1,{p},{0.2 * p},0,0,0,0,1,1,0" for n, p in LOADS.items()]
     found["GENERATOR"] = [
-        f"{n},'1 ',{POWERS[n]},0,300,-300,1.02,0,{base},0,0.25,0,0,1,1,100,{base},0,1,1" for n, base in ratings.items()
+        f"{n},'1 ',{POWERS[n]},0,300,-300,1.02,0,{base},0,0.25,0,0,1,1,100,{(most or {}).get(n, 9999)},0,1,1"
+        for n, base in ratings.items()
     ]
     found["BRANCH"] = [f"{i},{j},'1 ',0.004,0.05,0.02,{rates},0,0,0,0,1,1,0,1,1" for i, j in LINES]
     for n in RATINGS:

@@ -285,7 +285,12 @@ def test_an_unstable_point_fails_where_asked(gfor, tmp_path):
     code, out, _ = gfor("screen", "two_area", *options, "--fail-unstable")
     assert code == 1
     assert out.startswith("UNSTABLE: 1 item of 2; worst: out, intact")
+    assert "Least damping [%]" in out
     assert gfor("screen", "two_area", *options)[0] == 0
+    path.write_text("name,gfor.in_service\nin,1\n")
+    code, out, _ = gfor("screen", "two_area", *options)
+    assert code == 0
+    assert "Least damping [%]" not in out  # of one item the headline and the modes say all
 
 
 def test_reset_fmus_are_as_new(two_area):

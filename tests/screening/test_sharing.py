@@ -138,6 +138,18 @@ def test_nobody_is_beyond_a_limit_while_others_have_room(tmp_path):
     assert item.record.status is Status.COMPUTED
 
 
+def test_the_files_most_power_is_a_limit_of_sharing(tmp_path):
+    """PT of the RAW file: sg1 feeds 190 MW before, and takes no more than 200; a PT below what is fed takes nothing."""
+    free = at(five_machines(tmp_path), ("sg3",))
+    found = at(five_machines(tmp_path, most={1: 200.0, 2: 100.0}), ("sg3",))
+    assert free["sg1"] > 210
+    assert (found["sg1"], found["sg2"]) == (pytest.approx(200), pytest.approx(130))
+    assert found["sg5"] > free["sg5"] + 10
+    (_, item) = screened(five_machines(tmp_path, most=dict.fromkeys(RATINGS, 195.0)), tmp_path, "sg3")
+    assert item.record.status is Status.STEADY_STATE
+    assert re.search(r"sg\d would need \d+ % of its 195 MW", item.record.text)
+
+
 def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
     (_, lost, fine) = screened(five, tmp_path, "sg1+sg2,sg2")
     assert (lost.record.status, fine.record.status) == (Status.STEADY_STATE, Status.COMPUTED)

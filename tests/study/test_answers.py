@@ -31,9 +31,11 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
 
 def result(findings=(), stable=True, events=("fault",), failure=None):
     mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
-    prepared = SimpleNamespace(title="S", events=events, stop_time=5.0)
+    case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(modes={})))
+    prepared = SimpleNamespace(title="S", events=events, stop_time=5.0, case=case)
     modes = SimpleNamespace(
-        prepared=prepared, modes=[mode], hidden=None, swing_of=lambda _: (["sg1"], ["sg2"]),
+        prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
+        swing_of=lambda _: (["sg1"], ["sg2"]),
         stability=Stability(stable, mode, reason="" if stable else "not searched"),
     )  # fmt: skip
     return RunResult(modes, None, findings=list(findings), failure=failure)

@@ -1,20 +1,22 @@
 """A name stays with its mode where a gain makes other shapes of the modes."""
 
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.linalg
 
-from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.mode_names import name_modes
 from orchestrator.analysis.modes import Mode, find_modes, make_mode
 from orchestrator.api.results import Modes
 from orchestrator.cases.case import load_case
 from orchestrator.cases.schema import ScenarioTable
-from orchestrator.coupling.system import System
+from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import CosimError
+from orchestrator.study import mode_identity
 from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.modes import compute_modes, modes_json
@@ -40,7 +42,7 @@ def scenario(name, A, *, modes=None, names=STATES, flow=None, states=None, other
     table = SimpleNamespace(scenarios={"off": ScenarioTable(), "on": ScenarioTable()})
     schedule = SimpleNamespace(name="gauss-seidel")
     prepared = SimpleNamespace(
-        system=System(), name=name, case=table, power_flow=flow, schedule=schedule, beside=others
+        system=System(), name=name, case=table, power_flow=flow, schedule=schedule, beside=others, given={}
     )
     point = SimpleNamespace(states=states or dict.fromkeys(names, 0.0))
     return NamedSystem(prepared, point, model, found, name_modes(found, measures))
@@ -141,7 +143,7 @@ def test_a_name_does_not_pass_to_another_mode_because_a_gain_grew(gain, hertz, p
     found = compute_modes(prepared)
     mode = found.named["electromechanical"]
     assert (round(mode.frequency_hz, 3), round(mode.damping_percent, 2)) == (hertz, percent)
-    both = "the mode of 0.350 Hz, 25.92 % in 'gfor' is followed to "
+    both = "the mode of 0.350 Hz, 25.92 % without its damping controllers is followed to "
     assert all(text.startswith(f"'electromechanical': {both}") for text in found.warnings)
     assert bool(found.warnings) is (gain < 250)  # there the other one fits as well, or is damped less
 
@@ -166,3 +168,112 @@ def test_alone_and_with_all_scenarios_the_names_are_the_same():
         Modes(last).named["inter-area"]
     assert Modes(last).named.get("inter-area") is None
     assert "exchanges its nature with the one of 0.796 Hz, 29.90 %" in last.warnings[0]
+
+
+def with_part(system, gain, *, path="own", earlier=None, variables=("pod_p.K", "pod_p.enabled")):
+    """A scenario that has a component with a gain, and what it was before."""
+    info = {name: SimpleNamespace(start=1.0) for name in variables}
+    plan = ComponentPlan(SimpleNamespace(variables=info, path=Path(path)), {variables[0]: gain})
+    p = system.prepared
+    p.system, p.given = SimpleNamespace(components={"dev": plan}), {f"dev.{variables[0]}": gain}
+    p.beside = None if earlier is None else lambda name, plain, further=None: earlier.prepared
+    return system
+
+
+CLEAR = {"mine": lambda mode: 0.3 if 1.05 < mode.frequency_hz < 1.5 else 1.0}
+"""The lower mode of `OFF`, which is followed to the lower one of `FAR`, and there clearly the upper one."""
+
+
+def moved():
+    off, on = scenario("off", OFF, measures=CLEAR), scenario("on", FAR, measures=CLEAR)
+    assert off.naming.contested == on.naming.contested == ()
+    assert (hertz_of(off)["mine"], hertz_of(on)["mine"] > 2) == (pytest.approx(1.0, rel=1e-3), True)
+    return off, on
+
+
+def test_a_clear_shape_that_a_damping_controller_made_leaves_the_name_free(monkeypatch):
+    monkeypatch.setattr(mode_identity, "is_ours", lambda _: True)
+    off, on = moved()
+    asked = []
+    found = settled(with_part(on, 100.0), never, {}, undamped=lambda gains: asked.append(gains) or off)
+    assert asked == [{"dev.pod_p.K": 0.0}]
+    assert found.naming.named == {}
+    assert "exchanges its nature with the one of 2.6" in found.naming.reasons["mine"]
+    assert settled(with_part(on, 0.0), never, {}, undamped=never) is on  # the controller is off
+
+
+@pytest.mark.parametrize("a", [1.05, 1.5])
+def test_a_clear_shape_that_stays_keeps_its_name_without_a_word(a):
+    """With hardly a spring the frequencies cross, and each mode remains what it was."""
+    off, on = scenario("off", two_masses(1.0, 1.2, 0.01)), scenario("on", two_masses(a, 1.2, 0.01))
+    found = settled(with_part(on, 100.0), never, {}, undamped=lambda _: off)
+    assert (hertz_of(found), found.naming.doubts) == (hertz_of(on), ())
+
+
+@pytest.mark.parametrize("ours", [True, False])
+def test_a_value_of_a_foreign_fmu_is_followed_and_one_of_ours_has_its_shape(monkeypatch, ours):
+    """The shape of a system of ours is what the case describes; a vendor's gain may be a damping controller's."""
+    monkeypatch.setattr(mode_identity, "is_ours", lambda _: ours)
+    monkeypatch.setattr(mode_identity, "is_isolated", lambda *_: True)
+    off, on = moved()
+    with_part(off, 0.0, path="vendor", variables=("gain",))
+    found = settled(with_part(on, 40.0, path="vendor", variables=("gain",), earlier=off), lambda _: off, {})
+    assert hertz_of(found) == (hertz_of(on) if ours else {})
+    assert [text.endswith("which fits the name better now") for text in found.naming.doubts] == [True] * (not ours)
+
+
+def test_scenarios_that_are_shown_together_tell_where_modes_exchanged_their_nature():
+    off, on = moved()
+    found = settled(on, never, {"off": off})
+    assert hertz_of(found) == hertz_of(on)
+    (told,) = found.naming.doubts
+    assert told.startswith("'mine', by its shape, may be another mode than there: the mode of 1.0")
+    assert "exchanges its nature" in told
+
+
+def test_fitted_models_of_other_states_are_compared_by_those_that_both_have(monkeypatch):
+    """A black box has other states each time; a name that cannot be followed along its gain is left free."""
+    monkeypatch.setattr(mode_identity, "is_ours", lambda _: False)
+    monkeypatch.setattr(mode_identity, "is_isolated", lambda *_: True)
+
+    def boxed(name, spring, gain, poles):
+        A = scipy.linalg.block_diag(two_masses(1.0, 1.2, spring), -50.0 * np.eye(poles))
+        A[1, 4] = A[4, 0] = 0.01
+        names = (*STATES, *(f"dev.x{k}" for k in range(poles)))
+        system = scenario(name, A, names=names, measures=CLEAR)
+        object.__setattr__(system.model, "sources", {"dev": IDENTIFIED})
+        return with_part(system, gain, path="vendor", variables=("gain",))
+
+    for spring, known in ((0.02, True), (3.0, False)):
+        off, on = boxed("off", 0.0, 0.0, 1), boxed("on", spring, 40.0, 2)
+        steps = []
+
+        def beside(name, plain, further=None, off=off, steps=steps):
+            steps.append(further)
+            return off.prepared
+
+        on.prepared.beside = beside
+        found = settled(on, lambda _, off=off: off, {})
+        assert ("mine" in found.naming.named) is known
+        assert all(0 < step["dev.gain"] < 40 for step in steps if step)
+        assert len([step for step in steps if step]) <= 7
+
+
+@pytest.mark.parametrize(("X_L", "hertz"), [(0.36, 0.308), (0.41, 0.266), (0.44, None), (0.6, 0.193)])
+def test_a_name_is_followed_along_the_reactance_from_the_value_of_the_file(X_L, hertz):
+    """At 0.43 the swing meets another mode; beyond, what has its shape may be the one or the other."""
+    (prepared,) = load_case("two_area").prepare(["gfor"], {"grid.X_L": X_L})
+    found = compute_modes(prepared)
+    mode = found.named.get("electromechanical")
+    assert (None if mode is None else round(mode.frequency_hz, 3)) == hertz
+    assert bool(found.warnings) is (X_L > 0.43)
+    assert all("in 'gfor' with the values of its file meets another one" in text for text in found.warnings)
+
+
+def test_a_damping_controller_that_is_off_is_one_with_gain_0_on_the_way():
+    case = load_case("two_area")
+    (off,) = case.prepare(["gfor"], {"grid.X_L": 0.1})
+    (on,) = case.prepare(["pod_p"], {"grid.X_L": 0.3, "gfor.pod_p.K": 80})
+    assert mode_identity._differing(off, on) == {
+        "grid.X_L": (0.1, 0.3), "gfor.pod_p.enabled": (True, True), "gfor.pod_p.K": (0.0, 80.0)
+    }  # fmt: skip

@@ -56,6 +56,16 @@ def test_a_ray_joins_eigenvalues_of_its_damping(percent):
     assert -real / abs(complex(real, imag)) == pytest.approx(percent / 100, rel=1e-6)
 
 
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+def test_every_ray_ends_at_an_edge(shape):
+    axis, (left, highest) = axes(), shape
+    damping_rays(axis, left, highest)
+    for ray in axis.lines:
+        real, hertz = ray.get_xdata()[1], ray.get_ydata()[1]
+        assert real >= left - 1e-9
+        assert hertz == pytest.approx(highest) or real == pytest.approx(left)
+
+
 def test_a_scenario_without_a_mode_in_range_has_its_mark_in_the_legend():
     axis = axes()
     draw_eigenvalues(axis, [result("none")])

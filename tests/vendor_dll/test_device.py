@@ -5,6 +5,7 @@ import cmath
 import numpy as np
 import pytest
 
+import orchestrator as gfor
 from orchestrator.analysis.blocks import Blocks
 from orchestrator.analysis.linearization import compose
 from orchestrator.analysis.modes import eigenvalues
@@ -217,3 +218,27 @@ def test_a_wrong_binding_finds_no_start(tmp_path, old, new):
 def test_a_mistake_in_a_devices_file_is_one_clear_error(tmp_path, old, new, words):
     with pytest.raises(InputError, match=words):
         as_fmu(droop_device(tmp_path, changes=[(old, new)]))
+
+
+@pytest.mark.slow
+def test_a_control_for_another_frequency_is_named_as_the_cause(tmp_path):
+    """A droop for 60 Hz in a circuit for 50 Hz, with which it starts once it is told."""
+    file = droop_device(tmp_path, changes=[("[inputs]", "[parameters]\nf = 60\n[inputs]")])
+    words = r"in a network of 60 Hz it starts, and here f_n = 50 Hz: its control is made for 60 Hz.* give f_n = 60 in"
+    with pytest.raises(ComponentError, match=words):
+        device_master(file)
+    found = gfor.check(file, only=["initial_outputs", "steady_state"], frequency=60)
+    assert found.trusted, found.table()
+
+
+@pytest.mark.slow
+def test_no_frequency_is_blamed_where_phases_are_exchanged(tmp_path):
+    changes = [('"i[2]" = "i_s_b"', '"i[2]" = "i_s_c"'), ('"i[3]" = "i_s_c"', '"i[3]" = "i_s_b"')]
+    with pytest.raises(ComponentError, match=r"it delivers P = .* check \[inputs\]") as caught:
+        device_master(droop_device(tmp_path, changes=changes))
+    assert "Hz" not in str(caught.value)
+
+
+def test_a_frequency_is_given_to_what_has_one(tmp_path):
+    with pytest.raises(InputError, match=r"frequency = 60: controller.so has no parameter f_n; a binding's \[rating\]"):
+        gfor.check(compiled(lag(), tmp_path), frequency=60)

@@ -70,3 +70,15 @@ def source_fmu():
         closed = m.switch("connected", True, "Breaker of the source", tunable=True)
     m.output("source.theta", u * closed, "rad", "Angle of the source", base="S_n")
     return read_description(cached(PythonFmu(m.build())))
+
+
+@cache
+def foreign_fmu():
+    """A unit of others at 60 Hz that shows its frequency, not its angle."""
+    m = ModelBuilder("small_foreign_unit", "A unit of others")
+    f_n = m.parameter("f_n", 60.0, "Hz", "Rated frequency")
+    m.parameter("theta_0", 0.0, "rad", "Angle at the start")
+    m.parameter("S_n", 100.0, "MVA", "Rated power")
+    on = m.switch("connected", True, "Breaker", tunable=True)
+    m.output("omega", m.input("u", "1", "Input") * on * f_n / f_n, "pu", "Frequency", base="S_n")
+    return read_description(cached(PythonFmu(m.build())))

@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.binding.misfits import Misfit
 from orchestrator.coupling.events import ParameterChange
+from orchestrator.watch.seen import rescaled
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.synchronism import lost_synchronism
-from tests.watch.seen import seen_of, source_fmu, units
+from tests.support import vendor
+from tests.watch.seen import foreign_fmu, seen_of, source_fmu, units
 
 TURN = 2 * np.pi
 STOP = 10.0
@@ -74,3 +78,36 @@ def test_a_source_behind_its_own_open_breaker_keeps_nobody_in_step():
     assert list(lost_synchronism(seen, system, Settings(system, [opened], seen.times))) == []
     (finding,) = lost_synchronism(seen, system, Settings(system, [], seen.times))
     assert finding.message.startswith("plant loses synchronism with grid")
+
+
+def test_the_angle_of_a_foreign_unit_is_the_integral_of_its_frequency():
+    """At 60 Hz and 0.5 % too fast from 2 to 6 s it turns 1.2 times; it starts a quarter of a turn ahead."""
+    system = units(grid=900)
+    system.add("theirs", foreign_fmu(), {"theta_0": TURN / 4})
+    fast = {"theirs.omega": lambda t: 1.0 + 0.005 * ((t >= 2.0) & (t < 6.0)), "grid.delta": slip(0.0)}
+    seen = seen_of(fast, STOP)
+    (finding,) = lost_synchronism(seen, system, Settings(system, [], seen.times))
+    assert finding.figures["turns"] == pytest.approx(1.2, abs=0.002)
+    assert finding.time == pytest.approx(2.0 + 0.25 / 0.3, abs=0.011)
+    assert finding.message.endswith("1.20 turns against grid, and holds")
+
+
+@pytest.mark.parametrize("f_n", [50.0, 60.0])
+def test_turns_are_the_integral_of_the_frequency_that_was_recorded(f_n, tmp_path):
+    """10 Hz above the network's for 8 s, and a rise over two looks: half of it counts."""
+    system = units(big=100)
+    system.add("plant", bound_fmu(vendor.device(tmp_path), vendor.binding(tmp_path, f_n)))
+    seen = seen_of({"plant.omega": lambda t: 1 + 10 / f_n * (t >= 2), "big.delta": slip(0.0)}, STOP)
+    (finding,) = lost_synchronism(seen, system, Settings(system, [], seen.times))
+    assert finding.figures["turns"] == pytest.approx(10 * (STOP - 2 + seen.interval / 2), abs=1e-6)
+
+
+def test_a_frequency_of_another_scale_is_no_slip_and_a_slip_from_the_start_stays_one():
+    misfits = {"plant": [Misfit("wrong rated frequency", "", {"omega": 5 / 6})]}
+    still, turning = (
+        seen_of({"plant.omega": lambda t: 5 / 6 + 0 * t, "plant.i_re": re, "plant.i_im": lambda t: 0 * t}, 1.0)
+        for re in (lambda t: 1.0 + 0 * t, lambda t: 1 + np.cos(TURN * 10 * t))
+    )
+    assert rescaled(still, misfits).values["plant.omega"] == pytest.approx(1.0)
+    assert rescaled(turning, misfits).values["plant.omega"] == pytest.approx(5 / 6)
+    assert rescaled(still, {}).values["plant.omega"] == pytest.approx(5 / 6)

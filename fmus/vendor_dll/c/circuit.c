@@ -5,6 +5,7 @@
 static const double TURN = 6.283185307179586;
 enum { PARTS_OF_PERIOD = 20 };
 static const double AT_REST = 1e-11, NEAR_REST = 1e-4; /* largest mismatch of P and Q [pu], to stop; to go on at the end */
+static const double ALIKE = 1e-2; /* mismatch of P and Q [pu] from which it does not run at the other frequency */
 
 /* The network frame's angle: 0 at the start of the experiment. */
 static double angle_at(const struct instance *s, double time) {
@@ -77,7 +78,7 @@ static double limited(double value) { return fmin(fmax(value, -0.5), 0.5); }
 /* The start: the controller runs at the power flow's voltage, and its references are trimmed until it delivers P_0, Q_0.
 
    It begins a whole number of periods before the start, so that the frame's angle is 0 where it ends. */
-static int circuit_start(struct instance *s) {
+static int start_at_frequency(struct instance *s) {
     double *z = s->circuit, p = 0, q = 0;
     int status = circuit_check(s);
     if (status) return status;
@@ -85,7 +86,7 @@ static int circuit_start(struct instance *s) {
     circuit_initialise(z);
     drive(s);
     const double v[] = {z[AT_V_RE], z[AT_V_IM]}, period = 1 / z[AT_FREQUENCY];
-    const int most = (int)ceil(LONGEST_START / period), first = (int)ceil(FIRST_TRIM / period);
+    const int most = (int)ceil((s->probing ? 0.25 : 1.0) * LONGEST_START / period), first = (int)ceil(FIRST_TRIM / period);
     const double gain = period / TRIM_TIME;
     z[AT_V_RE] = z[AT_V_0] * cos(z[AT_THETA_0]), z[AT_V_IM] = z[AT_V_0] * sin(z[AT_THETA_0]);
     s->begin = s->clock = s->start;
@@ -103,7 +104,8 @@ static int circuit_start(struct instance *s) {
         if (TRIM_V) z[AT_TRIM_V] = limited(z[AT_TRIM_V] + gain * dq * V_PER_Q);
     }
     const double off_p = p - z[AT_P_0], off_q = q - z[AT_Q_0];
-    if (!(fabs(off_p) < NEAR_REST && fabs(off_q) < NEAR_REST))
+    const double near_rest = s->probing ? ALIKE : NEAR_REST;
+    if (!(fabs(off_p) < near_rest && fabs(off_q) < near_rest))
         return say(s, ERROR, "after %.3g s at the power flow's voltage it delivers P = %.6g and Q = %.6g; the power flow asks for "
                    "%.6g and %.6g [pu]: check [inputs], [bridge] and [start] of the device's file, and the DLL's parameters",
                    n * period, p, q, z[AT_P_0], z[AT_Q_0]);
@@ -114,4 +116,26 @@ static int circuit_start(struct instance *s) {
     s->time = s->start;
     circuit_refresh(s, s->time);
     return OK;
+}
+
+/* Whether it starts, shortly, at the other of the two frequencies that networks have; the controller is a new one. */
+static int starts_at(struct instance *s, double frequency) {
+    double kept[CIRCUIT_SIZE + 1];
+    void *logger = s->logger;
+    memcpy(kept, s->circuit, sizeof kept);
+    unload(s);
+    s->logger = NULL, s->probing = 1, s->started = 0;
+    s->circuit[AT_FREQUENCY] = frequency;
+    const int status = load_dll(s) ? ERROR : initialise(s);
+    memcpy(s->circuit, kept, sizeof kept);
+    s->logger = logger, s->probing = 0;
+    return status <= WARNING;
+}
+
+static int circuit_start(struct instance *s) {
+    const int status = start_at_frequency(s);
+    const double f_n = s->circuit[AT_FREQUENCY], other = f_n > 55 ? 50 : 60;
+    if (status <= WARNING || s->probing || circuit_check(s) || !starts_at(s, other)) return status;
+    return say(s, ERROR, "in a network of %g Hz it starts, and here f_n = %g Hz: its control is made for %g Hz, which is the likely cause; "
+               "give f_n = %g in [circuit] of the device's file, in the case that it stands in, or to gfor check as --frequency", other, f_n, other, other);
 }

@@ -31,6 +31,7 @@ typedef int32_t(CALLED *dll_call)(struct dll_instance *);
 struct instance {
     int phase, stale, failed, started, quiet;
     int old, changed; /* the circuit's outputs are older than its inputs; its parameters were set */
+    int probing;      /* it is tried what a start at another frequency would bring */
     double time, start, begin, clock; /* samples count from `begin`; the DLL's own time is 0 at `clock` */
     int64_t samples;
     char *name;
@@ -180,7 +181,7 @@ static void circuit_after(struct instance *s);
 static void circuit_refresh(struct instance *s, double time);
 static int circuit_check(struct instance *s);
 
-static int initialise(struct instance *s) {
+static int start_dll(struct instance *s) {
     s->stale = 0;
     s->begin = s->start;
     s->clock = 0;
@@ -208,7 +209,15 @@ static int initialise(struct instance *s) {
     if (status) return status;
     const char *bad = not_finite(s);
     if (bad) return say(s, ERROR, "Model_Initialize gives no finite value for %s; check parameters and initial outputs", bad);
-    return circuit_start(s);
+    return OK;
+}
+
+static int initialise(struct instance *s) {
+    const int status = start_dll(s), text = status < ERROR ? -1 : unread();
+    if (text >= 0)
+        say(s, ERROR, "its text parameter %s names the file %.1000s, which it cannot read here: it may be hidden from an FMU's process; "
+                      "build the FMU with the file's path given, which takes it along", NAMES[text], word(text));
+    return status < ERROR ? circuit_start(s) : status;
 }
 
 /* Samples before a time; a sample that lies on it within a millionth is not before it. */
@@ -254,6 +263,13 @@ static int do_step(struct instance *s, double time, double step_size) {
 
 /* -- life cycle -------------------------------------------------------------------------------- */
 
+static void set_texts(unsigned char *parameters) {
+    for (int i = 0; i < TEXTS; ++i) {
+        const char *text = word(i);
+        memcpy(parameters + TEXT_AT[i], &text, sizeof text);
+    }
+}
+
 static void set_to_start(struct instance *s) {
     for (int k = 0; k < BUFFERS; ++k) memset(s->buffer[k], 0, SIZE[k]);
     memset(s->initial, 0, sizeof s->initial);
@@ -270,7 +286,7 @@ static void set_to_start(struct instance *s) {
         if (VARIABLE[i].role <= INPUT || VARIABLE[i].role == CIRCUIT_PARAMETER || VARIABLE[i].role == CIRCUIT_INPUT ||
             VARIABLE[i].role == CONSTANT_INPUT)
             store(place_of(s, VARIABLE + i), VARIABLE[i].type, VARIABLE[i].start);
-    for (int i = 0; i < TEXTS; ++i) memcpy(s->given + TEXT_AT[i], &WORDS[i], sizeof WORDS[i]);
+    set_texts(s->given);
     for (int i = 0; i < TEXT_INPUTS; ++i) memcpy(s->buffer[0] + TEXT_INPUT_AT[i], &EMPTY, sizeof EMPTY);
 }
 
@@ -469,10 +485,8 @@ static int restore_saved(struct instance *s, const struct snapshot *c, const cha
     for (int k = 0; k < BUFFERS; from += SIZE[k++]) memcpy(s->buffer[k], from, SIZE[k]);
     for (int k = 0; c->base == s->base && k < REGIONS; from += REGION[k++][1]) memcpy(s->base + REGION[k][0], from, REGION[k][1]);
     /* Texts lie in this process, wherever the state was saved. */
-    for (int i = 0; i < TEXTS; ++i) {
-        memcpy(s->given + TEXT_AT[i], &WORDS[i], sizeof WORDS[i]);
-        memcpy(s->buffer[2] + TEXT_AT[i], &WORDS[i], sizeof WORDS[i]);
-    }
+    set_texts(s->given);
+    set_texts(s->buffer[2]);
     for (int i = 0; i < TEXT_INPUTS; ++i) memcpy(s->buffer[0] + TEXT_INPUT_AT[i], &EMPTY, sizeof EMPTY);
     s->failed = 0;
     return OK;

@@ -116,19 +116,41 @@ static char *loaded_at(const library *l) {
 
 #endif
 
-/* The vendor's file: ../../resources/NAME beside binaries/PLATFORM/HOST. */
-static int open_vendor(library *l, char *why, size_t room) {
-    char path[LONGEST_PATH + 64];
-    if (!resources(path)) {
-        snprintf(why, room, "this FMU does not find its own folder");
-        return 0;
-    }
+/* A file in the FMU: ../../resources/NAME beside binaries/PLATFORM/HOST. */
+static int in_resources(char path[LONGEST_PATH + 300], const char *name) {
+    if (!resources(path)) return 0;
     for (int up = 0; up < 3; ++up) {
         char *slash = strrchr(path, '/'), *other = strrchr(path, '\\');
         char *end = slash > other ? slash : other;
         if (end) *end = 0;
     }
     const size_t length = strlen(path);
-    snprintf(path + length, sizeof path - length, "/resources/%s", VENDOR_FILE);
-    return open_copy(l, path, why, room);
+    return snprintf(path + length, LONGEST_PATH + 300 - length, "/resources/%s", name) > 0;
+}
+
+static int open_vendor(library *l, char *why, size_t room) {
+    char path[LONGEST_PATH + 300];
+    if (in_resources(path, VENDOR_FILE)) return open_copy(l, path, why, room);
+    snprintf(why, room, "this FMU does not find its own folder");
+    return 0;
+}
+
+/* Value of a text parameter; of a file that the FMU brings, where that lies. */
+static const char *word(int i) {
+    static char path[TEXTS + 1][LONGEST_PATH + 300];
+    if (!CARRIED[i]) return WORDS[i];
+    return *path[i] || in_resources(path[i], WORDS[i]) ? path[i] : WORDS[i];
+}
+
+/* Where a DLL fails at its start: the first text parameter that names, as it seems, a file which cannot be read. */
+static int unread(void) {
+    for (int i = 0; i < TEXTS; ++i) {
+        const char *text = word(i), *dot = strrchr(text, '.');
+        const int letter = dot && dot > text ? (dot[1] | 32) : 0;
+        const int named = strpbrk(text, "/\\") || (letter >= 'a' && letter <= 'z' && strlen(dot) < 7);
+        FILE *file = named ? fopen(text, "rb") : NULL;
+        if (file) fclose(file);
+        if (named && !file) return i;
+    }
+    return -1;
 }

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from itertools import pairwise
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -78,8 +79,6 @@ class _After:
 
     Attributes
     ----------
-    end
-        What became of the device.
     away
         Distance of the current from where it was [pu, S_n].
     changed
@@ -144,9 +143,11 @@ def _judged(found: list[_After]) -> CheckResult:
     says = f"it answers small changes as before after {', '.join(f'the {after.words}' for after in back)}"
     unknown = "; ".join(f"{_WORDS[after.end]} after the {after.words}" for after in lost[:2])
     unknown += f", and so after {len(lost) - 2} more" if len(lost) > 2 else ""
-    figures = {"compared": len(back), "not_compared": len(lost)}
+    figures: dict[str, Any] = {"compared": len(back), "not_compared": len(lost)}
     if not back:
+        figures["not_judged"] = "what dips leave behind"
         return remarked("after_dips", f"not judged: {unknown}", "ask how it rides through", **figures)
+    figures |= {"not_judged": "what some dips leave behind"} if lost else {}
     return passed("after_dips", f"{says}; not judged: {unknown}" if lost else says, **figures)
 
 
@@ -216,7 +217,6 @@ class _Look:
         currents(running, 0j, round((until - running.time) / self._subject.step_size))
 
     def _came_back(self, running: Running, rest: complex) -> tuple[_End, float]:
-        """What became of it, and how far its current is from where it was."""
         steps, quiet = self._steps(_WINDOW), 0
         for number in range(_WINDOWS):
             current = currents(running, 0j, steps)

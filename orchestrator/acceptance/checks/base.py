@@ -12,8 +12,6 @@ from orchestrator.errors import UnsupportedFmuError
 
 
 class Verdict(StrEnum):
-    """The answer in one word."""
-
     PASS = "pass"
     REMARK = "remark"
     FAIL = "fail"
@@ -22,8 +20,6 @@ class Verdict(StrEnum):
 
 
 class Whose(StrEnum):
-    """Whose matter a finding is."""
-
     NOBODY = ""
     FMU = "the FMU"
     BINDING = "the binding"
@@ -37,14 +33,10 @@ class CheckResult:
 
     Attributes
     ----------
-    check
-        The check's name.
     fault
         Name of what is wrong, or not supported; else empty.
     evidence
         What was seen, with figures; for `NOT_APPLICABLE` the reason.
-    remedy
-        What to do about it.
     figures
         The measured figures, for programs.
     whose
@@ -82,8 +74,6 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Check:
-    """One question to an FMU."""
-
     name: str
     question: str
     needs: tuple[str, ...]
@@ -125,12 +115,8 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
 
     Parameters
     ----------
-    name
-        Of the check.
     fault
         A key of `REMEDIES`, which has the remedy for it.
-    evidence
-        What was seen.
     figures
         What was measured, for the report: plain values by name.
     """

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from orchestrator.acceptance.checks.subject import OperatingAt
 
@@ -91,6 +90,8 @@ def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> floa
     """
     if any(answer.moving > SETTLED for _, *answers in found for answer in answers):
         return None
+    from scipy.optimize import least_squares  # noqa: PLC0415 - half a second to import
+
     fits = []
     for inside in (False, True):
         best = least_squares(_errors, (0.02, 0.2, 0.0), args=(found, inside), x_scale=(0.01, 0.1, 0.05))

@@ -42,7 +42,6 @@ def factor(draw: np.random.Generator, kind: str) -> complex:
 
 
 def in_words(voltage: complex) -> str:
-    """A factor on the voltage in words."""
     angle = np.angle(voltage, deg=True)
     if abs(angle) > 1e-6:
         return f"phase jump of {angle:.3g}°"
@@ -67,14 +66,10 @@ def rows(
 
     Parameters
     ----------
-    subject
-        The FMU, with its inputs and step.
     segments
         What the voltage is multiplied by, one after another.
     purpose
         For what; each purpose has other random steps.
-    times
-        By what the durations are multiplied.
     point
         Where it starts; the subject's own point where None.
     """

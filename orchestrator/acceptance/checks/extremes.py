@@ -37,7 +37,6 @@ def nan_input(subject: Subject) -> CheckResult:
 
 
 def _answer(subject: Subject, deviation: Numbers) -> str:
-    """What it says to inputs of that kind."""
     try:
         with subject.running() as running:
             running.record(3, subject.step_size, subject.one_step())

@@ -1,5 +1,7 @@
 """Every fault that a check can find, by name, and what to do about it."""
 
+from orchestrator.binding import misfits
+
 REMEDIES = {
     # the file
     "hostile archive": "do not trust this file; ask for the FMU to be packed again by its exporter",
@@ -58,11 +60,10 @@ REMEDIES = {
     "not a number": "an FMU must return fmi2Error where it has no answer, or limit what it is given",
     "not a number stays": "look for static variables",
     # the port
-    "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for",
+    **misfits.REMEDIES,
     "wrong frequency": "check variable, unit and sign of the binding's 'omega', and the base by which its angle turns",
     "loses synchronism": "look for a limit that acts in one direction only; ask the author",
     "unstable": "look for a measurement of the wrong sign, or ask at which network impedance it is stable",
-    "above its current limit": "ask how it limits its current in a dip, or declare the limit that it has",
     "no current limit": "have its current limited as the converter's is; a machine's binding says I_max",
     "blocks": "have it stay on, or ask which grid code allows that, and at which voltages and jumps it blocks",
     "base of another rating": "its start values must follow the rating that it is given: check [start.S_n] and 'base'",
@@ -74,9 +75,4 @@ REMEDIES = {
     "does not start": "it must start from a power flow within its ratings",
     "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
     "leaves its steady state": "something in it counts time, or adds up what never ends; ask the author",
-    "wrong sign": "turn 'direction', 'form', 'signs' or 'frame_angle' of the binding, or have the FMU corrected",
-    "wrong base": "check unit, base and 'value' (rms or peak, phase or line) of current, voltage and start values",
-    "wrong frame": "set 'frame_angle' of the binding, or 'dq' for 'qd'",
-    "wrong axes": "check form, axes and 'signs' of the binding, one by one",
-    "power not as asked": "check which variables take the start values, their bases, and the voltage's base",
 }

@@ -7,7 +7,6 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.port import (
-    BALANCE,
     DRIFT,
     WHY,
     cannot_import,
@@ -19,6 +18,7 @@ from orchestrator.acceptance.checks.port import (
 from orchestrator.acceptance.checks.ride_through import NO_LIMIT
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.binding.misfits import BALANCE
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 

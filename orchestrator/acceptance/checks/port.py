@@ -1,9 +1,8 @@
 """Whether a converter at its port does what a power flow expects of it."""
 
-from cmath import phase
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isinf, pi, sqrt
+from math import isinf
 from time import perf_counter
 
 import numpy as np
@@ -13,6 +12,7 @@ from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed
 from orchestrator.acceptance.checks.running import LONGEST, RUN_FOR, affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex, Numbers
+from orchestrator.binding.misfits import BALANCE, diagnosis, power_seen
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
@@ -26,9 +26,6 @@ POINTS = (
 )
 IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))
 """Points at which it takes power."""
-
-BALANCE = 0.02
-"""Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
 
 DRIFT = 1e-3
 """Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
@@ -98,7 +95,6 @@ def present_current(running: Running) -> complex:
 
 
 def _points(subject: Subject) -> tuple[OperatingAt, ...]:
-    """The operating point of use, and others."""
     return POINTS if subject.use.point is None else (subject.use.point, *POINTS)
 
 
@@ -239,7 +235,7 @@ def _judged(
         return failed("power_balance", "not a number", f"the power {at} is not finite")
     worst = float(np.abs(s - s_0).max())
     k = int(np.argmax(np.abs(s - s_0)))
-    seen = f"{at} S = {_text(found[k])} pu of the rating where {_text(asked[k])} is asked"
+    seen = power_seen(at, asked[k], found[k])
     # What is wrong with an axis shows in the currents, what is wrong with P or Q in the powers.
     v = np.array(voltages)
     in_power, in_current = _fit(s_0, s), _fit((s_0 / v).conj(), (s / v).conj())
@@ -260,7 +256,7 @@ def _judged(
     if (np.abs(s - s_0)[~imports] <= BALANCE).all():
         says = "it is as asked where it gives power, and not where it takes power"
         return failed("power_balance", "power not as asked", f"{seen}: {says}", **figures)
-    fault, says = _diagnosis(of, a, b, c, rest)
+    fault, says = diagnosis(of, a, b, c, rest)
     return failed("power_balance", fault, f"{seen}: {says}", **figures)
 
 
@@ -268,43 +264,3 @@ def _fit(asked: Complex, found: Complex) -> tuple[complex, complex, complex, flo
     """The coefficients a, b, c of found = a·asked + b·conj(asked) + c, and the largest rest."""
     (a, b, c), *_ = np.linalg.lstsq(np.column_stack([asked, asked.conj(), np.ones(len(asked))]), found, rcond=None)
     return complex(a), complex(b), complex(c), float(np.abs(found - (a * asked + b * asked.conj() + c)).max())
-
-
-def _diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple[str, str]:
-    """Name of the fault, and what the fit says."""
-    fit = f"{of} = ({a:.3g})·{of}_0 + ({b:.3g})·{of}_0* + ({c:.3g})"
-    if rest > BALANCE or abs(c) > BALANCE:
-        return "power not as asked", "it does not follow P_0 and Q_0" if abs(a) < BALANCE else fit
-    if abs(a) <= BALANCE and abs(b) <= BALANCE:
-        return "power not as asked", "there is no power at all"
-    if min(abs(a), abs(b)) > BALANCE:
-        return "wrong axes", f"{fit}, so its axes are scaled or signed differently"
-    if abs(b) > abs(a):
-        return "wrong sign", f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}"
-    turn = phase(a) * 180 / pi
-    if abs(abs(a) - 1) > BALANCE:
-        return "wrong base", f"the power is {abs(a):.4g} times what is asked{_known(abs(a))}" + (
-            ", with the opposite sign" if abs(turn) > 178 else f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
-        )
-    if abs(turn) > 178:
-        return "wrong sign", "the power has the opposite sign"
-    return "wrong frame", f"the current is turned by {-turn:.1f}°"
-
-
-def _known(ratio: float) -> str:
-    names = {
-        sqrt(3): "√3: phase for line-to-line",
-        sqrt(2): "√2: peak for rms",
-        1.5: "3/2: of peak phase quantities",
-        3.0: "3: three phases for one",
-        1000.0: "1000: kilo",
-    }
-    for value, text in names.items():
-        for name, seen in ((text, value), (f"1/({text})", 1 / value)):
-            if abs(ratio / seen - 1) < 0.01:
-                return f" ({name})"
-    return ""
-
-
-def _text(power: complex) -> str:
-    return f"{power.real:.4g}{power.imag:+.4g}j"

@@ -4,13 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median_low
+from time import perf_counter
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, saved
 from orchestrator.errors import ComponentError
 
-_BLOCKS = 6
+_BLOCKS, _BLOCK = 6, 0.5
+"""Parts of a measurement, and the longest time of one with instances [s]."""
+
 _LEAST = 4.0
 """Bytes kept by each step that count as a leak."""
 
@@ -20,12 +23,8 @@ _RESETS, _FEW = 6, 4
 _INSTANCE = 120.0
 """Bytes kept by each instance, or each saved state."""
 
-
 _SLIGHT = 4096.0
 """Bytes kept by each instance that no study notices: some tools never free an instance's name or its log's."""
-
-_TOOL = 65536.0
-"""What an instance may keep if it runs in a tool, such as an interpreter that remembers every module it ran."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +39,14 @@ class _Unknown:
 def memory(subject: Subject) -> CheckResult:
     if not subject.memory_in_use():
         return not_applicable("memory", "because this platform does not tell how much memory is in use")
-    steps, instance = affordable(subject, 1500), _TOOL if subject.description.needs_tool else _INSTANCE
+    steps = affordable(subject, 1500)
     texts, figures, slight, unknown = [], {}, "", dict[str, _Unknown]()
     for what, growth, least in (
         ("step", _of_steps(subject, steps), _LEAST),
         ("later step", _of_a_long_run(subject), _LEAST),
-        ("instance", _of_instances(subject, instance), instance),
+        ("instance", _of_instances(subject), _INSTANCE),
         ("saved state", _of_states(subject), _INSTANCE),
-        ("fmi2Reset", _of_resets(subject, instance), instance),
+        ("fmi2Reset", _of_resets(subject), _INSTANCE),
     ):
         if isinstance(growth, _Unknown):
             unknown[what] = growth
@@ -115,12 +114,15 @@ def _of_a_long_run(subject: Subject) -> float | _Unknown:
     return max(0.0, min((b - a) / (later - sooner) for (sooner, a), (later, b) in pairwise(seen)))
 
 
-def _of_instances(subject: Subject, least: float) -> float | _Unknown:
+def _of_instances(subject: Subject) -> float | _Unknown:
     """A quick look, and a longer one where that sees something: an interpreter's own memory moves as well."""
     steps = int(min(4000, max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))))
-    quick = _of_so_many(subject, max(3, steps // 400))
-    small = isinstance(quick, float) and quick <= least
-    return quick if small else _of_so_many(subject, max(5, steps // 30))
+    few, clock = max(3, steps // 400), perf_counter()
+    quick = _of_so_many(subject, few)
+    if isinstance(quick, float) and quick <= _INSTANCE:
+        return quick
+    each = (perf_counter() - clock) / (_BLOCKS * few)
+    return _of_so_many(subject, max(5, min(steps // 30, int(_BLOCK / each))))
 
 
 def _of_so_many(subject: Subject, count: int) -> float | _Unknown:
@@ -132,11 +134,11 @@ def _of_so_many(subject: Subject, count: int) -> float | _Unknown:
     return _growth(subject, block, count)
 
 
-def _of_resets(subject: Subject, least: float) -> float | _Unknown:
+def _of_resets(subject: Subject) -> float | _Unknown:
     """A quick look, and a longer one where that sees something."""
     try:
         quick = _of_so_many_resets(subject, _RESETS)
-        small = isinstance(quick, float) and quick <= least
+        small = isinstance(quick, float) and quick <= _INSTANCE
         return quick if small else _of_so_many_resets(subject, 5 * _RESETS)
     except ComponentError as error:
         return _Unknown(f"{error.call} returned {error.status}")

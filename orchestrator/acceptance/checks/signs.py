@@ -1,7 +1,9 @@
 """Whether a converter answers voltage and frequency with the right signs, and rests at its frequency."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +24,7 @@ from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
+from orchestrator.binding.misfits import of_frequency, omega_seen
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -63,6 +66,7 @@ _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
+_DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
 """Of the changes of voltage and frequency."""
 
@@ -82,11 +86,10 @@ def rated_frequency(subject: Subject) -> CheckResult:
         omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[
             :, subject.outputs.index("omega")
         ]
-    rest, f_n = float(np.median(omega[-max(1, steps // 10) :])), _rated(subject)
-    seen = f"omega is {rest:.6g} at rest, in a network of its rated frequency"
-    if abs(rest - 1) > 0.02:
-        known = f", so it is made for {rest * f_n:.4g} Hz where {f_n:g} Hz is bound" if f_n else ""
-        return failed("rated_frequency", "wrong rated frequency", f"{seen}{known}", omega=rest)
+    rest = float(np.median(omega[-max(1, steps // 10) :]))
+    seen = omega_seen(rest)
+    if found := of_frequency(rest, _rated(subject)):
+        return failed("rated_frequency", found.fault, found.evidence, **found.figures)
     if abs(rest - 1) > _OMEGA:
         return remarked("rated_frequency", seen, "let it settle, or ask what omega is", omega=rest)
     return passed("rated_frequency", seen, omega=rest)
@@ -99,7 +102,11 @@ def _shows_omega(subject: Subject) -> bool:
 
 def _rated(subject: Subject) -> float:
     described = subject.description
-    return described.port.f_n if isinstance(described, BoundDescription) else 50.0
+    if isinstance(described, BoundDescription):
+        return described.port.f_n
+    own = described.variables.get("f_n")
+    known = 50.0 if own is None or own.start is None else own.start_number
+    return float(subject.use.values.get("f_n", known))
 
 
 @check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
@@ -116,15 +123,14 @@ def signs(subject: Subject) -> CheckResult:
     places = [POINT]
     if subject.starts:
         places += [p for p in (subject.use.point, ABSORBING, CHARGING) if p is not None]
-    first: CheckResult | None = None
-    refused = []
+    seen, refused = list[CheckResult](), []
     for point in places:
         if point is CHARGING and cannot_import(subject, point):
             continue  # which 'power_balance' tells
         try:
             result = _at(subject, steps, point)
-            if point is CHARGING and first is not None and not result.fault:
-                result = _evenly(first, result)
+            if point is CHARGING and seen and not result.fault:
+                result = _evenly(_summary(seen), result)
         except ComponentError as error:
             if point is CHARGING:
                 continue
@@ -132,13 +138,20 @@ def signs(subject: Subject) -> CheckResult:
             continue
         if result.fault:
             return result
-        if first is None or (first.verdict == "pass" and result.verdict == "remark"):
-            first = result
-    if first is None:
+        seen.append(result)
+    if not seen:
         return remarked("signs", refused[0], "ask why")
+    first = _summary(seen)
     if refused:
         return remarked("signs", "; ".join([first.evidence, *refused]), "ask why", **first.figures)
     return first
+
+
+def _summary(seen: list[CheckResult]) -> CheckResult:
+    """The first remark, or the first result, with what was not judged at any point."""
+    first = next((result for result in seen if result.verdict == "remark"), seen[0])
+    unknown = any("not_judged" in result.figures for result in seen)
+    return replace(first, figures=first.figures | ({"not_judged": _DROOP_OF_Q} if unknown else {}))
 
 
 def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
@@ -156,9 +169,8 @@ def _named(point: OperatingAt) -> str:
 
 
 def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
-    """What small changes at one operating point say."""
     voltage, frequency = _answers(subject, steps, point)
-    figures = {
+    figures: dict[str, Any] = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
     }  # fmt: skip
@@ -170,7 +182,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if subject.starts:
         said += f", at {_named(point)}"
-    said += f"; {unknown}" if unknown else ""
+    if unknown:
+        said += f"; {unknown}"
+        figures["not_judged"] = _DROOP_OF_Q
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
@@ -184,11 +198,13 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     if late > _RINGS:
         says = f"its power still swings by {late:.2g} pu about its course ({said})"
         return remarked("signs", says, "ask how it is damped, and at which network impedance", **figures)
+    if lag := _lag(frequency):
+        remedy = "ask for its time constant: what is controlled or judged by omega comes so late"
+        return remarked("signs", f"{lag} ({said})", remedy, **figures)
     return passed("signs", said, **figures)
 
 
 def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[DroopAnswer, DroopAnswer]:
-    """To lower voltage, and to lower frequency."""
     omega = 2 * pi * _rated(subject) * FREQUENCY
     return (
         _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * VOLTAGE, complex)),
@@ -227,7 +243,6 @@ def _answer(
 
 
 def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
-    """What one change brought, in the windows at the end."""
     late, later = (complex(power[window].mean()) for window in windows[1:])
     far = float(np.nan_to_num(np.abs(power), nan=np.inf).max())
     part = len(power) // 3
@@ -258,7 +273,6 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
 
 
 def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> tuple[str, str] | None:
-    """Name of a fault, and what shows it."""
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
     for answer, kind in zip((voltage, frequency), ("voltage", "frequency"), strict=True):
@@ -317,6 +331,15 @@ def _wrong_omega(frequency: DroopAnswer) -> tuple[str, str] | None:
     return None
 
 
+def _lag(frequency: DroopAnswer) -> str:
+    """How far an omega is behind that still moves where the power rests: where its angle rests, it has arrived."""
+    for sign, way in zip(_SIGNS, frequency.ways, strict=True):
+        network = 1 - sign * FREQUENCY
+        if way.omega is not None and way.moving < SETTLED and abs(way.omega - network) > _OMEGA_APART:
+            return f"omega is {way.omega:.6g} and still on its way to the network's {network:.6g}, and its power rests"
+    return ""
+
+
 def _wrong_droop(
     subject: Subject, steps: int, point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer
 ) -> tuple[tuple[str, str] | None, str]:
@@ -324,7 +347,7 @@ def _wrong_droop(
 
     A fault and what shows it, and why the droop of the reactive power could not be judged.
     """
-    not_judged = "the sign of its droop of reactive power was not judged: "
+    not_judged = f"{_DROOP_OF_Q} was not judged: "
     if voltage.power.imag < _MORE * voltage.early_power.imag:
         return None, ""
     if not subject.starts or not voltage.early_power.imag > 0:

@@ -75,18 +75,10 @@ class Subject:
         Communication step of the tests [s].
     step_is_given
         Whether the file declares it or the user asks for it.
-    inputs, outputs
-        Names of the Real inputs and outputs.
     process
         Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
-    use
-        How somebody uses it.
-    doing
-        What is done to it, for the report of a crash.
     memory
         Results that several checks share.
-    seed
-        Of what is drawn at random.
     """
 
     process: Callable[[], FmuProcess]
@@ -150,12 +142,8 @@ class Subject:
 
         Parameters
         ----------
-        component
-            The instance.
         point
             Operating point that it starts from; the one of use where None.
-        parameters
-            Values of further parameters.
         """
         component.setup(0.0, None)
         if self.starts:
@@ -238,14 +226,10 @@ class Subject:
 
         Parameters
         ----------
-        steps
-            How many communication steps.
         step_size
             Their length [s].
         stimulus
             Gives the deviations of the inputs from where they start, at a time [s].
-        options
-            As `running`.
         """
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
@@ -319,7 +303,6 @@ class Running:
         return self.component.save_state()
 
     def restore(self, state: Any) -> None:
-        """Restore a saved state."""
         self.component.restore_state(state)
 
     def reset(self) -> None:

@@ -1,11 +1,14 @@
 """Whether an FMU's answer depends on how a master steps it, and comes when it is due."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.comparing import scales
+from orchestrator.acceptance.checks.port import voltage_rows
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.acceptance.checks.subject import Running, Subject
 from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
@@ -25,6 +28,10 @@ _RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
 
 _DELAYS = 5
 """Communication steps of delay that are looked for."""
+
+
+_VOLTAGES = (1.08, 0.6)
+"""At which it is looked as well [pu]: a limit or an arrester may act there only."""
 
 
 @check("feedthrough", "Does what its outputs depend on at once agree with what it declares?", needs=("reading",))
@@ -52,25 +59,34 @@ def feedthrough(subject: Subject) -> CheckResult:
 
 
 def _observed(subject: Subject) -> dict[str, set[str]]:
-    """For each output the inputs that move it without a step, at a few points of a run."""
+    """For each output the inputs that move it without a step, at a few points of a run, and of the voltage."""
     seen: dict[str, set[str]] = {n: set() for n in subject.outputs}
     sizes, h = subject.amplitudes, subject.step_size
     with subject.running() as running:
         for count in (0, 3, 20):
             running.record(count, h, subject.steps(hold=5 * h))
-            here = np.zeros(len(sizes))
-            running.feed(here)
-            before = running.read()
-            for j, name in enumerate(subject.inputs):
-                moved = here.copy()
-                moved[j] = sizes[j]
-                running.feed(moved)
-                after = running.read()
-                for k, output in enumerate(subject.outputs):
-                    if abs(after[k] - before[k]) > 1e-10 * (abs(before[k]) + abs(sizes[j])):
-                        seen[output].add(name)
-            running.feed(here)
+            _note_direct(running, np.zeros(len(sizes)), seen)
+        if subject.port:
+            with suppress(ComponentError):  # it may refuse such a voltage
+                for here in voltage_rows(running, np.array(_VOLTAGES, complex)):
+                    _note_direct(running, here, seen)
     return seen
+
+
+def _note_direct(running: Running, here: Numbers, seen: dict[str, set[str]]) -> None:
+    """Move one input after another from one place, and note which outputs follow."""
+    subject, sizes = running.subject, running.subject.amplitudes
+    running.feed(here)
+    before = running.read()
+    for j, name in enumerate(subject.inputs):
+        moved = here.copy()
+        moved[j] += sizes[j]
+        running.feed(moved)
+        after = running.read()
+        for k, output in enumerate(subject.outputs):
+            if abs(after[k] - before[k]) > 1e-10 * (abs(before[k]) + abs(sizes[j])):
+                seen[output].add(name)
+    running.feed(here)
 
 
 @check("delay", "Do its outputs come when they are due?", needs=(*SAME, "reading"))
@@ -171,18 +187,18 @@ def _stale(subject: Subject, *, declared: bool) -> str | None:
         for name in claimed:
             if name in seen[output]:
                 continue
-            jumps = [_jump(subject, output, name, size) for size in (h, h / 8)]
-            if jumps[0] > 1e-6 and jumps[1] > 0.8 * jumps[0]:
+            (jump, size), (short, _) = (_jump(subject, output, name, step) for step in (h, h / 8))
+            if jump > 1e-6 * max(size, 1.0) and short > 0.8 * jump:
                 follows = "is declared to follow" if declared else "follows"
                 return (
-                    f"{output} {follows} {name} at once, but not when read: it jumps by {jumps[1]:.3g} in the next, "
+                    f"{output} {follows} {name} at once, but not when read: it jumps by {short:.3g} in the next, "
                     f"of {h / 8:g} s or of {h:g} s"
                 )
     return None
 
 
-def _jump(subject: Subject, output: str, name: str, step_size: float) -> float:
-    """How far one step moves an output after an input moved, beyond where it goes without."""
+def _jump(subject: Subject, output: str, name: str, step_size: float) -> tuple[float, float]:
+    """How far one step moves an output after an input moved, beyond where it goes without, and the output's size."""
     ends = []
     for on in (0.0, 1.0):
         deviation = np.zeros(len(subject.inputs))
@@ -191,7 +207,7 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> float:
             running.feed(deviation)
             running.step(step_size)
             ends.append(running.component.get([output])[output])
-    return abs(ends[1] - ends[0])
+    return abs(ends[1] - ends[0]), abs(ends[0])
 
 
 @check("step_invariance", "Is its answer the same with other communication steps?", needs=(*SAME, "reading", "delay"))

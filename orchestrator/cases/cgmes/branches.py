@@ -20,8 +20,6 @@ class Branch:
 
     Attributes
     ----------
-    name, start, end
-        Its name, and the buses' ids.
     z
         Series impedance [pu].
     to_earth

@@ -51,8 +51,6 @@ def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
 
     Parameters
     ----------
-    path
-        Of a zip, or of a folder.
     leaving_out
         Kinds of `LEFT_OUT` that the user lets go.
     """
@@ -76,8 +74,6 @@ def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNe
     ----------
     place
         Path of its source, for messages.
-    source
-        pypowsybl's network.
     leaving_out
         Kinds of `LEFT_OUT` that may go.
     """
@@ -85,8 +81,6 @@ def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNe
 
 
 class _Reading:
-    """One model on its way to tables."""
-
     def __init__(self, place: str, source: Any) -> None:
         self._place, self._source = place, source
         self._changes = Changes(place, "element")

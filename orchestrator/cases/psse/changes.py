@@ -25,17 +25,8 @@ def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
 
     Parameters
     ----------
-    raw
-        The file.
     allowed
         Kinds of `LEFT_OUT` that the user lets go.
-    changes
-        Where they are noted.
-
-    Raises
-    ------
-    InputError
-        If there are others, with all of them, or a name in ``allowed`` is unknown.
     """
     unknown = [kind for kind in allowed if kind not in LEFT_OUT]
     if unknown:

@@ -1,5 +1,6 @@
 """PSS/E dynamics data (DYR): machines with their controls, and converters, of the generators of a RAW file."""
 
+import dataclasses
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,7 @@ class MachineModel:
 
     ``partial``: a record of it was left out, and the case says what stands for it. ``doubts`` are texts with the
     parameter and the place that they are about; ``replaced`` are lines of records that an approximation stands for,
-    with what it leaves out.
+    with what it leaves out; ``lines`` are the records' by parameter.
     """
 
     parts: Mapping[str, str]
@@ -33,6 +34,7 @@ class MachineModel:
     doubts: tuple[tuple[str, str, str], ...] = ()
     replaced: tuple[tuple[int, str], ...] = ()
     partial: bool = False
+    lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
 
 
 def machine_models(
@@ -48,10 +50,6 @@ def machine_models(
 
     Parameters
     ----------
-    records
-        Of the DYR file.
-    machines
-        Of the RAW file.
     leaving_out
         Models whose records may be left out; their generators keep what the case says of that part.
     replaced
@@ -72,6 +70,7 @@ def machine_models(
     problems: list[str] = []
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
     values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
+    lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     for record in records:
@@ -91,7 +90,8 @@ def machine_models(
         else:
             parts[key][known.kind] = known.part
             try:
-                values[key] |= _values(record, known)
+                values[key] |= (own := _values(record, known))
+                lines[key] |= dict.fromkeys(own, record.line)
             except InputError as error:
                 problems.append(str(error))
     following = _followed(of, left, problems) if approximate else {}
@@ -107,7 +107,9 @@ def machine_models(
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
     return following | {
         key: replace(
-            _model(at[key], parts[key], values[key], key in open_), doubts=tuple(_doubts(at[key], of[key], values[key]))
+            _model(at[key], parts[key], values[key], key in open_),
+            lines=lines[key],
+            doubts=tuple(_doubts(at[key], of[key], values[key])),
         )
         for key in at
         if {"machine", "converter"} & {*parts[key]} and key not in following
@@ -152,7 +154,6 @@ def _followed(
 def _doubts(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[tuple[str, str, str]]:
-    """What two files say of one machine and should be the same."""
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -171,7 +172,6 @@ def _sets(name: str) -> set[str]:
 
 
 def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
-    """The model of a machine, of the parts that have records."""
     if "converter" in parts:
         coupling = {"RL": machine.source.real, "XL": machine.source.imag}
         return MachineModel({}, {**coupling, **values}, parts["converter"])
@@ -183,7 +183,6 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
-    """Parameters that a record sets."""
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
     found: dict[str, float] = {}
     for field in known.fields:

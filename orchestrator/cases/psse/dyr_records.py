@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fmus.synchronous_generator.dyr_fields import DyrField
 from orchestrator.errors import InputError
+from orchestrator.units import LARGEST
 
 MOST_BYTES = 100_000_000
 """Of a file."""
@@ -28,18 +29,10 @@ class DynamicRecord:
 
     @property
     def place(self) -> str:
-        """File and line."""
         return f"{self.file}, line {self.line}"
 
 
 def read_dyr(path: Path) -> list[DynamicRecord]:
-    """Records of a DYR file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is too large, or a record is not of that form.
-    """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
     if (size := path.stat().st_size) > MOST_BYTES:
@@ -72,7 +65,6 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
 
 
 def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
-    """Values of a record by the names of its fields."""
     following = next((text for text in record.values[2:] if text.upper() in known), None)
     if following is not None:
         raise InputError(
@@ -91,6 +83,6 @@ def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
         value = float(text.upper().replace("D", "E"))
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) < LARGEST:
         raise InputError(f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number")
     return value

@@ -25,6 +25,7 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
             str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}",
             bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu, place=place,
             q_min_mvar=sum(m.q_min_mvar for m in here), q_max_mvar=sum(m.q_max_mvar for m in here),
+            p_min_mw=machine.p_min_mw, p_max_mw=machine.p_max_mw,
         )  # fmt: skip
         rows.append(checked(row, place))
     return rows
@@ -46,8 +47,6 @@ def with_records(
     ----------
     rows, machines
         In the same order.
-    path
-        Of the DYR file.
     leaving_out
         Models whose records may be left out.
     without
@@ -56,11 +55,6 @@ def with_records(
         Bus and identifier of the machines that are out of service.
     approximate
         Whether grid-following converters become `gfl_phasor`.
-
-    Raises
-    ------
-    InputError
-        As `read_dyr` and `machine_models`.
     """
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
@@ -73,8 +67,10 @@ def with_records(
         elif model.converter is None:
             own = {"sg": model.parameters}
             of_records = replace(row, parameters=own, parts=model.parts, partial=model.partial)
-            found.append(replace(of_records, doubts=model.doubts))
+            found.append(replace(of_records, doubts=model.doubts, lines=model.lines))
         else:
             own = {"gfor": model.parameters}
-            found.append(replace(row, parameters=own, converter=model.converter, replaced=model.replaced))
+            found.append(
+                replace(row, parameters=own, converter=model.converter, replaced=model.replaced, lines=model.lines)
+            )
     return found

@@ -60,8 +60,6 @@ def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValu
     ----------
     rows
         Machines, with the choices of ``[units]``.
-    place
-        Path of the DYR file.
     """
     for kind, quantity in _CONSTANT.items():
         able = [row for row in rows if _can_have(kind, row)]

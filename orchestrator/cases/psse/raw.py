@@ -13,12 +13,19 @@ from orchestrator.cases.psse.changes import leave_out
 from orchestrator.cases.psse.records import RawFile, Record, read_records
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _REFERENCE = 3
 _NO_LIMIT = 9999.0
-"""Mvar by which PSS/E says that a generator has no limit."""
+"""MW or Mvar by which PSS/E says that a generator has no limit."""
+
+_MOST_VOLTAGE = 2.0
+_FAR = 20.0
+"""Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
+
+_SAME_VOLTAGE = 0.1
+"""Part by which the nominal voltages at a line's ends may differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,18 +34,14 @@ class Machine:
 
     Attributes
     ----------
-    bus, name
-        Number of its bus, and its identifier there.
-    line
-        Of its record.
     p_mw, v_pu
         Active power [MW], and voltage that it holds at its bus [pu].
     rating_mva
         MBASE [MVA].
     source
         ZSORCE [pu of the rating].
-    q_min_mvar, q_max_mvar
-        Limits of reactive power [Mvar]; infinite where the file has none.
+    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
+        Limits of reactive and of active power; infinite where the file has none.
     """
 
     bus: int
@@ -50,6 +53,8 @@ class Machine:
     source: complex
     q_min_mvar: float
     q_max_mvar: float
+    p_min_mw: float = -math.inf
+    p_max_mw: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,11 @@ class RawNetwork:
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
-    """Read the network of a RAW file."""
     raw = read_records(path)
     return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
 
 
 class _Reading:
-    """One file on its way to tables."""
-
     def __init__(self, raw: RawFile, changes: Changes, keep_load_parts: bool) -> None:
         self._raw, self._changes, self._keep_load_parts = raw, changes, keep_load_parts
         self._rows: dict[int, list[float]] = {}
@@ -83,6 +85,7 @@ class _Reading:
         self._branches: list[list[float]] = []
         self._to_earth: list[tuple[complex, complex]] = []
         self._labels: dict[int, str] = {}
+        self._ohms: list[tuple[int, float, float]] = []  # line of the record, X, and kV of each branch
         self._idle: set[tuple[int, str]] = set()
         self._lines_of: dict[tuple[Any, ...], int] = {}
         self._load_parts: dict[int, tuple[complex, complex]] = {}
@@ -139,8 +142,9 @@ class _Reading:
     def _buses(self) -> None:
         for record in self._raw.of("bus"):
             number, kind = record.whole(0, "the bus' number"), record.whole(3, "IDE", 1)
-            if number <= 0 or number in self._rows:
-                raise record.error(f"the bus' number is {number}; numbers exceed 0, and each stands once")
+            if number <= 0:
+                raise record.error(f"the bus' number is {number}; numbers exceed 0")
+            self._once(record, "bus", number)
             if kind not in (1, 2, 3, 4):
                 raise record.error(f"IDE is {kind}; known are 1 to 4")
             if kind == _REFERENCE and any(row[1] == _REFERENCE for row in self._rows.values()):
@@ -148,9 +152,10 @@ class _Reading:
             self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
             self._kilovolts[number] = record.number(2, "BASKV", 0.0)
             self._magnitudes[number] = record.number(7, "VM", 1.0)
-            if kind != 4 and not self._magnitudes[number] > 0:
+            if kind != 4 and not 0 < self._magnitudes[number] <= _MOST_VOLTAGE:
                 raise record.error(
-                    f"VM is {self._magnitudes[number]:g} pu; it must exceed 0: export the solved case, or give 1"
+                    f"VM is {self._magnitudes[number]:g} pu; it must exceed 0 and be at most {_MOST_VOLTAGE:g} (no kV, "
+                    "no percent): export the solved case, or give 1"
                 )
             self._labels[number] = str(number)
 
@@ -204,6 +209,11 @@ class _Reading:
             charging = 0.5j * record.number(5, "B", 0.0)
             gi, bi, gj, bj = (record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ")))
             state = record.whole(ends + 4, "ST", 1)
+            one, other = self._kilovolts[start], self._kilovolts[end]
+            if state and one and other and abs(one - other) > _SAME_VOLTAGE * max(one, other):
+                text = f"line between buses of BASKV = {one:g} and {other:g} kV: is one wrong, or a transformer meant?"
+                self._changes.note(record.line, text)
+            self._ohms.append((record.line, z.imag, one))
             self._branch(start, end, z, state, (charging + complex(gi, bi), charging + complex(gj, bj)))
         for record in self._raw.of("system switching device"):
             start, end = self._bus(record), self._bus(record, 1)
@@ -211,6 +221,12 @@ class _Reading:
             if closed:
                 self._changes.note(record.line, "switching device: a branch of its reactance")
             self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
+        usual = sorted(abs(x) for _, x, _ in self._ohms)
+        for line, x, kilovolts in self._ohms:
+            middle, ohms = usual[len(usual) // 2], x * self._raw.base_mva / kilovolts**2 if kilovolts else 0.0
+            if x > _FAR * middle and middle / _FAR < ohms < _FAR * middle:
+                text = f"X is {x:g} pu, {x / middle:.3g} times the middle one of all lines; is it in ohms? On "
+                self._changes.note(line, f"{text}{kilovolts:g} kV these are {ohms:.3g} pu")
 
     def _branch(
         self, start: int, end: int, z: complex, state: int, to_earth: tuple[complex, complex] = (0j, 0j),
@@ -269,22 +285,33 @@ class _Reading:
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(record.line, "step-up transformer within a generator's record: left out")
             source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
-            most, least = (record.number(k, n, d) for k, n, d in ((4, "QT", _NO_LIMIT), (5, "QB", -_NO_LIMIT)))
-            if least > most:
-                raise record.error(f"the limit QB is {least:g} Mvar, more than QT of {most:g} Mvar; swap them")
+            least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
+            p_least, p_most = _limits(record, "PB", status + 3, "PT", status + 2, "MW")
+            feeds = record.number(2, "PG", 0.0)
+            if not p_least <= feeds <= p_most and feeds <= rating:  # else the rating is asked about
+                text = f"PG is {feeds:g} MW, beyond the machine's limits, PB = {p_least:g} and PT = {p_most:g} MW"
+                self._changes.note(record.line, f"{text}: it feeds PG, and takes no part of an outage beyond")
             machines.append(
                 Machine(
                     bus,
                     record.text(1, "1"),
                     record.line,
-                    record.number(2, "PG", 0.0),
+                    feeds,
                     held,
                     rating,
                     source,
-                    least if least > -_NO_LIMIT else -math.inf,
-                    most if most < _NO_LIMIT else math.inf,
+                    least,
+                    most,
+                    p_least,
+                    p_most,
                 )
             )
-        if not any(row[1] == _REFERENCE for row in self._rows.values()):
-            raise InputError(f"{self._raw.place}: no bus is the reference (IDE = 3); set one in the case and export it")
         return tuple(machines)
+
+
+def _limits(record: Record, low: str, at: int, high: str, above: int, unit: str) -> tuple[float, float]:
+    """A least and a largest value, infinite where the file has no limit."""
+    least, most = record.number(at, low, -_NO_LIMIT), record.number(above, high, _NO_LIMIT)
+    if least > most:
+        raise record.error(f"the limit {low} is {least:g} {unit}, more than {high} of {most:g} {unit}; swap them")
+    return least if least > -_NO_LIMIT else -math.inf, most if most < _NO_LIMIT else math.inf

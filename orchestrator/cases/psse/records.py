@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.units import LARGEST
 
 REVISIONS = (33, 34, 35, 36)
 """Revisions whose records are known."""
@@ -50,13 +51,6 @@ class Record:
         return (self.fields[index] if index < len(self.fields) else "") or default
 
     def number(self, index: int, name: str, default: float | None = None) -> float:
-        """A field as a number.
-
-        Raises
-        ------
-        InputError
-            If it is none, or is left out and has no default.
-        """
         text = self.text(index)
         if not text and default is not None:
             return default
@@ -64,18 +58,11 @@ class Record:
             value = float(text.replace("D", "E").replace("d", "e"))
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
+        if not abs(value) < LARGEST:
             raise self.error(f"{name} is {text!r}; it must be a number")
         return value
 
     def whole(self, index: int, name: str, default: int | None = None) -> int:
-        """A field as a whole number.
-
-        Raises
-        ------
-        InputError
-            As `number`.
-        """
         value = self.number(index, name, default)
         if value != int(value):
             raise self.error(f"{name} is {self.text(index)!r}; it must be a whole number")
@@ -92,8 +79,6 @@ class RawFile:
 
     Attributes
     ----------
-    place
-        Path of the file.
     base_mva, frequency
         System base [MVA], and rated frequency [Hz] where the file says it.
     sections
@@ -111,12 +96,10 @@ class RawFile:
     guessed: dict[int, str] = field(default_factory=dict)
 
     def of(self, section: str) -> list[Record]:
-        """Records of a section."""
         return self.sections.get(section, [])
 
 
 def read_records(path: Path) -> RawFile:
-    """Read a RAW file."""
     lines = _numbered(_text_of(path))
     first = next(lines, None)
     if first is None:
@@ -209,7 +192,6 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
 
 
 def _known_as(text: str) -> str:
-    """A section by the name that is used here."""
     name = " ".join(text.lower().split())
     return _ALIASES.get(name, name)
 

@@ -33,8 +33,6 @@ class Transformer:
     ----------
     record
         Its first line.
-    windings
-        Two or three.
     impedances
         Between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system].
     magnetisation
@@ -60,15 +58,8 @@ def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transf
 
     Parameters
     ----------
-    raw
-        The file.
     voltages
         Bus → base voltage [kV]; 0 where the file leaves it open.
-
-    Raises
-    ------
-    InputError
-        If a record is cut short, names a bus that is not there, or has a code that is not known.
     """
     lines = iter(raw.of("transformer"))
     for first in lines:

@@ -26,8 +26,6 @@ def code_for(key: str, given: Mapping[str, object]) -> GridCode:
     ----------
     key
         As ``--code`` takes it.
-    given
-        Declared values by name.
     """
     if key in CODES:
         checked((), given, key)

@@ -58,16 +58,8 @@ def write_row(
 
     Parameters
     ----------
-    request
-        The converter, its binding and its values.
-    row, title
-        Name of the row, and what it is in words.
-    programme
-        What the bench does.
     f_n
         Rated frequency of the bench [Hz].
-    folder
-        Of the certificate.
     """
     description = bound_fmu(request.fmu, request.binding)
     own = dict(request.values)

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from orchestrator.analysis.device_start import misfits_of
 from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
 from orchestrator.cases.schema import Value
@@ -26,10 +27,6 @@ class BenchTask:
 
     Attributes
     ----------
-    row
-        Name of the row.
-    case, fingerprint
-        Path of the case file, and its fingerprint.
     key
         Name of the result's file: a hash of everything that the result depends on.
     changes
@@ -91,13 +88,7 @@ class BenchResult:
 
 
 def compute_row(task: BenchTask) -> BenchResult:
-    """Run a row; a failure becomes part of the result.
-
-    Raises
-    ------
-    InputError
-        As `same_case`.
-    """
+    """Run a row; a failure becomes part of the result."""
     case = same_case(task.case, task.fingerprint)
     result, begin = BenchResult(task.row), _processor_time()
     with failure_kept(result), alone():
@@ -105,6 +96,7 @@ def compute_row(task: BenchTask) -> BenchResult:
         watch = Watch(prepared)
         ended: CosimError | None = None
         with running(prepared) as master:
+            misfits = misfits_of(master)
             try:
                 master.run(prepared.stop_time, prepared.events, watch.observers)
             except ComponentError as error:
@@ -112,7 +104,7 @@ def compute_row(task: BenchTask) -> BenchResult:
                     raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
                 ended = error  # the converter gave up, or its values were no numbers: the row is not met
         _keep(result, watch)
-        result.findings = [finding.as_json() for finding in watch.findings(ended)]
+        result.findings = [finding.as_json() for finding in watch.findings(ended, misfits=misfits)]
         result.seconds = _processor_time() - begin
     return result
 

@@ -33,8 +33,6 @@ class CodeCertificate:
     ----------
     f_n
         Rated frequency of the bench [Hz].
-    results
-        Responses by the name of the row.
     verdicts
         In the order of the rows.
     chosen
@@ -55,7 +53,6 @@ class CodeCertificate:
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """By what the test departs from the code's."""
         return departures_of(self.request.values, self.f_n, self.code)
 
     @property
@@ -74,7 +71,6 @@ class CodeCertificate:
         return self.acceptance is not None and not self.acceptance.trusted
 
     def sentence(self) -> str:
-        """The result as a sentence."""
         return sentence_of(self.code, self.description.model_name, self.verdicts, self.missing, self.acceptance)
 
 
@@ -83,10 +79,6 @@ def missing_of(code: GridCode, verdicts: Sequence[RowVerdict], departures: Seque
 
     Parameters
     ----------
-    code
-        The code.
-    verdicts
-        On the rows that were run.
     departures
         From `departures_of`.
     """
@@ -106,16 +98,10 @@ def sentence_of(
 
     Parameters
     ----------
-    code
-        The code.
     model
         Name of the converter's model.
-    verdicts
-        On the rows that were run.
     missing
         From `missing_of`.
-    acceptance
-        The acceptance tests of the FMU; None where there were none.
     """
     judged = [v for v in verdicts if v.judged]
     bad = [v for v in judged if not v.accepted]
@@ -140,12 +126,8 @@ def departures_of(values: Mapping[str, Value], f_n: float, code: GridCode) -> tu
 
     Parameters
     ----------
-    values
-        Of the converter, as they were given.
     f_n
         Rated frequency of the bench [Hz].
-    code
-        The code.
     """
     set_too = tuple(f"converter.{name} = {shown(values[name])}" for name in GIVEN if name in values)
     if f_n != code.f_n:

@@ -28,8 +28,6 @@ class ChangeTask:
 
     Attributes
     ----------
-    code
-        Key of the code.
     f_n
         Rated frequency of the bench [Hz].
     bench
@@ -89,7 +87,6 @@ class ChangeResult:
 
     @property
     def lasting(self) -> bool:
-        """As `BenchResult.lasting`."""
         return self.failure is None
 
     @classmethod
@@ -111,13 +108,7 @@ class ChangeResult:
 
 
 def compute_change(task: ChangeTask) -> ChangeResult:
-    """Run and judge a changed row; a failure becomes part of the result.
-
-    Raises
-    ------
-    InputError
-        As `same_case`.
-    """
+    """Run and judge a changed row; a failure becomes part of the result."""
     result = compute_row(task.bench)
     if result.failure is not None:
         return ChangeResult(failure=result.failure)
@@ -133,8 +124,6 @@ def margins_with_time(
 
     Parameters
     ----------
-    verdict
-        Of the row.
     findings
         Of the watch over the run, in the form of `Finding.as_json`.
     f_n

@@ -99,8 +99,6 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
 
     Parameters
     ----------
-    name
-        Of the criterion.
     within
         Time after the event in which it has to be back for good [s]; None for the end of its hold.
     tolerance
@@ -139,14 +137,10 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
 
     Parameters
     ----------
-    event
-        Number of the event.
     sign
         +1 where the power has to rise: the source's angle falls.
     least
         [pu]
-    of_code
-        Whether the number is the code's.
     """
 
     def judge(row: MeasuredRow) -> RowFinding:
@@ -176,8 +170,6 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
 
     Parameters
     ----------
-    event
-        Number of the event.
     sign
         +1 where the power has to rise.
     longest
@@ -289,8 +281,6 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
 
     Parameters
     ----------
-    event
-        Number of the event with which the ramp begins.
     rate, lasts
         Of the ramp [Hz/s, s]; the power has to rise where the rate is negative.
     least

@@ -27,7 +27,6 @@ class Declaration:
 
 
 def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: str) -> dict[str, float]:
-    """The declared values, each a number within its range."""
     names = [declaration.name for declaration in wanted]
     if unknown := [name for name in given if name not in names]:
         takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"

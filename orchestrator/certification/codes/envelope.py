@@ -151,8 +151,6 @@ def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
 
     Parameters
     ----------
-    plant
-        As declared, with the grid.
     angle
         Size of the jump [rad].
     """
@@ -225,8 +223,6 @@ def ramp_bounds(plant: Swinging, rate: float, lasts: float) -> Callable[[Numbers
 
     Parameters
     ----------
-    plant
-        As declared, with the grid.
     rate
         Rate of the frequency [pu/s]; its sign chooses the margins.
     lasts

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
@@ -71,7 +69,6 @@ class AskedStiffness:
         return self.found >= self.value
 
     def sentence(self) -> str:
-        """The comparison in words."""
         low, high = self.band
         return (
             f"{OPPOSED:g} pu against {np.rad2deg(JUMP):g}° at SCR {SCR:g} (MISO, ERCOT) asks, by this program's "
@@ -90,8 +87,6 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
 
     Parameters
     ----------
-    found
-        What was measured.
     f_n
         Rated frequency [Hz].
     """
@@ -106,8 +101,6 @@ def measure_stiffness(request: CertificationRequest, f_n: float, report: Callabl
 
     Parameters
     ----------
-    request
-        The converter, its binding and its values.
     f_n
         Rated frequency [Hz].
     report
@@ -164,14 +157,8 @@ def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> li
 
     Parameters
     ----------
-    found
-        What was measured.
-    model
-        Name of the converter.
     f_n
         Rated frequency [Hz].
-    folder
-        Where the files go.
     """
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []
@@ -188,6 +175,9 @@ def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> li
 
 
 def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
+    import matplotlib as mpl  # noqa: PLC0415 - a second to import
+    from matplotlib.figure import Figure  # noqa: PLC0415 - as above
+
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         size, phase, stiff = figure.subplots(3, 1, sharex=True)

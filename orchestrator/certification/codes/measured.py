@@ -53,8 +53,6 @@ class MeasuredRow:
         When something changed [s].
     findings
         Of the watch over the run, in the form of `Finding.as_json`.
-    declared
-        What the applicant declares of the converter, by name.
     source_angle
         Of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
     """
@@ -116,7 +114,6 @@ class MeasuredRow:
 
     @property
     def finite(self) -> bool:
-        """Whether every value of every signal is a number."""
         return all(bool(np.isfinite(values).all()) for values in self.signals.values())
 
     @property

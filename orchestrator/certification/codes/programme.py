@@ -123,8 +123,6 @@ def jumps(scr: float, power: float, degrees: tuple[float, ...], hold: float = 5.
 
     Parameters
     ----------
-    scr, power
-        As `BenchProgramme`.
     degrees
         By how much the angle jumps each time [°].
     hold
@@ -144,8 +142,6 @@ def ramps(
 
     Parameters
     ----------
-    scr, power
-        As `BenchProgramme`.
     rated
         Rated frequency [Hz].
     rate
@@ -168,8 +164,6 @@ def weakening(start: float, power: float, ratios: tuple[float, ...], conductance
 
     Parameters
     ----------
-    start
-        Short-circuit ratio at the start.
     power
         Active power of the plant [pu of its rating].
     ratios
@@ -196,8 +190,6 @@ def voltage(scr: float, power: float, factors: tuple[tuple[float, float], ...], 
 
     Parameters
     ----------
-    scr, power
-        As `BenchProgramme`.
     factors
         Time after the first event [s], and the factor of the voltage from then on.
     stop

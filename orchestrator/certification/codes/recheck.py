@@ -118,7 +118,6 @@ def _of_the_table(code: GridCode, content: dict[str, Any], kept: Sequence[str]) 
 
 
 def _of_the_verdict(code: GridCode, content: dict[str, Any], verdicts: Sequence[RowVerdict]) -> list[str]:
-    """What is said of all rows together: what is missing, the verdict, and its sentence with the counts."""
     departures = departures_of(content["values"], content["f_n"], code)
     missing = missing_of(code, verdicts, departures)
     wanted = verdict_of([bool(v.accepted) for v in verdicts if v.judged], len(missing))

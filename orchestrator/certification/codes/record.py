@@ -15,9 +15,11 @@ from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_pictures import row_pictures
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
 from orchestrator.certification.environment import environment
-from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, write_sealed
+from orchestrator.certification.files import HTML, JSON, PDF, RESPONSES, figures_hash, write_sealed
+from orchestrator.certification.margins import margin_text
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, table
+from orchestrator.report.pdf import print_pdf
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
 
@@ -25,8 +27,8 @@ FORMAT = "code-2"
 """Form of the JSON of a code's certificate."""
 
 
-def save_certificate(certificate: CodeCertificate, folder: Path) -> list[Path]:
-    """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``."""
+def save_certificate(certificate: CodeCertificate, folder: Path, *, pdf: bool = False) -> list[Path]:
+    """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
     made = datetime.now(UTC).replace(microsecond=0)
     save_netcdf(responses_of(certificate), folder / RESPONSES)
     c = certificate
@@ -37,7 +39,8 @@ def save_certificate(certificate: CodeCertificate, folder: Path) -> list[Path]:
     write_text(folder / HTML, code_page(c, made, figures_hash(content)))
     content["files"] = hashes | {HTML: file_hash(folder / HTML)}
     write_sealed(content, folder / JSON)
-    return [folder / HTML, folder / JSON, folder / RESPONSES]
+    printed = [print_pdf(folder / HTML, folder / PDF)] if pdf else []
+    return [folder / HTML, folder / JSON, folder / RESPONSES, *printed]
 
 
 def responses_of(certificate: CodeCertificate) -> xr.Dataset:
@@ -119,7 +122,7 @@ def _list(heading: str, texts: Any) -> str:
 
 
 def _margin(finding: RowFinding) -> str:
-    return "–" if finding.margin is None else f"{100 * finding.margin:+.0f} %".replace("-", "−")
+    return margin_text(finding.margin, finding.limit, finding.value)
 
 
 def _word(verdict: RowVerdict, finding: RowFinding) -> str:

@@ -26,14 +26,8 @@ def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: 
 
     Parameters
     ----------
-    verdict
-        Of the row.
-    result
-        Its response.
     f_n
         Rated frequency of the bench [Hz].
-    figures
-        Numbers them.
     """
     if len(result.times) < 2:
         return ""
@@ -48,7 +42,6 @@ def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: 
 
 
 def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], figures: Figures) -> Iterator[str]:
-    """A picture for each envelope."""
     said = {finding.criterion: f"{v.word(finding)}: {finding.text}" for finding in v.findings}
     for band in bands:
         part = row.within(float(band.times[0]) - BEFORE, float(band.times[-1]) + 1e-6)

@@ -13,15 +13,12 @@ NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
 
 @dataclass(frozen=True)
 class RowVerdict:
-    """A row's findings."""
-
     row: CodeRow
     findings: tuple[RowFinding, ...] = ()
     unknown: str = ""
 
     @property
     def judged(self) -> bool:
-        """Whether it counts towards the verdict."""
         return not self.unknown and not self.row.shown_only
 
     @property
@@ -49,10 +46,6 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
 
     Parameters
     ----------
-    row
-        Of the code.
-    result
-        The response.
     f_n
         Rated frequency of the bench [Hz].
     """

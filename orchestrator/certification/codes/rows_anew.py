@@ -38,8 +38,6 @@ def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: b
     wanted
         Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN` others that
         chance draws, so that nobody knows them beforehand.
-    every
-        Take all of them.
     """
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
     if unknown := [name for name in wanted if name not in known]:

@@ -115,12 +115,8 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
     Parameters
     ----------
-    event
-        Number of the event.
     made
         The envelope for a rated frequency [Hz].
-    name
-        Of the criterion.
     quantity
         What is compared [pu].
     skipped

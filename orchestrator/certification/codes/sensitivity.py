@@ -26,8 +26,6 @@ class MarginSensitivity:
 
     Attributes
     ----------
-    margin
-        With the parameter as it is.
     below, above
         With the parameter lower and higher by the change; None where there is none.
     slope
@@ -41,8 +39,6 @@ class MarginSensitivity:
         Why there is no slope.
     idle
         Whether the response is the same to the last bit on both sides.
-    values
-        Of the parameter, below and above.
     """
 
     parameter: Parameter
@@ -68,7 +64,6 @@ class MarginSensitivity:
 
     @property
     def effect(self) -> float:
-        """By which rows are sorted: |slope|."""
         return abs(self.slope or 0.0)
 
     def change_to_meet(self) -> float | None:
@@ -94,12 +89,6 @@ def sensitivity_of(
 
     Parameters
     ----------
-    parameter
-        That was changed.
-    criterion
-        With the parameter as it is.
-    mark
-        Of the response with the parameter as it is.
     sides
         The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
     change

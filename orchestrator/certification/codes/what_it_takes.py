@@ -45,8 +45,6 @@ class ConfirmedChange:
 
     Attributes
     ----------
-    parameter
-        That was changed.
     change
         Relative; of 1 unit where the parameter is 0.
     straight_line
@@ -87,8 +85,6 @@ class CriterionNeeds:
 
 @dataclass(frozen=True)
 class ChangePlan:
-    """What is to be run."""
-
     certificate: CodeCertificate
     folder: Path
     rows: Sequence[RowVerdict]
@@ -111,8 +107,6 @@ def plan_changes(
 
     Parameters
     ----------
-    certificate
-        With the rows that fail.
     folder
         Of the certificate, with the rows' case files.
     patterns

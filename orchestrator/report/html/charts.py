@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 from orchestrator.arrays import Numbers
 
@@ -94,10 +93,6 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
 
     Parameters
     ----------
-    name
-        What a screen reader reads out.
-    x_label, y_label
-        Of the axes, with their units.
     curves
         At least one, with a point at least.
     height
@@ -130,8 +125,6 @@ def complex_plane(
 
     Parameters
     ----------
-    name
-        What a screen reader reads out.
     marks
         Eigenvalues: x [1/s], y [Hz].
     trajectories
@@ -189,7 +182,6 @@ def thinned(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> str:
-    """Names with their colours."""
     items = "".join(f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries)
     return f'<ul class="legend">{items}</ul>'
 
@@ -218,6 +210,8 @@ def _span(values: Numbers, margin: float) -> tuple[float, float]:
 
 
 def _ticks(limits: tuple[float, float]) -> list[tuple[float, str]]:
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - half a second to import
+
     low, high = limits
     values = [v for v in MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
     step = abs(values[1] - values[0]) if len(values) > 1 else abs(high - low) or 1.0

@@ -13,8 +13,6 @@ def colour(index: int) -> str:
 
 
 def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """A table."""
-
     def cells(tag: str, values: Sequence[str]) -> str:
         return "".join(f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values))
 
@@ -44,7 +42,6 @@ class Figures:
 
 
 def number(value: float, digits: int) -> str:
-    """With a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
 
 

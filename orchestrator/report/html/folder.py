@@ -22,14 +22,8 @@ class Results:
 
     Attributes
     ----------
-    case
-        The case of the run.
     scenarios
         One summary a scenario, as in ``summary.json``.
-    modes, participation, step_sizes
-        Rows of the files of that name.
-    trajectories, linear
-        By scenario.
     sweeps, designs
         Datasets and calculation sheets that were found beside the run.
     ended_early
@@ -91,11 +85,22 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
             ended_early=content.get("ended_early"),
         )
         for place in (folder, *others):
-            results.sweeps += [_load(path) for path in _files(place, "sweep.nc")]
-            results.designs += _designs(place)
+            sweeps, designs = [_load(path) for path in _files(place, "sweep.nc")], _designs(place)
+            if place != folder and not (sweeps or designs):
+                raise InputError(_unused(place))
+            results.sweeps += sweeps
+            results.designs += designs
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
     return results
+
+
+def _unused(place: Path) -> str:
+    pages = ", ".join(path.name for path in sorted(place.glob("*.html")))
+    own = f"it has a page of its own: {pages}" if pages else "leave it out"
+    return (
+        f"{place}: nothing in it belongs into a run's report, which takes sweeps and designs of POD controllers; {own}"
+    )
 
 
 def _designs(place: Path) -> list[dict[str, Any]]:

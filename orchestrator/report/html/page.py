@@ -15,8 +15,6 @@ def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = 
 
     Parameters
     ----------
-    folder
-        Of a run.
     others
         Folders or files with sweeps and designs that belong to it.
     path
@@ -29,7 +27,6 @@ def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = 
 
 
 def page(results: Results) -> str:
-    """The page's text."""
     figures = Figures()
     content: list[tuple[str, str]] = [
         ("What was studied", sections.studied(results)),

@@ -39,12 +39,10 @@ _NOTHING = (
 
 
 def titles(results: Results) -> dict[str, str]:
-    """Title of every scenario."""
     return {s["name"]: s["title"] for s in results.scenarios}
 
 
 def scenario_legend(results: Results) -> str:
-    """Colours of the scenarios."""
     return legend((s["title"], colour(k)) for k, s in enumerate(results.scenarios))
 
 
@@ -313,7 +311,6 @@ def responses(results: Results, figures: Figures) -> str:
 
 
 def _watched(results: Results) -> str:
-    """What each run did wrong: when, where, until when."""
     rows = [
         [escape(s["title"]), escape(_KINDS.get(f["kind"], f["kind"])), escape(f["component"]), escape(f["variable"]),
          f"{f['time']:.4g}", "the end" if f["until"] is None else f"{f['until']:.4g}"]

@@ -204,7 +204,6 @@ def design(sheet: dict[str, Any]) -> str:
 
 
 def _margins(margins: dict[str, Any]) -> str:
-    """What the POD loop can bear."""
     if not margins:
         return ""
     up, down = margins["gain_up"], margins["gain_down"]

@@ -52,8 +52,6 @@ class Configuration:
 
     Attributes
     ----------
-    place
-        Path of the file, for errors.
     frequency
         Frequency of the line [Hz]; 0 where the file leaves it open.
     rates
@@ -79,7 +77,6 @@ class Configuration:
 
     @property
     def samples(self) -> int:
-        """Number of samples of each channel."""
         return self.rates[-1][1]
 
 
@@ -91,7 +88,6 @@ class _Lines:
         self.place, self.number = place, 0
 
     def next(self, what: str) -> list[str]:
-        """Fields of the next line."""
         found = next(self._lines, None)
         if found is None:
             raise InputError(f"{self.place}: the file ends after line {self.number}, before {what}; copy it once more")

@@ -37,7 +37,6 @@ _TIMES_DIFFER = 0.01
 
 
 def is_comtrade(path: Path) -> bool:
-    """Whether a path names a COMTRADE recording."""
     return path.suffix.lower() in SUFFIXES
 
 

@@ -37,8 +37,6 @@ def write_comtrade(
     ----------
     dataset
         Evenly recorded signals over the time [s].
-    names
-        Of the signals to be written.
     path
         Of the ``.cfg``; the ``.dat`` gets the same stem.
     form

@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       MEMORY };
+       LAGGED, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
 #define DIVERGED 1e12
@@ -120,6 +120,9 @@ static void initialise(double *z, double *m) {
 #ifdef FAULT_DRIFT
     drift = FAULT_DRIFT;
 #endif
+#ifdef FAULT_SMALL_ANGLE
+    drift += sin(t) - t; /* as if the bus's angle were small */
+#endif
     const phasor e = {bus.re + R_PU * m[I_RE] - X_PU * m[I_IM], bus.im + R_PU * m[I_IM] + X_PU * m[I_RE]};
     m[DELTA] = atan2(e.im, e.re) + drift;
     m[E_0] = hypot(e.re, e.im);
@@ -130,6 +133,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
+    m[LAGGED] = 0;
 }
 
 /* The voltage behind its impedance, by its droop. */
@@ -290,6 +294,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
+#ifdef FAULT_OMEGA_LAGS
+    m[LAGGED] += h / FAULT_OMEGA_LAGS * (slip(z, m, m[P_F]) - m[LAGGED]);
+#endif
     m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
     notice(m, v, h);
 }
@@ -389,6 +396,10 @@ static void outputs(double *z, double *m, const double *hidden) {
     i.re = (u.re * R_PU + u.im * X_PU) / z2, i.im = (u.im * R_PU - u.re * X_PU) / z2;
 #endif
     if (m[BLOCKED] > 0) i.re = i.im = 0;
+#ifdef FAULT_SHUNT_ABOVE /* an arrester: feed-through that no small change shows */
+    const double over = hypot(v.re, v.im) - FAULT_SHUNT_ABOVE;
+    if (over > 0) i.re -= 5 * over * v.re, i.im -= 5 * over * v.im;
+#endif
 #ifdef FAULT_RINGS
     i.re += m[RING];
 #endif
@@ -420,5 +431,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #else
     z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
 #endif
+#ifdef FAULT_OMEGA_LAGS
+    z[OMEGA] = (1 + m[LAGGED]) * OMEGA_UNIT;
+#else
     z[OMEGA] = (1 + OMEGA_FACTOR * slip(z, m, m[P_F])) * OMEGA_UNIT;
+#endif
 }

@@ -318,7 +318,19 @@ def large_signals():
         one("knows_the_dips", "no current limit", "limits", FAULT_KNOWS_DIPS=1),
         *points_and_ratings(),
         one("leaking_in_dips", "memory leak", "after_dips", FAULT_LEAK_IN_DIPS=4096),
+        one("feedthrough_of_high_voltage", "undeclared feed-through", "reading", "feedthrough", FAULT_SHUNT_ABOVE=1.03),
+        *in_a_tool("leaking_in_a_tool", FAULT_LEAK_INSTANCE=26000),
+        *in_a_tool("leaking_resets_in_a_tool", FAULT_LEAK_RESET=26000),
     ]
+
+
+def in_a_tool(name, **defines):
+    """What keeps memory, of an FMU that says that it runs in a tool."""
+
+    def needs_tool(text):
+        return text.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
+
+    return [Member(replace(converter(name, **defines), change=needs_tool), "memory leak", only=("runs", "memory"))]
 
 
 def points_and_ratings():

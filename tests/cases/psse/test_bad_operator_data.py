@@ -31,7 +31,7 @@ RAWS = {
     "parts that nothing joins": (
         raw(33, records(33) | {"BRANCH": records(33)["BRANCH"][2:]}), r"no way leads to the slack bus 'bus_1' from"),
     "no reactance": (changed("BRANCH", 0, "0.085", "0.0"), r"line 'line_4_5' has the reactance 0 pu"),
-    "a voltage of zero": (changed("BUS", 3, ",1.0,0.0", ",0.0,0.0"), r"line 7: VM is 0 pu; it must exceed 0: export"),
+    "a voltage of zero": (changed("BUS", 3, ",1.0,0.0", ",0.0,0.0"), r"line 7: VM is 0 pu; it must exceed 0 and"),
     "more power than the rating": (
         changed("GENERATOR", 1, "163.0", "1630"), r"bus 2 feeds 1630 MW, more than its rating of 192 MVA; raise"),
     "a load twice": (
@@ -51,7 +51,7 @@ DYRS = {
         DYR.replace("2,'GENROU','1'", "2,'GENROU','7'"), CASE,
         r"(?s)GENROU is of machine '7' at bus 2, which has '1'; .*machine '1' at bus 2 has no record of a machine"),
     "no number": (DYR.replace("9.55", "nan"), CASE, r"grid.dyr, line 2: GENROU has H = 'nan'; it must be a number"),
-    "no inertia": (DYR.replace("9.55", "0.0"), CASE, r"grid.dyr, sg1.machine.H: machine.H = 0 s; it must be at least"),
+    "no inertia": (DYR.replace("9.55", "0.0"), CASE, r"grid.dyr, line 2, sg1.machine.H: machine.H = 0 s; it must be"),
     "a phasor model among others": (MACHINES, CASE, r"bus 3 is the phasor model regfm_a1_phasor, and the generator"),
     "a time constant of zero": (
         MACHINES.replace("0.02 0.03 0.04", "0 0.03 0.04"), PHASORS, r"gfor3.TPf: TPf = 0 s; it must be at least 0.001"),

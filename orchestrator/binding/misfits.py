@@ -1,0 +1,119 @@
+"""Whether a device and its binding fit together, by what it gives at an operating point: one verdict, in one place's
+words, for every command.
+"""
+
+from cmath import phase
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import pi, sqrt
+
+BALANCE = 0.02
+"""Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
+
+FREQUENCY_APART = 0.02
+"""Deviation of omega at rest from 1 above which a device is made for another frequency."""
+
+SHOWN = (0.4, 2.5)
+"""What omega is at the start of a device that shows it there at all."""
+
+REMEDIES = {
+    "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for; a network of "
+    "another one needs another device",
+    "above its current limit": "ask how it limits its current in a dip, or declare the limit that it has",
+    "wrong sign": "turn 'direction', 'form', 'signs' or 'frame_angle' of the binding, or have the FMU corrected",
+    "wrong base": "check unit, base and 'value' (rms or peak, phase or line) of current, voltage and start values",
+    "wrong frame": "set 'frame_angle' of the binding, or 'dq' for 'qd'",
+    "wrong axes": "check form, axes and 'signs' of the binding, one by one",
+    "power not as asked": "check which variables take the start values, their bases, and the voltage's base",
+}
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """A fault, by its name among `REMEDIES`, and what shows it."""
+
+    fault: str
+    evidence: str
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+    def sentence(self, name: str) -> str:
+        """The whole finding on the component of a name."""
+        return f"{name}: {self.fault}: {self.evidence}; {REMEDIES[self.fault]}"
+
+
+def omega_seen(omega: float) -> str:
+    return f"omega is {omega:.6g} at rest, in a network of its rated frequency"
+
+
+def of_frequency(omega: float, f_n: float | None) -> Misfit | None:
+    """By what it shows at rest [pu]; ``f_n`` is what is bound, where something is [Hz]."""
+    if not abs(omega - 1) > FREQUENCY_APART:
+        return None
+    known = f", so it is made for {omega * f_n:.4g} Hz where {f_n:g} Hz is bound" if f_n else ""
+    return Misfit("wrong rated frequency", omega_seen(omega) + known, {"omega": omega})
+
+
+def of_power(asked: complex, found: complex) -> Misfit | None:
+    """By the power at its start [pu, S_n]."""
+    if abs(found - asked) <= BALANCE or abs(asked) <= BALANCE:
+        return None
+    fault, says = "power not as asked", ""
+    for a, b in ((-1, 0), (0, 1), (0, -1)):
+        if abs(a * asked + b * asked.conjugate() - found) <= BALANCE * abs(asked):
+            fault, says = diagnosis("S", a, b, 0j, 0.0)
+    ratio = found / asked
+    if not says and known_ratio(abs(ratio)):
+        fault, says = diagnosis("S", ratio, 0j, 0j, 0.0)
+    return Misfit(fault, power_seen("at the start", asked, found) + (f": {says}" if says else ""))
+
+
+def of_current(size: float, limit: float | None) -> Misfit | None:
+    """By its current at rest, and the largest one that is declared [pu, S_n]."""
+    if limit is None or size <= limit * (1 + BALANCE):
+        return None
+    return Misfit("above its current limit", f"at rest {size:.3g} pu of its rating; {limit:g} pu is declared")
+
+
+def power_seen(at: str, asked: complex, found: complex) -> str:
+    return f"{at} S = {_text(found)} pu of the rating where {_text(asked)} is asked"
+
+
+def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple[str, str]:
+    """Name of the fault, and what the fit x = a·x_0 + b·conj(x_0) + c of powers S or currents i says."""
+    fit = f"{of} = ({a:.3g})·{of}_0 + ({b:.3g})·{of}_0* + ({c:.3g})"
+    if rest > BALANCE or abs(c) > BALANCE:
+        return "power not as asked", "it does not follow P_0 and Q_0" if abs(a) < BALANCE else fit
+    if abs(a) <= BALANCE and abs(b) <= BALANCE:
+        return "power not as asked", "there is no power at all"
+    if min(abs(a), abs(b)) > BALANCE:
+        return "wrong axes", f"{fit}, so its axes are scaled or signed differently"
+    if abs(b) > abs(a):
+        return "wrong sign", f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}"
+    turn = phase(a) * 180 / pi
+    if abs(abs(a) - 1) > BALANCE:
+        return "wrong base", f"the power is {abs(a):.4g} times what is asked{known_ratio(abs(a))}" + (
+            ", with the opposite sign" if abs(turn) > 178 else f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
+        )
+    if abs(turn) > 178:
+        return "wrong sign", "the power has the opposite sign"
+    return "wrong frame", f"the current is turned by {-turn:.1f}°"
+
+
+def known_ratio(ratio: float) -> str:
+    """What a factor between powers stands for; "" where it is none of the usual ones."""
+    names = {
+        sqrt(3): "√3: phase for line-to-line",
+        sqrt(2): "√2: peak for rms",
+        1.5: "3/2: of peak phase quantities",
+        3.0: "3: three phases for one",
+        1000.0: "1000: kilo",
+    }
+    for value, text in names.items():
+        for name, seen in ((text, value), (f"1/({text})", 1 / value)):
+            if abs(ratio / seen - 1) < 0.01:
+                return f" ({name})"
+    return ""
+
+
+def _text(power: complex) -> str:
+    return f"{power.real:.4g}{power.imag:+.4g}j"

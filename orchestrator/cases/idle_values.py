@@ -1,0 +1,54 @@
+"""Values that cannot act: of a part that is switched off, or of a component that is connected with no other."""
+
+import fnmatch
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from orchestrator.coupling.events import Event
+from orchestrator.coupling.system import System
+from orchestrator.errors import Problem
+
+DAMPING_CONTROLLERS = ("pod_p", "pod_q")
+"""Parts of converters that act by a gain ``K`` and have no effect at rest."""
+
+Idle = Mapping[str, Problem | None]
+"""By ``component.variable``, all values that somebody gave; with a question where one cannot act."""
+
+
+def why_idle(system: System, name: str, variable: str, moved: Collection[str] = ()) -> str:
+    """Why a parameter has no effect; empty where it may have one, as where its switch is among those that are moved."""
+    plan = system.components[name]
+    if len(system.components) > 1 and all(
+        name not in (c.source.component, c.target.component) for c in system.connections
+    ):
+        return f"{name} is connected with no other component"
+    parts = variable.split(".")
+    for part in (".".join(parts[:depth]) for depth in range(1, len(parts))):
+        for key in (f"{part}.enabled", *([f"{part}.K"] if part in DAMPING_CONTROLLERS else [])):
+            known = key != variable and key in plan.description.variables and f"{name}.{key}" not in moved
+            if known and plan.number(key) == 0:
+                return f"{name}.{key} is {str(plan.value(key)).lower()}"
+    return ""
+
+
+def idle_values(system: System, keys: Iterable[str], places: Mapping[str, str], events: Sequence[Event]) -> Idle:
+    """What keys with patterns set, and where that cannot act; a switch that is given too, or moves later, is meant."""
+    given = [
+        (name, variable)
+        for pattern, _, variable in (key.partition(".") for key in keys)
+        for name in fnmatch.filter(system.components, pattern)
+        if variable in system.components[name].description.variables
+    ]
+    moved = {f"{who}.{key}" for event in events for who, new in event.changes().items() for key in new}
+    moved |= {f"{name}.{variable}" for name, variable in given}
+    found: dict[str, Problem | None] = {}
+    for name, variable in given:
+        key, why = f"{name}.{variable}", why_idle(system, name, variable, moved)
+        found[key] = Problem(places.get(key, ""), f"{key} cannot act: {why}") if why else None
+    return found
+
+
+def idle_everywhere(scenarios: Sequence[Idle]) -> list[Problem]:
+    """The questions about values that act in none of some scenarios."""
+    acting = {name for idle in scenarios for name, question in idle.items() if question is None}
+    asked = (question for idle in scenarios for name, question in idle.items() if question and name not in acting)
+    return list(dict.fromkeys(asked))

@@ -1,0 +1,57 @@
+"""A value that cannot act is asked about, and none that acts."""
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.idle_values import idle_everywhere, idle_values, why_idle
+from orchestrator.coupling.system import System
+from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.sweep import plan_sweep
+
+CASE = load_case("two_area")
+
+
+def asked(scenarios, values):
+    first = CASE.prepare(scenarios, values)[0]
+    return [str(question) for question in first.questions if question in idle_everywhere([first.idle])]
+
+
+@pytest.mark.parametrize(("key", "name"), [("gfor.pod_p.K", "K"), ("gfor.pod_p.T_S1", "T_S1"), ("g*.pod_p.K", "K")])
+def test_a_part_that_is_off_is_named_with_its_switch(key, name):
+    (text,) = asked(["gfor"], {key: 0.1})
+    assert text == f"--set {key}: gfor.pod_p.{name} cannot act: gfor.pod_p.enabled is false"
+
+
+@pytest.mark.parametrize(
+    ("scenarios", "values"),
+    [
+        (["pod_p"], {"gfor.pod_p.K": 250, "gfor.pod_p.T_S1": 0.1, "grid.X_L": 0.3}),
+        (["gfor"], {"gfor.pod_p.K": 250, "gfor.pod_p.enabled": True}),
+        (["gfor"], {"gfor.pod_p.K": 250, "gfor.pod_p.enabled": False}),  # who says so knows it
+        (["gfor", "pod_p"], {"gfor.pod_p.K": 250}),  # it acts in one of them
+        (["gfor"], {"gfor.P_0": 0.8}),
+    ],
+)
+def test_what_acts_is_not_accused(scenarios, values):
+    prepared = CASE.prepare(scenarios, values)
+    assert idle_everywhere([one.idle for one in prepared]) == []
+    assert not any("cannot act" in str(question) for one in prepared for question in one.questions)
+
+
+def test_lead_and_lag_of_a_gain_of_0_and_what_is_connected_with_nothing():
+    (prepared,) = CASE.prepare(["pod_p"], {"gfor.pod_p.K": 0.0})
+    assert why_idle(prepared.system, "gfor", "pod_p.T_S1") == "gfor.pod_p.K is 0.0"
+    assert why_idle(prepared.system, "gfor", "pod_p.K") == ""
+    assert why_idle(prepared.system, "gfor", "pod_p.T_S1", {"gfor.pod_p.K"}) == ""
+    alone = System()
+    alone.components.update(prepared.system.components)
+    idle = idle_values(alone, ["grid.X_L"], {"grid.X_L": "here"}, ())
+    assert [str(q) for q in idle_everywhere([idle])] == [
+        "here: grid.X_L cannot act: grid is connected with no other component"
+    ]
+
+
+@pytest.mark.parametrize(("scenarios", "told"), [(["gfor"], 1), (["gfor", "pod_p"], 0)])
+def test_a_sweep_tells_of_an_axis_that_acts_in_no_scenario(scenarios, told):
+    plan = plan_sweep(CASE, [parse_vary("gfor.pod_p.K=100:200:3")], scenarios)
+    assert [str(q).startswith("--vary gfor.pod_p.K: gfor.pod_p.K cannot act") for q in plan.idle] == [True] * told

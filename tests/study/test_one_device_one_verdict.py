@@ -1,0 +1,104 @@
+"""What `gfor check` says of a device and its binding, `modes`, `run` and `certify` say of both in the same words."""
+
+import json
+import re
+
+import pytest
+
+from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.cli import main
+from orchestrator.errors import ComponentError
+from orchestrator.fmi.instance import open_component
+from tests.support import vendor
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return vendor.device(tmp_path_factory.mktemp("vendor"))
+
+
+@pytest.fixture
+def typed(fmu, tmp_path, capfd, monkeypatch):
+    """A command in a folder with the device, a binding of it and a case."""
+    (tmp_path / "vendor.fmu").write_bytes(fmu.read_bytes())
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words, **bound):
+        f_n = bound.get("f_n", 50.0)
+        vendor.binding(tmp_path, **bound)
+        vendor.case(tmp_path, f_n)
+        code = main([*map(str, words)])
+        out, err = capfd.readouterr()
+        return code, out, re.sub(r"\s+", " ", err)
+
+    return run
+
+
+def checked(typed, *only, **bound):
+    words = [word for name in only for word in ("--only", name)]
+    _, out, _ = typed("check", "vendor.fmu", "--binding", "vendor.toml", *words, "--json", **bound)
+    return {check["check"]: check for check in json.loads(out)["checks"]}
+
+
+WRONG = {"f_n": 60.0}
+
+
+def test_another_frequency_is_found_alike_and_nothing_slips(typed):
+    found = checked(typed, "rated_frequency", **WRONG)["rated_frequency"]
+    assert found["fault"] == "wrong rated frequency"
+    assert "made for 50 Hz where 60 Hz is bound" in found["evidence"]
+    sentence = f"gfor: {found['fault']}: {found['evidence']}; {found['remedy']}"
+    _, out, said = typed("run", "case.toml", "--out", "r", "--json", **WRONG)
+    (summary,) = json.loads(out)
+    kinds = {finding["kind"]: finding for finding in summary["findings"]}
+    assert sentence in said
+    assert "loss_of_synchronism" not in kinds
+    assert kinds["misfit"]["message"] == sentence
+    _, out, said = typed("modes", "case.toml", "--black-box", "--json", **WRONG)
+    assert sentence in json.loads(out)["scenarios"][0]["warnings"]
+    assert "wrong rated frequency" in typed("modes", "case.toml", "--black-box", **WRONG)[1]
+
+
+@pytest.mark.parametrize(
+    ("bound", "check", "fault"),
+    [
+        ({"direction": "into the converter"}, "power_balance", "wrong sign"),
+        ({"i_max": 0.4}, None, "above its current limit"),  # `check` asks with dips, which take long
+    ],
+)
+def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
+    if check:
+        assert checked(typed, check, **bound)[check]["fault"] == fault
+    said = typed("run", "case.toml", "--out", "r", **bound)[2]
+    assert f"gfor: {fault}: " in said
+    assert REMEDIES[fault] in said
+
+
+@pytest.mark.parametrize("bound", [{"v_n": 230.0}, {"rating": 4.0}])
+def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
+    told = checked(typed, "binding", **bound)["binding"]
+    assert told["verdict"] == "remark"
+    said = typed("run", "case.toml", "--out", "r", **bound)[2]
+    assert told["evidence"] in said
+    component = open_component("gfor", bound_fmu(fmu, vendor.binding(tmp_path, **bound)))
+    try:
+        with pytest.raises(ComponentError, match="likely cause: the binding has"):
+            component.check(3, "fmi2DoStep", 0.1)
+    finally:
+        component.close()
+
+
+def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
+    code, out, said = typed("run", "case.toml", "--out", "r", "--json")
+    assert code == 0
+    assert not [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
+    assert "the binding has" not in said
+    assert checked(typed, "binding", "rated_frequency")["binding"]["verdict"] == "pass"
+    component = open_component("gfor", bound_fmu(fmu, vendor.binding(tmp_path)))
+    try:
+        with pytest.raises(ComponentError) as caught:
+            component.check(3, "fmi2DoStep", 0.1)
+        assert "the binding has" not in str(caught.value)
+    finally:
+        component.close()
