@@ -29,6 +29,7 @@ _UNFINISHED = 3600.0
 """Age of a file that is still being written at which nobody writes it any more [s]; it takes seconds."""
 
 _locks: dict[Path, int] = {}
+_left = set[Path]()
 _swept = set[Path]()
 _process = os.getpid()
 
@@ -74,9 +75,14 @@ def _under_lock(new: Path) -> Path:
 def _remove_own() -> None:
     """Remove what an interrupt left; a copy of this process, which has the same list, removes nothing."""
     if os.getpid() == _process:
-        for folder in [*_locks]:
+        for folder in {*_locks} - _left:
             with contextlib.suppress(OSError):
                 remove(folder)
+
+
+def leave(folder: Path) -> None:
+    """Have the end of this process leave a folder to who removes it even later."""
+    _left.add(folder)
 
 
 def remove(folder: Path) -> None:

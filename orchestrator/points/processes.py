@@ -17,7 +17,7 @@ from multiprocessing.context import BaseContext
 from types import FrameType
 from typing import Any
 
-from fmus.toolchain.temporary import own_folder, remove
+from fmus.toolchain.temporary import leave, own_folder, remove
 from orchestrator.fmi.interrupts import calls
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
 
@@ -163,6 +163,7 @@ def _sockets_in_an_own_folder() -> None:
         multiprocessing.util.get_temp_dir()
     finally:
         tempfile.tempdir = before
+    leave(folder)  # whichever of the two modules was imported first
     multiprocessing.util.Finalize(None, remove, args=(folder,), exitpriority=-101)  # it removes its own at -100
 
 
