@@ -36,8 +36,8 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         )
         if computed and (need or abs(complex(given["P_0"], given["Q_0"])) > _FULL):
             text += (
-                ". Give others more of the power (P_0 of units), lower the loads or the reactive power around it, or "
-                "correct a limit that is wrong in its data"
+                ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "
+                "loads or the reactive power around it, or correct a limit that is wrong in its data"
             )
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU

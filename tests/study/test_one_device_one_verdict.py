@@ -6,6 +6,7 @@ import re
 import pytest
 
 from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.runner import check_fmu
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cli import main
 from orchestrator.errors import ComponentError
@@ -44,6 +45,7 @@ def checked(typed, *only, **bound):
 WRONG = {"f_n": 60.0}
 
 
+@pytest.mark.slow
 def test_another_frequency_is_found_alike_and_nothing_slips(typed):
     found = checked(typed, "rated_frequency", **WRONG)["rated_frequency"]
     assert found["fault"] == "wrong rated frequency"
@@ -102,3 +104,11 @@ def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
         assert "the binding has" not in str(caught.value)
     finally:
         component.close()
+
+
+def test_units_that_a_binding_converts_are_not_accused(tmp_path):
+    """The device calls its ports v_re and i_re as ours does, in kV and kA."""
+    path = vendor.device(tmp_path)
+    bound = check_fmu(path, vendor.binding(tmp_path), only=("units",), run_for=0.3)
+    assert bound.faults == []
+    assert check_fmu(path, None, only=("units",), run_for=0.3).faults == ["wrong units"]

@@ -50,7 +50,8 @@ def fmi_validity(subject: Subject) -> CheckResult:
 @check("units", "Are units declared, known, and what their definitions say?")
 def units(subject: Subject) -> CheckResult:
     described = without_binding(subject.description)
-    wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described)
+    bound = described is not subject.description
+    wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described, bound=bound)
     if wrong:
         return failed("units", "wrong units", some_of(wrong))
     open_ends = [
@@ -91,8 +92,8 @@ def _power(key: str, exponents: dict[str, int]) -> str:
     return f"{key}^{exponents[key]}"
 
 
-def _wrong_port_units(described: FmuDescription) -> list[str]:
-    """Where an FMU has our port's names, its units must be able to mean the port."""
+def _wrong_port_units(described: FmuDescription, *, bound: bool) -> list[str]:
+    """Where an FMU has our port's names, its units must be able to mean the port; a binding may convert them."""
     variables = described.variables
     if not set(_PORT_UNITS) <= set(variables):
         return []
@@ -103,7 +104,7 @@ def _wrong_port_units(described: FmuDescription) -> list[str]:
     ] + [
         f"{name} is declared in {variables[name].unit!r}; without a binding it must be pu"
         for name, allowed in _PORT_UNITS.items()
-        if variables[name].unit in allowed[1:]
+        if variables[name].unit in allowed[1:] and not bound
     ]
 
 
