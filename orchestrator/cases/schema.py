@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ModelWrapValidatorHandler, PrivateAttr, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
 from orchestrator.cases.names import file_name
 from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
@@ -382,7 +382,7 @@ class BusFaultTable(GridEventBase):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _noting_units(cls, given: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+    def _noting_units(cls, given: Any, handler: Callable[[Any], Self]) -> Self:
         found = handler(given)
         found._bare = isinstance(given, dict) and not isinstance(given.get("duration"), str)
         return found
