@@ -1,7 +1,7 @@
 """What does not fit between foreign devices and their bindings, seen at the start of a coupled system."""
 
 from cmath import rect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.binding.misfits import SHOWN, Misfit, of_current, of_frequency, of_power
@@ -24,7 +24,7 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
     return {name: misfits for name, misfits in found.items() if misfits}
 
 
-def sentences(found: dict[str, list[Misfit]]) -> tuple[str, ...]:
+def sentences(found: Mapping[str, list[Misfit]]) -> tuple[str, ...]:
     return tuple(misfit.sentence(name) for name, misfits in found.items() for misfit in misfits)
 
 

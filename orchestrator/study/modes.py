@@ -51,6 +51,9 @@ from orchestrator.study.start_errors import start_error
 _LEADING = 3
 """Of the states of an electromechanical mode: angle and speed of one machine, and the speed of another."""
 
+BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
+"""Identifies components of a running system that hide their states."""
+
 
 @dataclass(frozen=True)
 class ModesResult:
@@ -172,9 +175,7 @@ def linearised(
     directional: bool = False,
 ) -> "Linearised":
     """The same before its eigenvalues are computed."""
-    said = start_warnings(master)
-    misfits = misfits_of(master)
-    said = (*sentences(misfits), *start_warnings(master))
+    misfits, said = misfits_of(master), start_warnings(master)
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
@@ -188,12 +189,11 @@ def modes_from(
     blocks: Blocks,
     frequency_range: tuple[float, float],
     critical: float | None = None,
-    black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
+    black_boxes: BlackBoxes | None = None,
 ) -> ModesResult:
     """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
     misfits = misfits_of(master)
-    said = sentences(misfits)
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits, black_boxes))
+    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, (), misfits, black_boxes))
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -206,7 +206,7 @@ def _computed(system: "Linearised") -> ModesResult:
 class Linearised:
     """A linearised scenario, whose eigenvalues other threads compute meanwhile.
 
-    ``said`` are earlier warnings, ``misfits`` as `misfits_of`.
+    ``said`` are earlier warnings, behind those of ``misfits``, which are as `misfits_of` gives them.
     """
 
     def __init__(
@@ -219,11 +219,11 @@ class Linearised:
         critical: float | None,
         said: tuple[str, ...] = (),
         misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
-        black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
+        black_boxes: BlackBoxes | None = None,
     ) -> None:
         self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
-        self._range, self._critical, self._said = frequency_range, critical, said
+        self._range, self._critical, self._said = frequency_range, critical, (*sentences(misfits), *said)
         self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
         self.named: NamedSystem | None = None
@@ -330,7 +330,7 @@ def identified(
     at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None,
     *,
     directional: bool = False,
-    black_boxes: Callable[[Master], Mapping[str, ComponentLinearization]] | None = None,
+    black_boxes: BlackBoxes | None = None,
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 

@@ -170,10 +170,12 @@ def _run(
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
-        misfits = misfits_of(master)
-        started = (*sentences(misfits), *start_warnings(master)) if reasons else ()
-        modes = unknown_modes(prepared, reasons) if reasons else modes_of(prepared, master, frequency_range)
-        modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
+        if reasons:
+            misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
+            started = (*sentences(misfits), *start_warnings(master))
+            modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
+        else:
+            modes = modes_of(prepared, master, frequency_range)
         if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
@@ -191,7 +193,7 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    findings = watch.findings(failure, master.late_starts, misfits)
+    findings = watch.findings(failure, master.late_starts, modes.misfits)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
