@@ -12,6 +12,7 @@ from orchestrator.api.executors import computing
 from orchestrator.api.show import page
 from orchestrator.api.values import Names, whole_number
 from orchestrator.api.values import names as names_given
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
 from orchestrator.coordinated_design.study import (
     PointsDesign,
@@ -21,7 +22,6 @@ from orchestrator.coordinated_design.study import (
 )
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
-from orchestrator.pod_design.target import CONTROLLERS
 
 WORKERS_IMPORT = ("orchestrator.coordinated_design.worker",)
 """Modules that a process of a design imports once, before its first point."""
@@ -57,10 +57,10 @@ def request_of(controllers: Sequence[str], wanted: WantedOverPoints, **rest: Any
         If one of the wishes is unknown, not of its kind or outside of its range; it is named.
     """
     for controller in controllers:
-        if controller not in CONTROLLERS:
-            raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
+        if controller not in DAMPING_CONTROLLERS:
+            raise InputError(f"there is no controller {controller!r}; there are: {', '.join(DAMPING_CONTROLLERS)}")
     if not controllers:
-        raise InputError(f"controllers is empty; name one or both of {', '.join(CONTROLLERS)}")
+        raise InputError(f"controllers is empty; name one or both of {', '.join(DAMPING_CONTROLLERS)}")
     known = tuple(WantedOverPoints.__annotations__)
     own = in_ratios(wanted)
     if unknown := [name for name in own if name not in known]:

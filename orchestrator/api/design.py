@@ -12,13 +12,13 @@ from orchestrator.api.show import page
 from orchestrator.api.values import path as path_of
 from orchestrator.api.values import text_or_none
 from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cases.parameter_files import ParameterFile, parameter_file_text
 from orchestrator.cases.schema import Value
 from orchestrator.coordinated_design.one_point import search_settings
 from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, PodDesign, StageReport, design_pod
 from orchestrator.pod_design.files import design_json, parameters_of, provenance
-from orchestrator.pod_design.target import CONTROLLERS
 from orchestrator.points.store import PointStore
 from orchestrator.safe_files import write_text
 
@@ -173,8 +173,8 @@ def design_controller(
     store
         Keeps figures on the way, as `design_pod` takes it.
     """
-    if controller not in CONTROLLERS:
-        raise InputError(f"there is no controller {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    if controller not in DAMPING_CONTROLLERS:
+        raise InputError(f"there is no controller {controller!r}; there are: {', '.join(DAMPING_CONTROLLERS)}")
     unknown = [name for name in wanted if name not in Wanted.__annotations__]
     if unknown:
         known = ", ".join(Wanted.__annotations__)

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.criteria import LEAST_DAMPING
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.study import Certification
@@ -34,6 +36,9 @@ class CriterionMargin:
     text: str
 
 
+Margin = TypeVar("Margin", CriterionMargin, RowFinding)
+
+
 def margins_of(certificate: Certification | CodeCertificate) -> list[CriterionMargin]:
     """All criteria that count towards the verdict."""
     if isinstance(certificate, CodeCertificate):
@@ -44,7 +49,7 @@ def margins_of(certificate: Certification | CodeCertificate) -> list[CriterionMa
     return [margin for v in certificate.verdicts if v.judged for margin in _of_point(v)]
 
 
-def narrowest(margins: Sequence[CriterionMargin]) -> CriterionMargin | None:
+def narrowest(margins: Sequence[Margin]) -> Margin | None:
     """The criterion with the least margin; None where none has a figure."""
     known = [m for m in margins if m.margin is not None]
     return min(known, key=lambda m: m.margin or 0.0, default=None)

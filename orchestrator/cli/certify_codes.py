@@ -15,7 +15,7 @@ from orchestrator.certification.codes.certificate import CodeCertificate, certif
 from orchestrator.certification.codes.record import figures_of, save_certificate
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.devices import Device
-from orchestrator.certification.margins import margin_text
+from orchestrator.certification.margins import margin_text, narrowest
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.certificate import certified
@@ -108,7 +108,7 @@ def verdict_table(found: CodeCertificate) -> PlainTable:
     table.add_row("all", Text(found.verdict, style=f"bold {colour}"), "", "", ", ".join(counted))
     for v in found.verdicts:
         known = [f for f in v.findings if f.accepted is not None]
-        least = min((f for f in known if f.margin is not None), key=lambda f: f.margin or 0.0, default=None)
+        least = narrowest(known)
         word = NOT_JUDGED if v in unknown else NO_VERDICT if not v.judged else "fails" if v in bad else "accepted"
         remark = v.unknown or "; ".join(f.criterion for f in v.failed) or (least.criterion if least else "")
         margin = "–" if least is None else margin_text(least.margin, least.limit, least.value)

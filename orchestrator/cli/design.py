@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from orchestrator.api.design import Wanted, design_controller, parameter_file_path
 from orchestrator.cases.case import load_case
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cli.arguments import percent, positive
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
 from orchestrator.cli.design_points import add_points_arguments, run_over_points
@@ -21,7 +22,6 @@ from orchestrator.cli.verdict import NOT_MET, add_verdict_argument, exit_code, p
 from orchestrator.errors import CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import first_screen, sheet
-from orchestrator.pod_design.target import CONTROLLERS
 from orchestrator.points.store import PointStore, any_kept
 
 
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--controller",
         action="append",
         required=True,
-        choices=CONTROLLERS,
+        choices=DAMPING_CONTROLLERS,
         help="the controller to design (with --points repeatable)",
     )
     parser.add_argument(

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.cases.case import Case
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
-
-CONTROLLERS = ("pod_p", "pod_q")
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[
 def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
     return not any(
         plan[name].value(f"{controller}.enabled")
-        for controller in CONTROLLERS
+        for controller in DAMPING_CONTROLLERS
         for name in with_controller(plan, controller)
     )
 
