@@ -271,6 +271,7 @@ def _read_device(path: Path) -> None:
     try:
         _, table = read_device_file(path)
         device = device_of(path, table, INTERFACE)
+        INTERFACE.with_defaults(device.parameters)
         device.around("device")
     except DeviceFileError as error:  # those who call make it an InputError
         raise CosimError(str(error)) from error
