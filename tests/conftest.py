@@ -2,6 +2,7 @@
 
 import os
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cli import main
+from tests.support.durations import MEASURED, Measure, mark
 from tests.support.skips import Skips, in_ci
 
 
@@ -20,6 +22,13 @@ def pytest_configure(config):
     """In CI a skip that is not on the list fails the session; with xdist the process that started the others counts."""
     if in_ci() and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
+    if MEASURED in os.environ:
+        config.pluginmanager.register(Measure(Path(os.environ[MEASURED])), "seconds")
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses by the marks
+def pytest_collection_modifyitems(items):
+    mark(items)
 
 
 @pytest.fixture(scope="session")

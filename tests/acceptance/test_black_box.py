@@ -39,6 +39,7 @@ def test_direct_feedthrough_is_measured_without_a_step(gallery):
     assert np.abs(shunted.strictly_proper - plain.strictly_proper).max() < 0.05 * np.abs(plain.values).max()
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_vendors_black_box_is_certified_and_does_something_to_the_modes(gallery, tmp_path):
     fmu, binding = gallery("converter_power_si")

@@ -1,6 +1,6 @@
 """Every faulty FMU is caught by the name of its fault, and no good one is failed: the confusion table.
 
-`.ci/nightly` makes the whole of it; a landing looks at all good ones and a part of the others.
+`.ci/nightly` makes the whole of it; a landing looks at a part of them.
 """
 
 import os
@@ -190,9 +190,9 @@ def test_pages_and_table_count_the_galleries_members():
 
 
 @pytest.mark.slow
-def test_good_ones_pass_and_some_faulty_ones_are_caught(gallery):
-    """Of the whole table, which is made each night, all good ones and every eighth faulty one."""
-    rows = [("", m) for m in good()] + [(m.fault, m) for m in faulty()[::8]]
+def test_some_good_ones_pass_and_some_faulty_ones_are_caught(gallery):
+    """Of the whole table, which is made each night, every third good one and every sixteenth faulty one."""
+    rows = [("", m) for m in good()[::3]] + [(m.fault, m) for m in faulty()[::16]]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         reports = list(pool.map(lambda row: checked(*gallery(row[1].name), row[1].only), rows))
     for (fault, member), report in zip(rows, reports, strict=True):

@@ -103,6 +103,7 @@ def test_start_values_and_parameters_of_a_binding(tmp_path, short, fmu_path, cap
     assert stated([*point["modes"], *point["modes_beside"]]) == modes_again(point, "with", capsys)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("foreign", [True, False])
 def test_a_black_box(tmp_path, short, gallery, fmu_path, capsys, monkeypatch, foreign):

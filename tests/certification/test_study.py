@@ -280,6 +280,7 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     assert ('<span class="bad">not accepted</span>' in page) == (result.verdict == "fails")
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_converter_that_hides_its_states_gets_the_same_verdict(tmp_path, executor, fmu_path):
     results = [

@@ -115,7 +115,8 @@ def test_mutated_files_of_fmi_3_are_read_or_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_ten_thousand_mutated_files_are_read_or_refused(plain, fmu_path, tmp_path):
+@pytest.mark.parametrize("count", [1_000, pytest.param(10_000, marks=pytest.mark.nightly)])
+def test_thousands_of_mutated_files_are_read_or_refused(plain, fmu_path, tmp_path, count):
     slim = tmp_path / "slim.fmu"
     with zipfile.ZipFile(fmu_path("gfor")) as source, zipfile.ZipFile(slim, "w", zipfile.ZIP_DEFLATED) as target:
         for name in source.namelist():
@@ -126,7 +127,8 @@ def test_ten_thousand_mutated_files_are_read_or_refused(plain, fmu_path, tmp_pat
     folders = [tmp_path / str(k) for k in range(2)]
     for folder in folders:
         folder.mkdir()
+    half = count // 2
     with ThreadPoolExecutor() as pool:
-        found = list(pool.map(lambda k: _fuzz(1000 + 5000 * k, 5000, folders[k], [plain, slim]), range(2)))
-    assert sum(sum(counts.values()) for counts in found) == 10_000
-    assert all(min(counts.values()) > 500 for counts in found)
+        found = list(pool.map(lambda k: _fuzz(1000 + half * k, half, folders[k], [plain, slim]), range(2)))
+    assert sum(sum(counts.values()) for counts in found) == count
+    assert all(min(counts.values()) > count // 20 for counts in found)

@@ -199,6 +199,7 @@ def test_a_device_that_hides_its_states_is_refused_with_the_remedy():
     assert advice == [True, False]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_device_that_is_identified_damps_as_with_its_states(fmu_path, tmp_path):
     shown, hidden = fmu_path("gfl_l2ep", native=True), tmp_path / "hidden.fmu"

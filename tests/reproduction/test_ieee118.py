@@ -68,6 +68,7 @@ def test_the_power_flow_gives_the_published_reactive_powers():
         assert power.imag == pytest.approx(float(row["q_mvar"]), abs=0.3)  # its voltages are given to five digits
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_another_share_of_converters_moves_every_mode():
     half = compute_modes(prepare("gfor", {"units.alpha": 0.5})).named["1-2"]
@@ -75,6 +76,7 @@ def test_another_share_of_converters_moves_every_mode():
     assert len(prepare("gfor", {"units.alpha": 1.0}).system.components) == 29
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_which_coupling_is_stable_is_known_before_any_run():
     ready = prepare("gfor")
@@ -89,6 +91,7 @@ def test_which_coupling_is_stable_is_known_before_any_run():
     assert "against the unstable coupling, take a step of 0.0002 s" in advice
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_twenty_undisturbed_seconds_stay_where_they_began():
     ready = prepare("pod_pq", NATIVE)
@@ -98,6 +101,7 @@ def test_twenty_undisturbed_seconds_stay_where_they_began():
     assert max(drift.values()) < 1e-10  # pu; 2e-13 was seen
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_thirty_seconds_after_a_load_step_ring_down_with_the_mode():
     ready = prepare("pod_pq", NATIVE, stop_time=30.0)
@@ -115,6 +119,7 @@ PAPER_GOVERNOR = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "frequency", "damping"), [("base", 0.711, 6.06), ("gfor", 0.759, 7.52), ("pod_pq", 0.813, 13.97)]

@@ -76,6 +76,7 @@ def test_an_outage_has_modes_of_its_own():
     assert outage.frequency_hz < whole.frequency_hz - 0.01
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_line_trips_and_recloses_and_a_unit_trips():
     ready = prepare("line_trip", stop_time=6.0)

@@ -109,6 +109,7 @@ def test_a_requirement_out_of_reach_is_said_to_be():
     assert "surveyed" in d.refinement.notes[-1]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_a_survey_finds_what_the_search_from_the_design_does_not():
     """The search ends at 15.0 %; far from the design there is a setting with the 15.9 % that are asked for."""
@@ -201,6 +202,7 @@ def test_a_requirement_that_is_none():
         design("pod_p", damping_increment=0.95)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_one_setting_for_all_converters_of_the_118_bus_system():
     d = design("pod_p", "ieee118", component="gfor*", mode="1-2")

@@ -12,7 +12,7 @@ from orchestrator.study.modes import compute_modes
 from orchestrator.study.run import run_scenario
 from tests.support.exact import exact_continuous
 
-pytestmark = pytest.mark.reproduction
+pytestmark = [pytest.mark.reproduction, pytest.mark.quick]
 
 FIGURES = json.loads((Path(__file__).parents[1] / "reference" / "two_area.json").read_text())
 SCENARIOS = ("base", "gfor", "pod_p", "pod_q", "pod_pq")

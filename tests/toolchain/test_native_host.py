@@ -79,6 +79,7 @@ def everywhere(tmp_path_factory):
     shutil.rmtree(folder)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_another_machine_builds_the_same_file(everywhere, tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))

@@ -1,0 +1,54 @@
+"""Which tests take long: a list, measured by `python -m tests.benchmarks.durations`, marks them as slow.
+
+A newcomer's tests (``-m "not slow"``) so stay within minutes, without a mark at each of hundreds of tests. A test that
+is not on the list, for example a new one, counts as quick.
+"""
+
+import os
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+LIST = Path(__file__).parents[1] / "slow_tests.txt"
+"""A line is ``SECONDS TEST``: seconds of processor, and what pytest calls the test."""
+
+LONGEST = 0.6
+"""Seconds of processor from which on a test stands on the list."""
+
+MEASURED = "GFOR_TEST_SECONDS"
+"""Environment variable with the file to which `Measure` adds a line for each test."""
+
+
+def read_list(path: Path = LIST) -> dict[str, float]:
+    """Seconds by test."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return {test: float(seconds) for seconds, _, test in (line.partition(" ") for line in lines if line)}
+
+
+def mark(items: list[pytest.Item]) -> None:
+    """Mark as slow what is on the list; the paper's tables are among the quick ones whatever they take."""
+    listed = read_list()
+    for item in items:
+        if item.nodeid in listed and not item.get_closest_marker("quick"):
+            item.add_marker("slow")
+
+
+class Measure:
+    """Writes the seconds of processor of each test, with those of the processes that it waited for."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
+        before = _processor()
+        try:
+            return (yield)
+        finally:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(f"{_processor() - before:.2f} {item.nodeid}\n")
+
+
+def _processor() -> float:
+    return sum(os.times()[:4])

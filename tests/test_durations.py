@@ -1,0 +1,43 @@
+"""The list of tests that take long, and how it marks them."""
+
+import pytest
+
+from tests.support.durations import LIST, LONGEST, Measure, mark, read_list
+
+
+class Item:
+    def __init__(self, nodeid, *names):
+        self.nodeid, self.names = nodeid, set(names)
+
+    def get_closest_marker(self, name):
+        return name in self.names or None
+
+    def add_marker(self, name):
+        self.names.add(name)
+
+
+def test_what_is_on_the_list_is_slow_unless_it_is_always_to_be_quick():
+    listed = next(iter(read_list()))
+    items = [Item(listed), Item(listed, "quick"), Item("tests/test_new.py::test_new")]
+    mark(items)
+    assert [item.names for item in items] == [{"slow"}, {"quick"}, set()]
+
+
+def test_the_list_names_tests_of_files_that_are_there_each_once():
+    lines = LIST.read_text(encoding="utf-8").splitlines()
+    seconds = read_list()
+    assert len(lines) == len(seconds)
+    assert min(seconds.values()) >= LONGEST
+    missing = {test.partition("::")[0] for test in seconds if not (LIST.parents[1] / test.partition("::")[0]).exists()}
+    assert not missing, "python -m tests.benchmarks.durations writes the list anew"
+
+
+def test_a_test_is_measured(tmp_path):
+    around = Measure(tmp_path / "seconds").pytest_runtest_protocol(Item("tests/a.py::test[a b]"))
+    next(around)
+    sum(k * k for k in range(1_000_000))
+    with pytest.raises(StopIteration):
+        around.send(True)
+    ((test, seconds),) = read_list(tmp_path / "seconds").items()
+    assert test == "tests/a.py::test[a b]"
+    assert 0.01 <= seconds < 10
