@@ -15,7 +15,7 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
     ("orchestrator.arrays", "orchestrator.cores", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
-    ("orchestrator.safe_files", "orchestrator.toml_files"),
+    ("orchestrator.asked", "orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import pandas as pd
 
@@ -12,7 +12,7 @@ from orchestrator.api.coordinated_design import WORKERS_IMPORT as COORDINATED_IM
 from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
 from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
-from orchestrator.api.design_wishes import in_ratios
+from orchestrator.api.design import request_of as design_of
 from orchestrator.api.executors import Compute, Plan, Shown, choose_executor
 from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
 from orchestrator.api.interactions import Interactions, WantedInteractions
@@ -25,20 +25,10 @@ from orchestrator.api.screening import Screening
 from orchestrator.api.screening import compute as screened
 from orchestrator.api.show import page
 from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
-from orchestrator.api.values import (
-    Names,
-    Paths,
-    Time,
-    case_values,
-    damping_percent,
-    flag,
-    frequency_range,
-    in_seconds,
-    parameter_files,
-    text_or_none,
-)
-from orchestrator.api.values import names as names_given
+from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
+from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
+from orchestrator.asked import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
@@ -343,8 +333,8 @@ class Case:
         0  00:00          0.58            10.57
         """
         executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
-        ratio = damping_percent(damping, "damping", most=100 * MOST_DAMPING)
-        wanted = CriticalRegion(*frequency_range(frequencies), ratio or 0.0)
+        ratio = percent(damping, "damping", most=100 * MOST_DAMPING)
+        wanted = CriticalRegion(*frequency_range(frequencies), ratio)
         if sharing is not None and sharing not in list(SharingRule):
             raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
         planned = plan_screening(
@@ -440,13 +430,10 @@ class Case:
         >>> design.parameters["gfor.pod_p.K"]
         200.0
         """
-        files = parameter_files(parameters)
-        step_size = in_seconds(step, "step")
-        ratios = cast("Wanted", in_ratios(wanted))
+        request = design_of(controller, wanted, scenario, overrides=case_values(values),
+                            parameters=parameter_files(parameters), step_size=in_seconds(step, "step"))  # fmt: skip
         with shown_stages(shown=progress) as report:
-            design = design_controller(
-                self.file, controller, scenario, case_values(values), step_size, files, ratios, report=report
-            )
+            design = design_controller(self.file, request, report=report)
         question([design.result.prepared])
         return design
 

@@ -11,7 +11,8 @@ from orchestrator.analysis.identification import IdentifiedMode, Sampling, sampl
 from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, straight_line
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
-from orchestrator.api.values import Time, moment, text_or_none
+from orchestrator.api.values import Time, moment
+from orchestrator.asked import text_or_none
 from orchestrator.errors import InputError
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import warn_of_early_end

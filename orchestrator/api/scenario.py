@@ -15,19 +15,10 @@ from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.api.sensitivities import Sensitivities
 from orchestrator.api.show import page
-from orchestrator.api.values import (
-    Names,
-    Paths,
-    Time,
-    case_values,
-    damping_percent,
-    frequency_range,
-    in_seconds,
-    parameter_files,
-    plain_value,
-)
-from orchestrator.api.values import names as names_given
+from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
+from orchestrator.asked import Names, frequency_range, percent, plain_value
+from orchestrator.asked import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.load_models import as_powers, is_open
@@ -172,7 +163,8 @@ class Scenario:
         """
         from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
 
-        frequencies, critical = frequency_range(frequencies), damping_percent(critical, "critical")
+        frequencies = frequency_range(frequencies)
+        critical = None if critical is None else percent(critical, "critical")
         if critical is not None and not frequencies[0] > 0:
             raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
         if not black_box:

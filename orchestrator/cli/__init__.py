@@ -231,12 +231,26 @@ class _Parser(argparse.ArgumentParser):
         return f"{EXAMPLES}\n{super().format_help()}"
 
 
+class _Command(argparse.ArgumentParser):
+    """A command's parser; it says what a reader of an option says is wrong."""
+
+    def _get_value(self, action: argparse.Action, text: str) -> Any:
+        try:
+            return super()._get_value(action, text)
+        except InputError as error:
+            raise argparse.ArgumentError(action, str(error)) from error
+        except argparse.ArgumentError as error:
+            if isinstance(error.__context__, ValueError) and not isinstance(action.type, type):
+                raise argparse.ArgumentError(action, str(error.__context__)) from error
+            raise
+
+
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
     parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
     parser.set_defaults(command=lambda _: _first_page())
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    commands = parser.add_subparsers(metavar="COMMAND", parser_class=argparse.ArgumentParser)
+    commands = parser.add_subparsers(metavar="COMMAND", parser_class=_Command)
     for name, words in COMMANDS.items():
         command = commands.add_parser(name, help=words)
         if name == chosen:

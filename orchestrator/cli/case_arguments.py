@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from orchestrator.api.scenario import Scenario, choose
 from orchestrator.cases.case import load_case
@@ -11,6 +12,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.cli.arguments import assignment, seconds
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
+from orchestrator.errors import InputError
 
 
 def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False) -> None:
@@ -93,6 +95,14 @@ def values_set(options: argparse.Namespace) -> dict[str, Value]:
         values.pop(key, None)
         values[key] = value
     return values
+
+
+def of_one_scenario(options: argparse.Namespace, rule: str) -> dict[str, Any]:
+    """Scenario, values, step and parameter files for a study of one scenario; ``rule`` says that it is of one."""
+    if len(options.scenario) > 1:
+        raise InputError(f"--scenario: {rule}, not for {' and '.join(options.scenario)}; start it once for each")
+    return {"scenario": next(iter(options.scenario), None), "overrides": values_set(options),
+            "step_size": options.step, "parameters": parameters(options)}  # fmt: skip
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.comtrade import export_comtrade
-from orchestrator.cli.arguments import positive
+from orchestrator.asked import read_positive
 from orchestrator.cli.terminal import saying_warnings
 
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="FILE.cfg", help="the recording (default: <RUN>/trajectory.cfg)")
     parser.add_argument("--form", default="BINARY32", type=str.upper, metavar="FORM",
                         help="ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)")  # fmt: skip
-    parser.add_argument("--frequency", type=positive, metavar="HZ", help="rated frequency [Hz] (the run's)")
+    parser.add_argument("--frequency", type=read_positive, metavar="HZ", help="rated frequency [Hz] (the run's)")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.dll import export_dll
-from orchestrator.cli.arguments import positive
+from orchestrator.asked import read_positive
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 from orchestrator.units import read_value
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--platform", action="append", metavar="PLATFORM", help="linux64, win32 or win64 (repeatable; default: all)"
     )
     parser.add_argument(
-        "--sample-time", type=positive, default=2e-5, metavar="S", help="time between two calls [s] (20e-6)"
+        "--sample-time", type=read_positive, default=2e-5, metavar="S", help="time between two calls [s] (20e-6)"
     )
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="default of a parameter (repeatable)"

@@ -2,17 +2,11 @@
 
 import argparse
 
+from orchestrator.asked import read_whole
 from orchestrator.cli.arguments import seconds
 from orchestrator.cli.terminal import make_errors
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
-
-
-def port(text: str) -> int:
-    """A port that a broker can listen on; it takes the next one as well."""
-    if not text.isdigit() or not 1 <= int(text) <= 65534:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1 to 65534")
-    return int(text)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                        help="components whose federates others start: `gfor federate`, or a program")  # fmt: skip
     group.add_argument("--broker", metavar="ADDRESS", help="a broker that runs, such as tcp://host:23405 "
                        "(default: gfor starts one for this machine alone)")  # fmt: skip
-    group.add_argument("--broker-port", type=port, metavar="PORT",
+    group.add_argument("--broker-port", type=read_whole(1, 65534, "a port"), metavar="PORT",
                        help="start the broker at this port of all network interfaces")  # fmt: skip
     group.add_argument("--patience", type=seconds, default=None, metavar="T",
                        help=f"longest time of a federate for one step [s] (default: {PATIENCE:g})")  # fmt: skip
@@ -36,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def names(text: str) -> tuple[str, ...]:
     found = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
     if not all(found):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")
+        raise ValueError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")
     return found
 
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario
-from orchestrator.cli.arguments import frequency_range, percent
+from orchestrator.asked import read_percent, read_range
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
     make_console,
@@ -35,14 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
     parser.add_argument(
         "--range",
-        type=frequency_range,
+        type=read_range,
         default=ELECTROMECHANICAL_HZ,
         metavar="LO:HI",
         help="frequencies shown [Hz] (default: 0.1:2)",
     )
     parser.add_argument(
         "--critical",
-        type=percent,
+        type=read_percent,
         nargs="?",
         const=0.2,
         metavar="PERCENT",

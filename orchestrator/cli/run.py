@@ -11,8 +11,9 @@ from typing import Any
 from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
+from orchestrator.asked import read_whole
 from orchestrator.cli import checkpoints, federates, like, run_request
-from orchestrator.cli.arguments import seconds, threads, tolerance
+from orchestrator.cli.arguments import seconds, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
@@ -24,6 +25,7 @@ from orchestrator.cli.terminal import (
     print_warnings,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
+from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
@@ -54,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
     parser.add_argument(
         "--threads",
-        type=threads,
+        type=read_whole(1, MOST_THREADS),
         metavar="N",
         help="threads that step native FMUs (default: as many as are faster than one, up to one for each core); "
         "no value depends on it",

@@ -4,6 +4,7 @@ import argparse
 import json
 import shutil
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -11,10 +12,11 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.screening import WORKERS_IMPORT, Screening, compute
+from orchestrator.asked import read_percent, read_range
 from orchestrator.cases.case import load_case
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import Joined, frequency_range, percent
-from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
+from orchestrator.cli.arguments import Joined
+from orchestrator.cli.case_arguments import add_case_arguments, of_one_scenario
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
@@ -45,16 +47,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who feeds what an outage takes: units by droop and rating (default), by rating, or the slack alone",
     )  # fmt: skip
     parser.add_argument(
-        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
+        "--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
     )
     parser.add_argument(
-        "--damping", type=_damping, default=0.2, metavar="PERCENT",
+        "--damping", type=partial(read_percent, most=100 * MOST_DAMPING), default=0.2, metavar="PERCENT",
         help="damping below which a mode is critical, at most 60 (default: 20)",
     )  # fmt: skip
     parser.add_argument(
         "--whole", action="store_true", help="count growing modes of all frequencies at every point; takes longer"
     )
-    parser.add_argument("--shard", type=_shard, metavar="I/N", help="compute the part I of N only, and keep its points")
+    parser.add_argument(
+        "--shard", type=Shard.parse, metavar="I/N", help="compute the part I of N only, and keep its points"
+    )
     parser.add_argument(
         "--merge", action="append", default=[], type=Path, metavar="DIR", help="take the points that a part kept there"
     )
@@ -71,27 +75,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if nothing has modes, or after an internal error."""
-    if len(options.scenario) > 1:
-        raise InputError("--scenario: a screening is of one scenario; start one for each")
+    of_case = of_one_scenario(options, "a screening is of one scenario")
     executor = choose_executor(options, WORKERS_IMPORT)
     case = load_case(options.case, trust_fmus=options.trust_fmus)
     low, high = options.range
     wanted = CriticalRegion(low, high, options.damping)
     if not wanted.lowest_hz > 0:
         raise InputError(f"--range {wanted.lowest_hz:g}:{wanted.highest_hz:g}: a screening begins above 0 Hz")
-    name = options.scenario[0] if options.scenario else None
     planned = plan_screening(
-        case,
-        options.points,
-        options.outages,
-        name,
-        values_set(options),
-        options.step,
-        wanted,
-        parameters(options),
-        whole=options.whole,
-        sharing=None if options.sharing is None else SharingRule(options.sharing),
-    )
+        case, options.points, options.outages, wanted=wanted, whole=options.whole,
+        sharing=None if options.sharing is None else SharingRule(options.sharing), **of_case,
+    )  # fmt: skip
     print_questions([planned.prepared], as_json=options.json)
     folder = made_folder(options.out or Path("results") / f"{case.name}_screen", "--out")
     progress, console = Progressing(folder), make_console(stderr=options.json)
@@ -150,17 +144,3 @@ def _merge(folders: Sequence[Path], store: Path) -> None:
         for path in kept:
             if not (store / path.name).exists():
                 shutil.copyfile(path, store / path.name)
-
-
-def _damping(text: str) -> float:
-    ratio = percent(text)
-    if ratio > MOST_DAMPING:
-        raise argparse.ArgumentTypeError(f"{text!r}; modes of at most {100 * MOST_DAMPING:g} % are looked for")
-    return ratio
-
-
-def _shard(text: str) -> Shard:
-    try:
-        return Shard.parse(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error

@@ -11,7 +11,7 @@ from rich.markup import escape
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import Scenario
-from orchestrator.cli.arguments import frequency_range
+from orchestrator.asked import read_range
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import make_console, print_warnings, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="partial derivatives at the held operating point, instead of the total ones; tunable parameters only",
     )
     parser.add_argument(
-        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
+        "--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
     )
     parser.add_argument(
         "--directional",

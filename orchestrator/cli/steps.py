@@ -6,7 +6,8 @@ import json
 import numpy as np
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_percent
-from orchestrator.cli.arguments import frequency_range, seconds
+from orchestrator.asked import read_range
+from orchestrator.cli.arguments import seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.terminal import make_console
 from orchestrator.coupling.schedule import SCHEDULES
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--range",
-        type=frequency_range,
+        type=read_range,
         default=ELECTROMECHANICAL_HZ,
         metavar="LO:HI",
         help="frequencies of the critical modes [Hz] (default: 0.1:2)",
@@ -53,9 +54,9 @@ def _error(text: str) -> Allowed:
     try:
         hertz, points = map(float, parts)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form HZ:POINTS, such as 0.001:0.1") from None
+        raise ValueError(f"{text!r} is not of the form HZ:POINTS, such as 0.001:0.1") from None
     if not (0 < hertz < np.inf and 0 < points < np.inf):
-        raise argparse.ArgumentTypeError(f"{text!r}: both errors must be above 0 and finite")
+        raise ValueError(f"{text!r}: both errors must be above 0 and finite")
     return Allowed(hertz, points)
 
 

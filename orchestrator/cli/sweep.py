@@ -9,8 +9,8 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
+from orchestrator.asked import read_range
 from orchestrator.cases.case import Case, load_case
-from orchestrator.cli.arguments import frequency_range
 from orchestrator.cli.case_arguments import add_case_arguments, values_set
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -21,7 +21,7 @@ from orchestrator.points.executor import Executor
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep import tables
-from orchestrator.sweep.axes import Vary, parse_vary
+from orchestrator.sweep.axes import parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,13 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vary",
         action="append",
         required=True,
-        type=_vary,
+        type=parse_vary,
         metavar="COMPONENT.PARAMETER=START:STOP:COUNT",
         help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
         "last one)",
     )
     parser.add_argument(
-        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
+        "--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
     )
     add_executor_arguments(parser)
     parser.add_argument(
@@ -96,10 +96,3 @@ def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: 
         words = f"{result.computed} points computed{stored}. Results in {folder}: {files}"
         console.print(escape(words), soft_wrap=True)
     return 0 if any(s.trajectories for s in result.scenarios) else 1
-
-
-def _vary(text: str) -> Vary:
-    try:
-        return parse_vary(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error

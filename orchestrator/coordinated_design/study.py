@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.analysis.modes import Mode
+from orchestrator.asked import DAMPING, GAIN_BOUNDS, NAMES, RANKED, STAGES, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.layers import OptionValues
@@ -52,37 +53,31 @@ class PointsDesignRequest:
 
     Attributes
     ----------
-    controllers
-        ``pod_p``, ``pod_q``, or both.
-    components
-        Names or patterns of converters; each gets a setting of its own. All with the controller share one where empty.
-    scenario
-        Its name; the one in which all PODs are off where None.
     modes
-        Names of the case's modes that are damped; all electromechanical ones where empty.
+        All electromechanical ones where empty.
     damping
-        Damping ratio that is wanted; None for the best that there is.
-    gain_bounds
-        Of every gain [pu of the converter's rating].
-    stages
-        N_S of the lead/lag; the components' own where None.
+        None for the best that there is.
     least_damping
         No other mode may fall below this damping ratio, or, where it is below already, below what it has.
-    ranked
-        For how many converters a controller alone is designed to rank them.
-    overrides, parameters, step_size
-        As in `orchestrator.pod_design.design.DesignRequest`.
     """
 
     controllers: tuple[str, ...]
-    components: tuple[str, ...] = ()
+    components: tuple[str, ...] = asked(
+        NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
+    )
     scenario: str | None = None
-    modes: tuple[str, ...] = ()
-    damping: float | None = None
-    gain_bounds: tuple[float, float] = (0.0, 400.0)
-    stages: int | None = None
-    least_damping: float = 0.05
-    ranked: int = 3
+    modes: tuple[str, ...] = asked(
+        NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
+    )
+    damping: float | None = asked(DAMPING, None, "required damping, such as 20")
+    gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
+    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
+    least_damping: float = asked(
+        DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
+    )
+    ranked: int = asked(
+        RANKED, 3, "converters for which a controller alone is designed to rank them (default: 3)", option="--rank"
+    )
     overrides: Mapping[str, Value] = field(default_factory=dict)
     parameters: Sequence[ParameterFile] = ()
     step_size: float | None = None

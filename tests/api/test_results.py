@@ -206,7 +206,7 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").scenario("dip").modes((2, 1)), "the lower one first"),
         (
             lambda: face.load("infinite_bus").scenario("dip").modes(critical=0.2),
-            "is read in percent, at least 1; write 20",
+            "it is in percent between 1 and 90, such as 20: write 20",
         ),
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 20), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
