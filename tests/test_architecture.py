@@ -279,8 +279,8 @@ ON_THE_FACE = {
     "linearize": {"cli.case_arguments.chosen"},
     "modes": {"cli.case_arguments.chosen"},
     "run": {"cli.case_arguments.chosen"},
-    "screen": {"api.screening.compute"},
-    "sweep": {"api.sweep.plan", "api.sweep.compute"},
+    "screen": {"api.screening.STUDY"},
+    "sweep": {"api.sweep.plan", "api.sweep.STUDY"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
 

@@ -1,30 +1,29 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.coordinated_design import WORKERS_IMPORT as COORDINATED_IMPORT
+from orchestrator.api.coordinated_design import STUDY as COORDINATED_DESIGN
 from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
-from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.design import request_of as design_of
-from orchestrator.api.executors import Compute, Plan, Shown, choose_executor
-from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
+from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
+from orchestrator.api.interactions import STUDY as INTERACTIONS
 from orchestrator.api.interactions import Interactions, WantedInteractions
-from orchestrator.api.interactions import compute as interacting
 from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
+from orchestrator.api.screening import STUDY as SCREENING
 from orchestrator.api.screening import Screening
-from orchestrator.api.screening import compute as screened
 from orchestrator.api.show import page
-from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
+from orchestrator.api.sweep import STUDY as SWEEP
+from orchestrator.api.sweep import ParameterSweep, plan
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
@@ -37,7 +36,6 @@ from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
-from orchestrator.points.executor import Executor
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
@@ -265,10 +263,9 @@ class Case:
         0       0.1          0.58            10.59
         1       0.2          0.43            18.01
         """
-        executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
-        planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
-        question(planned.scenarios)
-        return _computed(compute, planned, executor, folder, "Points", shown=progress)
+        planned = partial(plan, self.file, vary, scenarios, values, step=step, parameters=parameters,
+                          frequencies=frequencies)  # fmt: skip
+        return _studied(SWEEP, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def screen(
         self,
@@ -332,19 +329,16 @@ class Case:
            point  frequency_hz  damping_percent
         0  00:00          0.58            10.57
         """
-        executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
-        ratio = percent(damping, "damping", most=100 * MOST_DAMPING)
-        wanted = CriticalRegion(*frequency_range(frequencies), ratio)
+        wanted = CriticalRegion(*frequency_range(frequencies), percent(damping, "damping", most=100 * MOST_DAMPING))
         if sharing is not None and sharing not in list(SharingRule):
             raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
-        planned = plan_screening(
-            self.file, None if points is None else path_of(points, "points", "file"),
+        planned = partial(
+            plan_screening, self.file, None if points is None else path_of(points, "points", "file"),
             outages if outages is None else ",".join(names_given(outages, "outages")), scenario, case_values(values),
             in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
             sharing=None if sharing is None else SharingRule(sharing),
         )  # fmt: skip
-        question([planned.prepared])
-        return _computed(screened, planned, executor, folder, "Points", shown=progress)
+        return _studied(SCREENING, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def interactions(
         self,
@@ -382,11 +376,9 @@ class Case:
         >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
         [45.53, 0.4, 0.6]
         """
-        executor = choose_executor(workers, None, INTERACTIONS_IMPORT)
-        own, files = case_values(values), parameter_files(parameters)
-        planned = plan_interactions(self.file, interactions_of(wanted), scenario, own, in_seconds(step, "step"), files)
-        question([planned.prepared])
-        return _computed(interacting, planned, executor, folder, "Systems", shown=progress)
+        of_case = (scenario, case_values(values), in_seconds(step, "step"), parameter_files(parameters))
+        planned = partial(plan_interactions, self.file, interactions_of(wanted), *of_case)
+        return _studied(INTERACTIONS, planned, (workers, None, None), folder, "Systems", shown=progress)
 
     def design(
         self,
@@ -496,10 +488,8 @@ class Case:
         request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
-        executor = choose_executor(workers, scheduler, COORDINATED_IMPORT, tls)
-        planned = plan_points_design(self.file, request, path_of(points, "points", "file"), outages)
-        question([planned.prepared])
-        return _computed(designed, planned, executor, folder, "Points", shown=progress)
+        planned = partial(plan_points_design, self.file, request, path_of(points, "points", "file"), outages)
+        return _studied(COORDINATED_DESIGN, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
@@ -510,19 +500,23 @@ class Case:
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
 
 
-def _computed(
-    compute: Compute[Plan, Shown],
-    planned: Plan,
-    executor: Executor,
+def _studied(
+    study: PointStudy[Plan, Result, Shown],
+    plan: Callable[[], Plan],
+    where: tuple[int | None, str | None, str | Path | None],
     folder: str | Path | None,
     title: str,
     *,
     shown: bool,
 ) -> Shown:
-    """What a planned study gives; a folder that keeps its points is kept from other commands meanwhile."""
+    """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
+    workers, scheduler, tls = where
+    executor = choose_executor(workers, scheduler, (study.worker,), tls)
+    planned = plan()
+    question(study.prepared(planned), above=1)
     kept = None if folder is None else _folder(folder)
     with shown_progress(title, shown=shown) as report, nullcontext() if kept is None else held(kept):
-        return compute(planned, executor, kept, report)
+        return study.compute(planned, executor, kept, report)
 
 
 def _folder(given: str | Path) -> Path:

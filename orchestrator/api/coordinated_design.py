@@ -7,7 +7,7 @@ from typing import Any, TypedDict
 import pandas as pd
 
 from orchestrator.api.design import parameter_file_path, require_controllers
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.asked import Names, checked, require_known
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
@@ -20,9 +20,6 @@ from orchestrator.coordinated_design.study import (
 )
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
-
-WORKERS_IMPORT = ("orchestrator.coordinated_design.worker",)
-"""Modules that a process of a design imports once, before its first point."""
 
 
 class WantedOverPoints(TypedDict, total=False):
@@ -135,4 +132,4 @@ class CoordinatedDesign:
         return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
-compute = computing(design_over_points, CoordinatedDesign)
+STUDY = PointStudy(design_over_points, CoordinatedDesign, "orchestrator.coordinated_design.worker")

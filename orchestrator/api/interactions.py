@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.api.values import binding_path
 from orchestrator.api.values import path as path_of
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
 else:
     pd = Late("pandas")
-
-WORKERS_IMPORT = ("orchestrator.interactions.worker",)
-"""Modules that a process of such a study imports once, before its first system."""
 
 
 class WantedInteractions(TypedDict, total=False):
@@ -148,4 +145,4 @@ class Interactions:
         return page(repr(self).strip("<>"), self.sentences, self.pairs())
 
 
-compute = computing(run_interactions, Interactions)
+STUDY = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")

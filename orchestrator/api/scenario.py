@@ -529,7 +529,7 @@ def _as_asked(prepared: PreparedScenario, schedule: ScheduleName | None, toleran
     return prepared if tolerance is None else prepared.with_tolerance(tolerance)
 
 
-def question(scenarios: Iterable[PreparedScenario]) -> None:
-    """Warn about data that are most unusual, each once, where the caller of the caller stands."""
+def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:
+    """Warn about data that are most unusual, each once, where the caller of the caller stands, or ``above`` it."""
     for text in dict.fromkeys(str(one) for prepared in scenarios for one in prepared.questions):
-        warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3)
+        warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3 + above)

@@ -5,15 +5,12 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.safe_files import made_folder
 from orchestrator.screening.study import ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, Summary, as_json
 from orchestrator.screening.words import verdict_sentence, what_was_counted
-
-WORKERS_IMPORT = ("orchestrator.screening.worker",)
-"""Modules that a process of a screening imports once, before its first point."""
 
 
 class Screening:
@@ -90,4 +87,4 @@ class Screening:
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
-compute = computing(run_screening, Screening)
+STUDY = PointStudy(run_screening, Screening, "orchestrator.screening.worker")

@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import Axes, axes_or_new, page
 from orchestrator.api.values import Paths, Time, case_values, check_case_name, in_seconds, parameter_files
 from orchestrator.asked import Names, frequency_range, names, plain_value
@@ -20,9 +20,6 @@ from orchestrator.safe_files import made_folder
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
 from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
-
-WORKERS_IMPORT = ("orchestrator.sweep.worker",)
-"""Modules that a process of a sweep imports once, before its first point."""
 
 
 class ParameterSweep:
@@ -218,7 +215,7 @@ def plan(
     return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)
 
 
-compute = computing(run_sweep, ParameterSweep)
+STUDY = PointStudy(run_sweep, ParameterSweep, "orchestrator.sweep.worker", lambda plan: plan.scenarios)
 
 
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:

@@ -2,7 +2,6 @@
 
 import argparse
 import cmath
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +21,7 @@ from orchestrator.black_box.passivity import passivity
 from orchestrator.cases.values import check_system_base, convert
 from orchestrator.cli.arguments import seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import make_console, said_stages
+from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
@@ -63,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         files = save_identification(response, model, passive, staging)
     content = identification_json(response, model, passive)
     if options.json:
-        print(json.dumps(content, indent=1))
+        print_json(content)
         return 0
     console.print(_summary(content))
     active = ", ".join(f"{low:g}–{high:g} Hz" for low, high in passive.ranges()) or "nowhere in the measured range"

@@ -4,9 +4,18 @@ import argparse
 import math
 from typing import Any
 
-from orchestrator.asked import as_number, asked_of
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.asked import as_number, asked_of, read_range
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.units import read_value, to_unit
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
+    parser.add_argument("--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help=text)
 
 
 def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> None:

@@ -1,7 +1,6 @@
 """``gfor black-box``: modes of a system with a device that is known only through FMI."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.report.tables import PlainTable
@@ -63,15 +62,14 @@ def run(options: argparse.Namespace) -> int:
         passive = passivity(system.response)
         with staged(folder / prepared.name, run_id) as staging:
             save_identification(system.response, system.identified, passive, staging)
-        for text in system.warnings:
-            make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(f'scenario {prepared.name!r}: {text}')}")
+        warn(prepared.name, system.warnings)
         if options.json:
             output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
         else:
             print_stability(console, {prepared.title: verdicts[prepared.title]})
             console.print(_modes_table(prepared.title, system, white), "")
     if options.json:
-        print(json.dumps(output, indent=1))
+        print_json(output)
     else:
         console.print(escape(f"Admittances and models in {folder}"), soft_wrap=True, highlight=False)
     return exit_code(options, list(verdicts.values()))

@@ -1,7 +1,6 @@
 """``gfor compare``: two recorded runs side by side."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
@@ -9,7 +8,7 @@ from rich.markup import escape
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
 from orchestrator.cli.arguments import seconds_or_none
-from orchestrator.cli.terminal import make_console, make_errors, saying_warnings
+from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import PlainTable
 
 
@@ -27,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = compare(options.first, options.second, options.signal or (), options.start)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1))
+        print_json(found.as_json())
         for text in found.remarks:
             make_errors().print(text, markup=False, soft_wrap=True, highlight=False)
         return 0

@@ -1,7 +1,6 @@
 """``gfor design``: a POD controller by eigenvalue sensitivity."""
 
 import argparse
-import json
 import shlex
 from contextlib import suppress
 from pathlib import Path
@@ -10,13 +9,12 @@ from shutil import rmtree
 from rich.markup import escape
 
 from orchestrator.api.design import design_controller, parameter_file_path
-from orchestrator.cases.case import load_case
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cli.arguments import add_request_arguments, asked_by
-from orchestrator.cli.case_arguments import add_case_arguments, of_one_scenario
+from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
 from orchestrator.cli.design_points import A_DESIGN, add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.terminal import make_console, print_questions, warn
+from orchestrator.cli.terminal import make_console, print_json, print_parts, print_questions, warn
 from orchestrator.cli.verdict import NOT_MET, add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
@@ -70,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         _check_over_points(options)
         return run_over_points(options, None if options.out is None else _writable(_given(options.out)))
     _check_for_one_point(options)
-    case, console = load_case(options.case, trust_fmus=options.trust_fmus), make_console(stderr=options.json)
+    case, console = case_of(options), make_console(stderr=options.json)
     request = _request(options)
     path = _writable(_given(options.out) if options.out else Path(f"{case.name}_{request.controller}.toml"))
     folder = path.with_suffix(".points")
@@ -89,15 +87,13 @@ def run(options: argparse.Namespace) -> int:
         rmtree(folder, ignore_errors=True)
     ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
     if options.json:
-        print(json.dumps(controller.as_json(path), indent=1, ensure_ascii=False))
+        print_json(controller.as_json(path))
         return ends
-    for part in first_screen(design):
-        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+    print_parts(console, first_screen(design))
     print_stability(
         console, {"without the controller": design.stability_before, "with the final setting": design.stability}
     )
-    for part in sheet(design):
-        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+    print_parts(console, sheet(design))
     warned = "" if design.met else " (the requirement is not met)"
     console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
                   f"{design.target.scenario} --parameters {path}"), soft_wrap=True, highlight=False)  # fmt: skip

@@ -1,26 +1,23 @@
 """``gfor design --points``: one setting for many operating points and outages."""
 
 import argparse
-import json
 import shlex
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
+from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.coordinated_design import WORKERS_IMPORT, compute
-from orchestrator.cases.case import load_case
+from orchestrator.api.coordinated_design import STUDY
 from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by
-from orchestrator.cli.case_arguments import of_one_scenario
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_questions
+from orchestrator.cli.case_arguments import case_of, of_one_scenario
+from orchestrator.cli.executors import add_executor_arguments
+from orchestrator.cli.study import present, working_in
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.coordinated_design import words
-from orchestrator.coordinated_design.study import ALL, PointsDesignRequest, plan_points_design
+from orchestrator.coordinated_design.study import ALL, PointsDesign, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
-from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
 from orchestrator.screening.record import Status
 
 A_DESIGN = "a design is made for one scenario"
@@ -51,34 +48,26 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     request = PointsDesignRequest(
         **asked_by(options, PointsDesignRequest) | several | of_one_scenario(options, A_DESIGN)
     )
-    executor = choose_executor(options, WORKERS_IMPORT)
-    case, console = load_case(options.case, trust_fmus=options.trust_fmus), make_console(stderr=options.json)
+    case = case_of(options)
     path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
-    planned = plan_points_design(case, request, options.points, options.outages)
-    print_questions([planned.prepared], as_json=options.json)
-    folder = made_folder(path.with_suffix(".points"), "--out")
-    progress = Progressing(folder)
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        design = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
+    folder = path.with_suffix(".points")
+    plan = partial(plan_points_design, case, request, options.points, options.outages)
+    with working_in(options, folder, STUDY, plan) as (_, compute):
+        design = compute()
         written = design.save(path, _command_line(options, request))
     verdict = design.result.verdict
-    if options.json:
-        print(json.dumps(design.as_json(), indent=1, ensure_ascii=False))
-    else:
-        console.print(words.verdict_of(verdict).markup(), soft_wrap=True, highlight=False)
-        for table in (words.points_table(verdict), words.settings_table(design.result)):
-            console.print("", table)
-        if request.ranked:
-            console.print("", words.ranking_table(design.result))
-        console.print("")
-        console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
-    for text in words.remarks(verdict):
-        make_errors().print(escape(text), soft_wrap=True)
-    if not options.json:
-        files = ", ".join(one.name for one in written[1:])
-        text = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
-        console.print(escape(text), soft_wrap=True, highlight=False)
+    files = ", ".join(one.name for one in written[1:])
+    end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
+    present(options, design.as_json, _parts(design.result), words.remarks(verdict), end)
     return _exit_code(verdict, fail_unstable=options.fail_unstable)
+
+
+def _parts(design: PointsDesign) -> Iterator[RenderableType]:
+    yield words.verdict_of(design.verdict).markup()
+    yield from ("", words.points_table(design.verdict), "", words.settings_table(design))
+    if design.plan.request.ranked:
+        yield from ("", words.ranking_table(design))
+    yield from ("", escape(words.what_it_rests_on(design)))
 
 
 def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:

@@ -1,14 +1,13 @@
 """``gfor identify``: the modes in a recorded signal."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.api.identification import identify
 from orchestrator.cli.arguments import seconds, seconds_or_none
-from orchestrator.cli.terminal import make_console, make_errors, saying_warnings
+from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import PlainTable
 
 
@@ -32,7 +31,7 @@ def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = identify(options.run, options.signal, options.start, options.stop)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1))
+        print_json(found.as_json())
         for text in found.remarks:
             make_errors().print(text, soft_wrap=True, highlight=False)
         return 0

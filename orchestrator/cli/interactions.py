@@ -1,31 +1,24 @@
 """``gfor interactions``: which modes several vendors' converters share, and which pair of them does not agree."""
 
 import argparse
-import json
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-from rich.console import Console
+from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.interactions import WORKERS_IMPORT, Interactions, compute
-from orchestrator.cases.case import load_case
+from orchestrator.api.interactions import STUDY, Interactions
 from orchestrator.certification.devices import devices_of
 from orchestrator.cli.arguments import add_request_arguments, asked_by
-from orchestrator.cli.case_arguments import add_case_arguments, of_one_scenario
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_questions
-from orchestrator.cli.verdict import add_verdict_argument
+from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
+from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
+from orchestrator.cli.terminal import say
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions import tables
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.words import verdict_of
-from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,29 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--binding", action="append", default=[], metavar="[NAME=]FILE", help="binding of a --device (repeatable)"
     )
-    add_executor_arguments(parser)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder for results (default: results/<case>_interactions); systems that are there are not computed again",
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    add_verdict_argument(parser)
+    add_study_arguments(parser, "interactions", "systems")
 
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if the system as it is has no modes."""
     of_case = of_one_scenario(options, "interactions are those of one scenario")
-    executor = choose_executor(options, WORKERS_IMPORT)
-    case = load_case(options.case, trust_fmus=options.trust_fmus)
-    planned = plan_interactions(case, _request(options), **of_case)
-    print_questions([planned.prepared], as_json=options.json)
-    folder = made_folder(options.out or Path("results") / f"{case.name}_interactions", "--out")
-    progress, console = Progressing(folder), make_console(stderr=options.json)
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        found = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
-        _present(found, folder, console, as_json=options.json)
+    case = case_of(options)
+    request = _request(options)
+    folder = folder_of(options, case.name, "interactions")
+    with working_in(options, folder, STUDY, lambda: plan_interactions(case, request, **of_case)) as (_, compute):
+        found = compute()
+        end = last_line(found.result, "systems ", folder, found.save(folder))
+        say("warning", found.warnings)
+        present(options, found.as_json, _parts(found), end=end)
     failed = found.judgement.whole.record.error is not None
     return int(failed or (options.fail_unstable and not found.judgement.stable))
 
@@ -79,20 +63,10 @@ def _request(options: argparse.Namespace) -> InteractionsRequest:
     return replace(request, swap=request.swap or bool(devices), devices=devices)
 
 
-def _present(found: Interactions, folder: Path, console: Console, *, as_json: bool) -> None:
-    written, result, judgement = found.save(folder), found.result, found.judgement
-    for text in found.warnings:
-        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
-    if as_json:
-        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
-        return
-    console.print(verdict_of(judgement).markup(), soft_wrap=True, highlight=False)
-    for text in found.sentences[1:]:
-        console.print(escape(text), soft_wrap=True, highlight=False)
-    console.print("", tables.modes_table(judgement), "", tables.systems_table(judgement), "")
-    if result.plan.swapped:
-        console.print(tables.assignments_table(judgement), "")
-    stored = f", {result.stored} were there already" if result.stored else ""
-    files = ", ".join(path.name for path in written)
-    words = f"{result.computed} systems computed{stored}. Results in {folder}: {files}"
-    console.print(escape(words), soft_wrap=True)
+def _parts(found: Interactions) -> Iterator[RenderableType]:
+    judgement = found.judgement
+    yield verdict_of(judgement).markup()
+    yield from map(escape, found.sentences[1:])
+    yield from ("", tables.modes_table(judgement), "", tables.systems_table(judgement), "")
+    if found.result.plan.swapped:
+        yield from (tables.assignments_table(judgement), "")

@@ -1,24 +1,24 @@
 """``gfor modes``: steady state and eigenvalues of a case's scenarios."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario
-from orchestrator.asked import read_percent, read_range
+from orchestrator.asked import read_percent
+from orchestrator.cli.arguments import add_range_argument
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import (
     make_console,
-    make_errors,
+    print_json,
     print_named_modes,
     print_sources,
     print_warnings,
     said_stages,
+    say,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
@@ -33,13 +33,7 @@ from orchestrator.study.modes import modes_json
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
-    parser.add_argument(
-        "--range",
-        type=read_range,
-        default=ELECTROMECHANICAL_HZ,
-        metavar="LO:HI",
-        help="frequencies shown [Hz] (default: 0.1:2)",
-    )
+    add_range_argument(parser, "frequencies shown [Hz] (default: 0.1:2)")
     parser.add_argument(
         "--critical",
         type=read_percent,
@@ -102,13 +96,12 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
             written += [*sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
     weights = [] if options.black_box else load_model_weights(scenarios, results, options.range)
     if options.json:
-        print(json.dumps(modes_json(results, weights), indent=1, ensure_ascii=False))
+        print_json(modes_json(results, weights))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_answers(console, [of_modes(r) for r in results], results)
     print_warnings(results)
-    for weight in weights:
-        make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(weight)}")
+    say("question", weights)
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, results)

@@ -1,7 +1,6 @@
 """``gfor run``: steady state, modes and time response of a case's scenarios."""
 
 import argparse
-import json
 import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -21,8 +20,10 @@ from orchestrator.cli.terminal import (
     make_console,
     make_errors,
     print_findings,
+    print_json,
     print_recording_questions,
     print_warnings,
+    say,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.cores import MOST_THREADS
@@ -133,7 +134,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     early_end = None if stopped is None else _early_end(*stopped, scenarios, results)
     plots = _save_together(results, folder, run_id, stopped, early_end)
     if options.json:
-        print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
+        print_json([summary_of(r) for r in results])
     else:
         print_run(console, results, early_end, details=options.details)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
@@ -159,7 +160,7 @@ def _say_unfinished(folder: Path) -> None:
             f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; `gfor identify` "
             "and `gfor compare` read them, and you may delete those that you do not need"
         )
-        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
+        say("warning", [text])
 
 
 def _run_into(

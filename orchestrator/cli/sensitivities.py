@@ -1,19 +1,17 @@
 """``gfor sensitivities``: how each parameter of each FMU moves a mode."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import Scenario
-from orchestrator.asked import read_range
+from orchestrator.cli.arguments import add_range_argument
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import make_console, print_warnings, warn
+from orchestrator.cli.terminal import make_console, print_json, print_warnings, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
@@ -43,9 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="partial derivatives at the held operating point, instead of the total ones; tunable parameters only",
     )
-    parser.add_argument(
-        "--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
-    )
+    add_range_argument(parser)
     parser.add_argument(
         "--directional",
         action="store_true",
@@ -83,7 +79,7 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
             written += one.save(folder / scenario.name)
     results = [one.result.modes for one in found]
     if options.json:
-        print(json.dumps([one.as_json() for one in found], indent=1, ensure_ascii=False))
+        print_json([one.as_json() for one in found])
     else:
         console = make_console()
         print_verdicts(console, results)

@@ -1,15 +1,13 @@
 """``gfor steps``: the largest communication step within a given error, for each schedule."""
 
 import argparse
-import json
 
 import numpy as np
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_percent
-from orchestrator.asked import read_range
-from orchestrator.cli.arguments import seconds
+from orchestrator.analysis.modes import damping_percent
+from orchestrator.cli.arguments import add_range_argument, seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.report.tables import make_table
 from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep, choose_step, step_choice_json
@@ -39,13 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help=f"schedule to try (repeatable; default: {', '.join(TRIED)})",
     )
-    parser.add_argument(
-        "--range",
-        type=read_range,
-        default=ELECTROMECHANICAL_HZ,
-        metavar="LO:HI",
-        help="frequencies of the critical modes [Hz] (default: 0.1:2)",
-    )
+    add_range_argument(parser, "frequencies of the critical modes [Hz] (default: 0.1:2)")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -73,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
         for prepared in prepare(options)
     ]
     if options.json:
-        print(json.dumps([step_choice_json(choice) for choice in choices], indent=1, ensure_ascii=False))
+        print_json([step_choice_json(choice) for choice in choices])
     else:
         for choice in choices:
             _print(choice)

@@ -1,27 +1,16 @@
 """``gfor sweep``: from its options to points, files and words."""
 
 import argparse
-import json
-from pathlib import Path
 
-from rich.console import Console
-from rich.markup import escape
+from rich.console import RenderableType
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
-from orchestrator.asked import read_range
-from orchestrator.cases.case import Case, load_case
-from orchestrator.cli.case_arguments import add_case_arguments, values_set
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_questions
-from orchestrator.cli.verdict import add_verdict_argument
-from orchestrator.points.executor import Executor
-from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
+from orchestrator.api.sweep import STUDY, plan
+from orchestrator.cli.arguments import add_range_argument
+from orchestrator.cli.case_arguments import add_case_arguments, case_of, values_set
+from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.sweep import SweepPlan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,64 +24,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
         "last one)",
     )
-    parser.add_argument(
-        "--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
-    )
-    add_executor_arguments(parser)
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="folder for results (default: results/<case>_sweep); points that are there are not computed again",
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    add_verdict_argument(parser)
+    add_range_argument(parser)
+    add_study_arguments(parser, "sweep")
 
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if no point has modes."""
-    executor = choose_executor(options, WORKERS_IMPORT)
-    case = load_case(options.case, trust_fmus=options.trust_fmus)
-    folder = options.out or Path("results") / f"{case.name}_sweep"
-    progress = Progressing(folder)
-    with saying_how_it_goes_on(progress.how_it_goes_on):
-        return _sweep(case, folder, progress, executor, options)
+    case = case_of(options)
+    folder = folder_of(options, case.name, "sweep")
 
+    def planning() -> SweepPlan:
+        return plan(
+            case, options.vary, options.scenario, values_set(options), step=options.step,
+            parameters=options.parameters, frequencies=options.range,
+        )  # fmt: skip
 
-def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, options: argparse.Namespace) -> int:
-    """See `run`."""
-    planned = plan(
-        case,
-        options.vary,
-        options.scenario,
-        values_set(options),
-        step=options.step,
-        parameters=options.parameters,
-        frequencies=options.range,
-    )
-    print_questions(planned.scenarios, as_json=options.json)
-    made_folder(folder, "--out")
-    console = make_console(stderr=options.json)
-    with held(folder):
-        sweep = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
-        failed = _present(sweep, folder, console, as_json=options.json)
-    return failed or int(options.fail_unstable and not all(s.stable for s in sweep.result.scenarios))
-
-
-def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: bool) -> int:
-    """Write a sweep's files and print its summary; returns 1 if no point has modes."""
-    written, result = sweep.save(folder), sweep.result
-    if as_json:
-        print(json.dumps(sweep.as_json(), indent=1, ensure_ascii=False))
-    else:
-        for line in tables.stability(sweep.samples):
-            console.print(line, soft_wrap=True, highlight=False)
-        console.print("", tables.trajectories(sweep.samples), "")
-    for text in sweep.remarks:
-        make_errors().print(escape(text))
-    if not as_json:
-        stored = f", {result.stored} were there already" if result.stored else ""
-        files = ", ".join(path.name for path in written)
-        words = f"{result.computed} points computed{stored}. Results in {folder}: {files}"
-        console.print(escape(words), soft_wrap=True)
-    return 0 if any(s.trajectories for s in result.scenarios) else 1
+    with working_in(options, folder, STUDY, planning) as (_, compute):
+        sweep = compute()
+        end = last_line(sweep.result, "points ", folder, sweep.save(folder))
+        parts: list[RenderableType] = [*tables.stability(sweep.samples), "", tables.trajectories(sweep.samples), ""]
+        present(options, sweep.as_json, parts, sweep.remarks, end)
+    scenarios = sweep.result.scenarios
+    if not any(s.trajectories for s in scenarios):
+        return 1
+    return int(options.fail_unstable and not all(s.stable for s in scenarios))

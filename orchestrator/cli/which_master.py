@@ -1,7 +1,6 @@
 """``gfor which-master``: which schedule another tool runs."""
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from rich.console import Console
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.extras import require
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     named = dict(_named(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
-        print(json.dumps(_json(verdict), indent=1, ensure_ascii=False))
+        print_json(_json(verdict))
     else:
         _print(verdict, make_console())
     return 0 if verdict.fits else 1
