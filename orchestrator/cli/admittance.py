@@ -19,7 +19,7 @@ from orchestrator.black_box.fitting import fit, require_fitting
 from orchestrator.black_box.frequency_response import measure
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cases.values import check_system_base, convert
-from orchestrator.cli.arguments import seconds, setting
+from orchestrator.cli.arguments import option, repeatable, seconds, setting, switch
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
@@ -32,13 +32,13 @@ from orchestrator.safe_files import made_folder
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device")
-    parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
-    parser.add_argument("--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
-                        help="a value of the FMU, such as P_0=0.9 or pod_p.enabled=true (repeatable)")  # fmt: skip
-    parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step [s] (100 us)")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/admittance_<file>)")
+    option(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port", read=Path)
+    repeatable(parser, "--set", "VARIABLE=VALUE", "a value of the FMU, such as P_0=0.9 or pod_p.enabled=true "
+               "(repeatable)", read=setting)  # fmt: skip
+    option(parser, "--step", "H", "communication step [s] (100 us)", read=seconds, default=1e-4)
+    option(parser, "--out", "DIR", "folder (default: results/admittance_<file>)", read=Path)
     add_excitation_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:

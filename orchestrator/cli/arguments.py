@@ -2,20 +2,41 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from typing import Any
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import as_number, asked_of, read_range
+from orchestrator.asked import as_number, asked_of
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.units import read_value, to_unit
 
 
+def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
+    """An option without a value, such as ``--native``."""
+    parser.add_argument(name, action="store_true", help=text)
+
+
+def option(
+    parser: argparse._ActionsContainer,
+    name: str,
+    metavar: str,
+    text: str,
+    *,
+    read: Callable[[str], Any] = str,
+    default: Any = None,
+) -> None:
+    """An option with one value, which ``read`` makes of the text."""
+    parser.add_argument(name, metavar=metavar, help=text, type=read, default=default)
+
+
+def repeatable(
+    parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str
+) -> None:
+    """An option that may be given several times; its values are a list."""
+    parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
+
+
 def add_json_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--json", action="store_true", help="print JSON")
-
-
-def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
-    parser.add_argument("--range", type=read_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help=text)
+    switch(parser, "--json", "print JSON")
 
 
 def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> None:

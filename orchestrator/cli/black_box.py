@@ -17,6 +17,7 @@ from orchestrator.black_box.coupled_modes import (
 )
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.passivity import passivity
+from orchestrator.cli.arguments import option, switch
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
@@ -32,9 +33,9 @@ from orchestrator.study.modes import modes_of, running
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     parser.add_argument("--component", required=True, metavar="NAME", help="the component to take for a black box")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_black_box)")
+    option(parser, "--out", "DIR", "folder (default: results/<case>_black_box)", read=Path)
     add_excitation_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
 
 

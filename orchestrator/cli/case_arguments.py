@@ -4,12 +4,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario, choose
+from orchestrator.asked import read_range
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cli.arguments import assignment, seconds
+from orchestrator.cli.arguments import assignment, option, repeatable, seconds, switch
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
@@ -23,27 +25,12 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
         nargs="?" if optional else None,
         help="a built-in case (two_area), or the path of a case file or an .ssp",
     )
-    parser.add_argument(
-        "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=assignment,
-        metavar="COMPONENT.PARAMETER=VALUE",
-        help="override a value (repeatable)",
-    )
-    parser.add_argument(
-        "--parameters",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help="values from a parameter file, as `gfor design` writes it (repeatable; --set overrides it)",
-    )
+    repeatable(parser, "--scenario", "NAME", "only this scenario (repeatable)")
+    repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "override a value (repeatable)", read=assignment)
+    repeatable(parser, "--parameters", "FILE", "values from a parameter file, as `gfor design` writes it (repeatable; "
+               "--set overrides it)", read=Path)  # fmt: skip
     add_trust_argument(parser)
-    parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
         add_schedule_argument(parser)
     parser.add_argument(
@@ -53,6 +40,10 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
         const=("*.native", True),
         help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
     )
+
+
+def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
+    option(parser, "--range", "LO:HI", text, read=read_range, default=ELECTROMECHANICAL_HZ)
 
 
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
@@ -67,12 +58,8 @@ def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:
     """The user's own word on foreign FMUs."""
-    parser.add_argument(
-        "--trust-fmus",
-        action="store_true",
-        help="let FMUs of others run in gfor's own process where the case says isolated = false; they can do there "
-        "whatever you can",
-    )
+    switch(parser, "--trust-fmus", "let FMUs of others run in gfor's own process where the case says isolated = false; "
+           "they can do there whatever you can")  # fmt: skip
 
 
 def case_of(options: argparse.Namespace) -> Case:

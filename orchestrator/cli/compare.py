@@ -7,7 +7,7 @@ from rich.markup import escape
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
-from orchestrator.cli.arguments import seconds_or_none
+from orchestrator.cli.arguments import option, seconds_or_none, switch
 from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import PlainTable
 
@@ -18,8 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
     parser.add_argument("--signal", action="append", metavar="SIGNAL",
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip
-    parser.add_argument("--start", type=seconds_or_none, metavar="T", help="oscillations are read from here [s] (2)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--start", "T", "oscillations are read from here [s] (2)", read=seconds_or_none)
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:

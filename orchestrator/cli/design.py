@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from orchestrator.api.design import design_controller, parameter_file_path
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cli.arguments import add_request_arguments, asked_by
+from orchestrator.cli.arguments import add_request_arguments, asked_by, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
 from orchestrator.cli.design_points import A_DESIGN, add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
@@ -31,21 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=DAMPING_CONTROLLERS,
         help="the controller to design (with --points repeatable)",
     )
-    parser.add_argument(
-        "--component",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="the converter, or a pattern such as 'gfor*' for several with one setting (default: all with this POD); "
-        "with --points repeatable: each gets a setting of its own",
-    )
-    parser.add_argument(
-        "--mode",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="the case's mode to damp (default: its first); with --points repeatable, all from 0.1 to 2 Hz by default",
-    )
+    repeatable(parser, "--component", "NAME", "the converter, or a pattern such as 'gfor*' for several with one "
+               "setting (default: all with this POD); with --points repeatable: each gets a setting of "
+               "its own")  # fmt: skip
+    repeatable(parser, "--mode", "NAME", "the case's mode to damp (default: its first); with --points repeatable, all "
+               "from 0.1 to 2 Hz by default")  # fmt: skip
     parser.add_argument(
         "--gain-from",
         choices=("non-compensated", "compensated"),
@@ -53,12 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="sensitivity that the gain is computed from, without or with the lead/lag (default: non-compensated)",
     )
     add_request_arguments(parser, DesignRequest)
-    parser.add_argument("--no-margins", action="store_true", help="leave out the margins, which take longest")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--no-margins", "leave out the margins, which take longest")
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.toml", help="parameter file (default: <case>_<controller>.toml, here)"
-    )
+    option(parser, "--out", "FILE.toml", "parameter file (default: <case>_<controller>.toml, here)", read=Path)
     add_points_arguments(parser)
 
 

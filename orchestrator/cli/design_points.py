@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.api.coordinated_design import STUDY
-from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by
+from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by, option
 from orchestrator.cli.case_arguments import case_of, of_one_scenario
 from orchestrator.cli.executors import add_executor_arguments
 from orchestrator.cli.study import present, working_in
@@ -26,9 +26,7 @@ A_DESIGN = "a design is made for one scenario"
 def add_points_arguments(parser: argparse.ArgumentParser) -> None:
     """Options that a design over operating points has beside those of a design for one."""
     group = parser.add_argument_group("over operating points")
-    group.add_argument(
-        "--points", type=Path, metavar="FILE", help="operating points: a CSV file, as gfor screen has it"
-    )
+    option(group, "--points", "FILE", "operating points: a CSV file, as gfor screen has it", read=Path)
     group.add_argument("--outages", action=Joined, metavar="WHICH",
                        help="n-1, lines, units, or names, each at every point (repeatable)")  # fmt: skip
     add_request_arguments(group, PointsDesignRequest)

@@ -4,6 +4,7 @@ import argparse
 
 from orchestrator.asked import read_positive
 from orchestrator.black_box.frequency_response import METHODS, Excitation
+from orchestrator.cli.arguments import switch
 from orchestrator.errors import InputError
 
 _DEFAULTS = Excitation()
@@ -18,7 +19,7 @@ def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f"lowest frequency [Hz] ({_DEFAULTS.lowest_hz:g})")  # fmt: skip
     parser.add_argument("--to-hz", type=read_positive, default=_DEFAULTS.highest_hz, metavar="F",
                         help=f"highest frequency [Hz] ({_DEFAULTS.highest_hz:g})")  # fmt: skip
-    parser.add_argument("--no-state", action="store_true", help="never save or restore the FMU's state")
+    switch(parser, "--no-state", "never save or restore the FMU's state")
 
 
 def excitation_of(options: argparse.Namespace) -> Excitation:

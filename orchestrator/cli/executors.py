@@ -5,16 +5,15 @@ from collections.abc import Sequence
 
 from orchestrator.api import executors
 from orchestrator.asked import read_whole
+from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
-    parser.add_argument(
-        "--workers", type=read_whole(1, 1000), metavar="N", help="processes to compute in (default: one a core)"
-    )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
-    parser.add_argument("--tls", metavar="DIR", help="folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
+    option(parser, "--workers", "N", "processes to compute in (default: one a core)", read=read_whole(1, 1000))
+    option(parser, "--scheduler", "ADDRESS", "compute on a Dask cluster, such as tcp://host:8786")
+    option(parser, "--tls", "DIR", "folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
 
 
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:

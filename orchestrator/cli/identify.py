@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.api.identification import identify
-from orchestrator.cli.arguments import seconds, seconds_or_none
+from orchestrator.cli.arguments import option, seconds, seconds_or_none, switch
 from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import PlainTable
 
@@ -19,11 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", type=Path, metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
-    parser.add_argument(
-        "--start", type=seconds_or_none, default=2.0, metavar="T", help="beginning of the free response [s] (2)"
-    )
-    parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s] (default: the run's)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--start", "T", "beginning of the free response [s] (2)", read=seconds_or_none, default=2.0)
+    option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:

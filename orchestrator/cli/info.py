@@ -8,6 +8,7 @@ from rich.markup import escape
 from fmus.vendor_dll.interface import CONTROLLER
 from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
+from orchestrator.cli.arguments import switch
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.fmi.description import FmuDescription, missing_binary
 from orchestrator.fmi.linear_model import EmbeddedModel
@@ -16,7 +17,7 @@ from orchestrator.report.tables import fmu_variables
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from orchestrator.api.interactions import STUDY, Interactions
 from orchestrator.certification.devices import devices_of
-from orchestrator.cli.arguments import add_request_arguments, asked_by
+from orchestrator.cli.arguments import add_request_arguments, asked_by, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.cli.terminal import say
@@ -24,16 +24,9 @@ from orchestrator.interactions.words import verdict_of
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     add_request_arguments(parser, InteractionsRequest)
-    parser.add_argument(
-        "--device",
-        action="append",
-        default=[],
-        metavar="[NAME=]FILE",
-        help="try this FMU or DLL at the places as well; it implies --swap (repeatable)",
-    )
-    parser.add_argument(
-        "--binding", action="append", default=[], metavar="[NAME=]FILE", help="binding of a --device (repeatable)"
-    )
+    repeatable(parser, "--device", "[NAME=]FILE", "try this FMU or DLL at the places as well; it implies --swap "
+               "(repeatable)")  # fmt: skip
+    repeatable(parser, "--binding", "[NAME=]FILE", "binding of a --device (repeatable)")
     add_study_arguments(parser, "interactions", "systems")
 
 

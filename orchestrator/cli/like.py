@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.rules import MasterRules
@@ -15,10 +16,8 @@ from orchestrator.study.like import run_like
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor run`` that make it run as another master."""
-    parser.add_argument("--like", metavar="MASTER",
-                        help=f"only trajectories, as another master would give them: {', '.join(MASTERS)}")  # fmt: skip
-    parser.add_argument("--order", metavar="A,B,…",
-                        help="with --like: in which order components step, where they take turns")  # fmt: skip
+    option(parser, "--like", "MASTER", f"only trajectories, as another master would give them: {', '.join(MASTERS)}")
+    option(parser, "--order", "A,B,…", "with --like: in which order components step, where they take turns")
 
 
 def rules_of(options: argparse.Namespace) -> MasterRules | None:

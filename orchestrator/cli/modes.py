@@ -9,8 +9,8 @@ from rich.markup import escape
 
 from orchestrator.api.scenario import Scenario
 from orchestrator.asked import read_percent
-from orchestrator.cli.arguments import add_range_argument
-from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.cli.arguments import option, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
 from orchestrator.cli.terminal import (
     make_console,
     print_json,
@@ -42,18 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PERCENT",
         help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
     )
-    parser.add_argument(
-        "--directional",
-        action="store_true",
-        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
-    )
-    parser.add_argument(
-        "--black-box",
-        action="store_true",
-        help="identify the components that hide their states from their inputs and outputs",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
+           "(with --native)")  # fmt: skip
+    switch(parser, "--black-box", "identify the components that hide their states from their inputs and outputs")
+    option(parser, "--out", "DIR", "write modes, participation, shapes and plots there", read=Path)
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
 

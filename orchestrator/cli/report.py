@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.cli.arguments import option
 from orchestrator.cli.terminal import saying_warnings
 from orchestrator.report.html.page import write_report
 
@@ -10,7 +11,7 @@ from orchestrator.report.html.page import write_report
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of `gfor run`")
     parser.add_argument("others", type=Path, nargs="*", metavar="DIR", help="folders of sweeps and designs beside it")
-    parser.add_argument("--out", type=Path, metavar="FILE.html", help="page (default: DIR/report.html)")
+    option(parser, "--out", "FILE.html", "page (default: DIR/report.html)", read=Path)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from rich.markup import escape
 from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.asked import read_whole
 from orchestrator.cli import checkpoints, federates, like, run_request
-from orchestrator.cli.arguments import seconds, tolerance
+from orchestrator.cli.arguments import option, seconds, switch, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
@@ -44,25 +44,16 @@ from orchestrator.study.run import RunResult
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, optional=True, schedule=True)
-    parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
-    parser.add_argument(
-        "--tolerance",
-        type=tolerance,
-        metavar="TOL",
-        help="take steps as long as this error of a coupled output allows, from 1e-8 to 0.1, such as 1e-4; needs FMUs "
-        "that save their state (default: fixed steps, or the case's tolerance)",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    option(parser, "--stop", "T", "stop time [s], e.g. 5 or '500 ms'", read=seconds)
+    option(parser, "--tolerance", "TOL", "take steps as long as this error of a coupled output allows, from 1e-8 to "
+           "0.1, such as 1e-4; needs FMUs that save their state (default: fixed steps, "
+           "or the case's tolerance)", read=tolerance)  # fmt: skip
+    option(parser, "--out", "DIR", "folder for results (default: results/<case>)", read=Path)
     parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
-    parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
-    parser.add_argument(
-        "--threads",
-        type=read_whole(1, MOST_THREADS),
-        metavar="N",
-        help="threads that step native FMUs (default: as many as are faster than one, up to one for each core); "
-        "no value depends on it",
-    )
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    switch(parser, "--linear", "lay the linear model's response over the simulated one")
+    option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
+           "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
+    switch(parser, "--json", "print the summary as JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
     run_request.add_arguments(parser)

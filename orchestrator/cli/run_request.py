@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import built_in_cases
-from orchestrator.cli.arguments import seconds_or_none
+from orchestrator.cli.arguments import option, seconds_or_none, switch
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import CHECKPOINT, CHECKPOINTS
 from orchestrator.results.staging import new_run_id
@@ -38,17 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help=f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes none",
     )
-    parser.add_argument(
-        "--require-checkpoint",
-        action="store_true",
-        help="refuse a run that could not be resumed, because an FMU cannot serialise its state",
-    )
-    parser.add_argument(
-        "--resume",
-        type=Path,
-        metavar="DIR",
-        help="go on with the interrupted run whose results are in DIR; case and options are those that it had",
-    )
+    switch(parser, "--require-checkpoint", "refuse a run that could not be resumed, because an FMU cannot serialise "
+           "its state")  # fmt: skip
+    option(parser, "--resume", "DIR", "go on with the interrupted run whose results are in DIR; case and options are "
+           "those that it had", read=Path)  # fmt: skip
 
 
 def with_request(options: argparse.Namespace) -> argparse.Namespace:

@@ -12,8 +12,8 @@ from rich.markup import escape
 from orchestrator.api.screening import STUDY, Screening
 from orchestrator.asked import read_percent
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import Joined, add_range_argument
-from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
+from orchestrator.cli.arguments import Joined, option, repeatable, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, of_one_scenario
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.errors import InputError
@@ -28,10 +28,8 @@ from orchestrator.screening.summary import Summary
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument(
-        "--points", type=Path, metavar="FILE",
-        help="operating points: a CSV file, a row each (default: the case as it is)",
-    )  # fmt: skip
+    option(parser, "--points", "FILE",
+           "operating points: a CSV file, a row each (default: the case as it is)", read=Path)  # fmt: skip
     parser.add_argument(
         "--outages", action=Joined, metavar="WHICH",
         help="n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
@@ -45,15 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--damping", type=partial(read_percent, most=100 * MOST_DAMPING), default=0.2, metavar="PERCENT",
         help="damping below which a mode is critical, at most 60 (default: 20)",
     )  # fmt: skip
-    parser.add_argument(
-        "--whole", action="store_true", help="count growing modes of all frequencies at every point; takes longer"
-    )
-    parser.add_argument(
-        "--shard", type=Shard.parse, metavar="I/N", help="compute the part I of N only, and keep its points"
-    )
-    parser.add_argument(
-        "--merge", action="append", default=[], type=Path, metavar="DIR", help="take the points that a part kept there"
-    )
+    switch(parser, "--whole", "count growing modes of all frequencies at every point; takes longer")
+    option(parser, "--shard", "I/N", "compute the part I of N only, and keep its points", read=Shard.parse)
+    repeatable(parser, "--merge", "DIR", "take the points that a part kept there", read=Path)
     add_study_arguments(parser, "screen")
 
 

@@ -5,8 +5,8 @@ import argparse
 import numpy as np
 
 from orchestrator.analysis.modes import damping_percent
-from orchestrator.cli.arguments import add_range_argument, seconds
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
+from orchestrator.cli.arguments import option, seconds, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, prepare
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.report.tables import make_table
@@ -15,13 +15,8 @@ from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument(
-        "--error",
-        type=_error,
-        default=Allowed(),
-        metavar="HZ:POINTS",
-        help="accepted error of a critical mode's frequency [Hz] and damping [points] (default: 0.001:0.1)",
-    )
+    option(parser, "--error", "HZ:POINTS", "accepted error of a critical mode's frequency [Hz] and damping [points] "
+           "(default: 0.001:0.1)", read=_error, default=Allowed())  # fmt: skip
     parser.add_argument(
         "--try",
         dest="tried",
@@ -38,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"schedule to try (repeatable; default: {', '.join(TRIED)})",
     )
     add_range_argument(parser, "frequencies of the critical modes [Hz] (default: 0.1:2)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
 
 
 def _error(text: str) -> Allowed:

@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.api.executors import Plan, PointStudy, Result, Shown
-from orchestrator.cli.arguments import add_json_argument
+from orchestrator.cli.arguments import add_json_argument, option
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
@@ -31,7 +31,7 @@ def add_study_arguments(parser: argparse.ArgumentParser, study: str, what: str =
     """Where ``what`` is computed and kept, and what is printed of it."""
     add_executor_arguments(parser)
     where = f"folder for results (default: results/<case>_{study}); {what} that are there are not computed again"
-    parser.add_argument("--out", type=Path, metavar="DIR", help=where)
+    option(parser, "--out", "DIR", where, read=Path)
     add_json_argument(parser)
     add_verdict_argument(parser)
 

@@ -5,8 +5,7 @@ import argparse
 from rich.console import RenderableType
 
 from orchestrator.api.sweep import STUDY, plan
-from orchestrator.cli.arguments import add_range_argument
-from orchestrator.cli.case_arguments import add_case_arguments, case_of, values_set
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, values_set
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import parse_vary

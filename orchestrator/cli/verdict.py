@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
+from orchestrator.cli.arguments import switch
 from orchestrator.report.verdict import COLOURS, VerdictSentence
 from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
@@ -18,11 +19,7 @@ NOT_MET = 3
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--fail-unstable",
-        action="store_true",
-        help="end with exit code 1 unless everything is known to be stable, at any frequency",
-    )
+    switch(parser, "--fail-unstable", "end with exit code 1 unless everything is known to be stable, at any frequency")
 
 
 def print_stability(
@@ -55,9 +52,7 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
 
 
 def add_details_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--details", action="store_true", help="print also the power flow, and each verdict with its eigenvalue"
-    )
+    switch(parser, "--details", "print also the power flow, and each verdict with its eigenvalue")
 
 
 def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult]) -> None:
