@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, TypedDict
 
 from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
@@ -19,13 +19,8 @@ from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.safe_files import made_folder
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
 
 
 class WantedInteractions(TypedDict, total=False):

@@ -11,20 +11,15 @@ from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.api.show import Axes, axes_or_new, curves_on, page
 from orchestrator.errors import CosimError, InputError
-from orchestrator.late import Late
+from orchestrator.late import pd, xr
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
-
     from orchestrator.analysis.stability import Stability
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
     from orchestrator.watch.finding import Finding
-else:
-    pd = Late("pandas")
 
 _STATES = 3
 """States with the largest participation that stand in a table."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
@@ -31,19 +31,13 @@ from orchestrator.coupling.progress import Progress
 from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-else:
-    pd = Late("pandas")
 
 
 class RunEndedWarning(UserWarning):

@@ -25,7 +25,7 @@ from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 
@@ -105,12 +105,12 @@ def _summary(content: dict[str, Any]) -> Group:
     heading = (f"Admittance by {content['method']}: {content['lines']} lines from {content['range_hz'][0]:g} to "
              f"{content['range_hz'][1]:g} Hz, largest bound {content['largest_relative_bound']:.1e}; model of order "
              f"{content['model']['order']}, error {content['model']['error']:.1e}")  # fmt: skip
-    table = PlainTable(title="Poles of the fitted model", title_justify="left", header_style="bold")
-    for column in ("Pole [rad/s]", "f [Hz]", "Damping [%]"):
-        table.add_column(escape(column), justify="right")
+    rows = []
     for pole in content["model"]["poles"]:
         eigenvalue = complex(pole["real"], pole["imag"])
         value = f"{pole['real']:.4g}" + (f" ± j{pole['imag']:.4g}" if pole["imag"] else "")
         damping = f"{damping_percent(eigenvalue):.2f}" if eigenvalue else "–"
-        table.add_row(value, f"{pole['imag'] / (2 * math.pi):.4g}", damping)
+        rows.append((value, f"{pole['imag'] / (2 * math.pi):.4g}", damping))
+    columns = ("Pole [rad/s]", "f [Hz]", "Damping [%]")
+    table = make_table("Poles of the fitted model", *columns, left=0, rows=rows)
     return Group(heading, table)

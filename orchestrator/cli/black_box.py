@@ -23,7 +23,7 @@ from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -82,12 +82,9 @@ def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
 
 def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     fitted = f"order {len(system.identified.A)}, fit {system.identified.error:.1e}"
-    name = f"{title}: {system.component} as a black box, {fitted}"
-    table = PlainTable(title=escape(name), title_justify="left", header_style="bold")
     columns = ["f [Hz]", "Damping [%]", "the box takes part [%]"]
     columns += ["with its states: f [Hz]", "Damping [%]", "takes part [%]"] if white else []
-    for column in columns:
-        table.add_column(escape(column), justify="right")
+    table = make_table(f"{title}: {system.component} as a black box, {fitted}", *columns, left=0)
     for mode in system.modes():
         row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * system.participation(mode):.2f}"]
         other = _nearest(mode, white)

@@ -9,7 +9,7 @@ from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
 from orchestrator.cli.arguments import option, seconds_or_none, switch
 from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,13 +30,13 @@ def run(options: argparse.Namespace) -> int:
         for text in found.remarks:
             make_errors().print(text, markup=False, soft_wrap=True, highlight=False)
         return 0
-    title = escape(f"A: {options.first}\nB: {options.second}")
-    table = PlainTable(title=title, title_justify="left", header_style="bold")
-    for column in ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings"):
-        table.add_column(column, justify="left" if column == "Signal" else "right")
-    for c in found:
-        table.add_row(f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}",
-                      f"{c.largest:.4g}", f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))  # fmt: skip
+    columns = ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings")
+    rows = [
+        (f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}", f"{c.largest:.4g}",
+         f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))
+        for c in found
+    ]  # fmt: skip
+    table = make_table(f"A: {options.first}\nB: {options.second}", *columns, rows=rows)
     console = make_console()
     console.print(table)
     for text in found.remarks:

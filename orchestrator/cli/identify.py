@@ -8,7 +8,7 @@ from rich.markup import escape
 from orchestrator.api.identification import identify
 from orchestrator.cli.arguments import option, seconds, seconds_or_none, switch
 from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import eigenvalue_text, make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,14 +34,12 @@ def run(options: argparse.Namespace) -> int:
             make_errors().print(text, soft_wrap=True, highlight=False)
         return 0
     title = f"{found.signal} from {found.start:g} to {found.stop:g} s (matrix pencil), strongest first"
-    table = PlainTable(title=escape(title), title_justify="left", header_style="bold")
-    for column in ("λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"):
-        table.add_column(column, justify="right")
+    columns, rows = ("λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"), []
     for m in found:
-        value = f"{m.eigenvalue.real:+.4f} ± j{abs(m.eigenvalue.imag):.4f}"
-        frequency, damping = f"{m.frequency_hz:.4f}{' ?' if m.doubts else ''}", f"{m.damping_percent:.2f}"
-        shown = ("trend", "-") if found.is_trend(m) else (frequency, damping)
-        table.add_row(value, *shown, f"{m.amplitude:.3g}")
+        figures = (f"{m.frequency_hz:.4f}{' ?' if m.doubts else ''}", f"{m.damping_percent:.2f}")
+        shown = ("trend", "-") if found.is_trend(m) else figures
+        rows.append((eigenvalue_text(m.eigenvalue), *shown, f"{m.amplitude:.3g}"))
+    table = make_table(title, *columns, left=0, rows=rows)
     console = make_console()
     console.print(table)
     for text in found.remarks:

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from orchestrator.cases.names import variables_of
-from orchestrator.late import Late
-
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
+from orchestrator.late import xr
 
 MOST_DRAWN = 200_000
 """Rows up to which a signal is drawn as it is."""

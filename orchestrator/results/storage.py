@@ -16,16 +16,12 @@ from numpy.typing import NDArray
 
 from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.results.netcdf import netcdf_image, stored_name
 from orchestrator.safe_files import replacing, write_bytes, write_text
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from orchestrator.cases.prepare import PreparedScenario
-else:
-    xr = Late("xarray")
 
 _CSV_ROWS = 10_000
 """Rows of a table that are written at a time."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,13 +19,8 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import faults_among
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.study.modes import running
-
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:

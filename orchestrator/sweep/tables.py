@@ -6,7 +6,7 @@ import re
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
 from orchestrator.sweep.dataset import Samples
 from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.trajectories import GridPlace
@@ -20,11 +20,8 @@ def trajectories(samples: Samples) -> Table:
 
     The table shows the trajectories with a name, or all trajectories if the case names no mode.
     """
-    title = escape(f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}")
-    table = PlainTable(title=title, title_justify="left", title_style="bold", header_style="bold")
-    table.add_column("Mode", overflow="fold")
-    for column in ("f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity"):
-        table.add_column(escape(column), justify="right")
+    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    table = make_table(title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity")
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:

@@ -5,21 +5,15 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.results.comtrade.configuration import Configuration, read_configuration
 from orchestrator.results.comtrade.samples import read_samples
 from orchestrator.results.manifest import ResultsWarning
-
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
 
 SUFFIXES = (".cfg", ".cff", ".dat")
 """Files by which a recording is named, in small letters."""

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import io
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.arrays import Matrix, Numbers
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.results.comtrade.configuration import Configuration
 from orchestrator.results.manifest import ResultsWarning
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
 
 _STAMP_MISSING = 0xFFFFFFFF
 _TYPES = {"BINARY": ("<i2", -0x8000), "BINARY32": ("<i4", -0x80000000), "FLOAT32": ("<f4", None)}
