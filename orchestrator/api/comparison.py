@@ -78,10 +78,7 @@ class RunComparison:
 
 
 def compare(
-    a: Run | xr.Dataset | str | Path,
-    b: Run | xr.Dataset | str | Path,
-    signals: Names = (),
-    start: Time | None = None,
+    a: Run | xr.Dataset | str | Path, b: Run | xr.Dataset | str | Path, signals: Names = (), start: Time | None = None
 ) -> RunComparison:
     """Compare two runs: how far signals differ, and what each rings with.
 

@@ -12,12 +12,7 @@ from orchestrator.api.show import page
 from orchestrator.asked import Names, checked, require_known
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
-from orchestrator.coordinated_design.study import (
-    PointsDesign,
-    PointsDesignRequest,
-    design_over_points,
-    values_of,
-)
+from orchestrator.coordinated_design.study import PointsDesign, PointsDesignRequest, design_over_points, values_of
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
 

@@ -166,25 +166,9 @@ def require_controllers(controllers: Sequence[str]) -> None:
 
 
 def design_controller(
-    file: CaseFile,
-    request: DesignRequest,
-    *,
-    report: StageReport = lambda text: None,
-    store: PointStore | None = None,
+    file: CaseFile, request: DesignRequest, *, report: StageReport = lambda text: None, store: PointStore | None = None
 ) -> ControllerDesign:
-    """Design a controller, as `Case.design` offers it.
-
-    Parameters
-    ----------
-    file
-        The case.
-    request
-        What is required.
-    report
-        Called with the name of each stage when the stage begins.
-    store
-        Keeps figures on the way, as `design_pod` takes it.
-    """
+    """As `Case.design`; ``store`` keeps figures on the way."""
     return ControllerDesign(design_pod(file, request, report, store, search_settings))
 
 

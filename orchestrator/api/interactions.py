@@ -116,18 +116,7 @@ class Interactions:
         return as_json(self.judgement)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write tables, ``interactions.json`` and the page ``interactions.html``; give their paths.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-        """
+        """Write tables, ``interactions.json`` and the page ``interactions.html`` into a folder; give their paths."""
         from orchestrator.interactions.files import save  # noqa: PLC0415 - imports what only pages need
 
         return save(self.judgement, made_folder(Path(folder)))

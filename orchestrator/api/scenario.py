@@ -17,7 +17,7 @@ from orchestrator.api.sensitivities import Sensitivities
 from orchestrator.api.show import page
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
-from orchestrator.asked import Names, frequency_range, percent, plain_value
+from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
@@ -233,7 +233,8 @@ class Scenario:
 
         prepared = self._until(in_seconds(stop, "stop"))
         _check_observers(observers)
-        _check_threads(threads)
+        if threads is not None:
+            whole_number(threads, "threads", 1, MOST_THREADS)
         _check_kind(
             recording, RecordingFolder, "recording", "give a RecordingFolder; `checkpoints` takes a folder's path"
         )
@@ -441,11 +442,6 @@ def _check_observers(given: Sequence[Observer]) -> None:
         raise InputError(f"observers = {given!r}; give a list of observers, or leave it out")
 
 
-def _check_threads(given: int | None) -> None:
-    if given is not None and (isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS):
-        raise InputError(f"threads = {given!r}; give a whole number from 1 to {MOST_THREADS}, or leave it out")
-
-
 def _check_kind(given: object, kind: type, argument: str, rule: str) -> None:
     if given is not None and not isinstance(given, kind):
         raise InputError(f"{argument} = {given!r}; {rule}, or leave it out")
@@ -479,30 +475,7 @@ def choose(
     schedule: ScheduleName | None = None,
     tolerance: float | None = None,
 ) -> list[Scenario]:
-    """Scenarios of a case, as `Case.choose` offers them.
-
-    Parameters
-    ----------
-    file
-        The case.
-    names
-        Of the scenarios; all of them where empty.
-    values
-        Values by ``component.variable``; they go before the parameter files.
-    step, stop
-        Communication step, and time at which runs end [s]; the case's where None.
-    parameters
-        Paths of parameter files.
-    schedule
-        In which order components step, and what inputs do meanwhile; the case's where None.
-    tolerance
-        Largest error of a coupled output in a pair of steps, of 1 or of its value; None for fixed steps, or the case's.
-
-    Raises
-    ------
-    CaseError
-        With every problem of the case and of the values.
-    """
+    """As `Case.choose` offers them."""
     if schedule is not None and schedule not in SCHEDULES:
         raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
     files = parameter_files(parameters)

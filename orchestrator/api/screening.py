@@ -63,18 +63,7 @@ class Screening:
         return as_json(self.summary)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html``.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-        """
+        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html`` into a folder."""
         from orchestrator.screening.files import save  # noqa: PLC0415 - imports Matplotlib, a second
 
         return save(self.summary, made_folder(Path(folder)))

@@ -186,30 +186,7 @@ def plan(
     parameters: Paths = (),
     frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
 ) -> SweepPlan:
-    """Check a sweep, and build the FMUs that it needs, as `Case.sweep` does first.
-
-    Parameters
-    ----------
-    file
-        The case.
-    vary
-        Values by ``component.parameter``, or texts as with ``--vary``.
-    scenarios
-        Names of the scenarios; all of them where empty.
-    values
-        Values by ``component.variable`` that hold at every point. They have priority over the parameter files.
-    step
-        Communication step [s]; the case's where None.
-    parameters
-        Paths of parameter files.
-    frequencies
-        Modes from the first to the second are followed [Hz].
-
-    Raises
-    ------
-    InputError
-        If a value, a name or a file cannot be used.
-    """
+    """As `Case.sweep` takes it, checked, and its FMUs built."""
     files, fixed = parameter_files(parameters), case_values(values)
     chosen, seen = names(scenarios, "scenarios"), frequency_range(frequencies)
     return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)

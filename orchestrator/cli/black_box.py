@@ -9,12 +9,7 @@ from rich.table import Table
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.stability import Stability, judge
-from orchestrator.black_box.coupled_modes import (
-    BoxedSystem,
-    component_participation,
-    is_black_box,
-    linearize_with_box,
-)
+from orchestrator.black_box.coupled_modes import BoxedSystem, component_participation, is_black_box, linearize_with_box
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.passivity import passivity
 from orchestrator.cli.arguments import option, switch
