@@ -24,22 +24,13 @@ _LARGEST = 10**308
 
 @dataclass(frozen=True)
 class FieldKind:
-    """What a field may be.
-
-    Attributes
-    ----------
-    read
-        From an option's text, or a `ValueError` that says what is wrong with it; None for a switch.
-    check
-        From what a caller gives, and the keyword for the `InputError`.
-    several
-        Whether the option is repeatable, and gives a tuple.
-    """
+    """What a field may be."""
 
     metavar: str
+    # from an option's text, or a `ValueError` that says what is wrong with it; None for a switch
     read: Callable[[str], Any] | None
-    check: Callable[[Any, str], Any]
-    several: bool = False
+    check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
+    several: bool = False  # whether the option is repeatable, and gives a tuple
 
 
 @dataclass(frozen=True)

@@ -57,24 +57,15 @@ _PATIENCE = 10
 
 @dataclass
 class AcceptanceReport:
-    """What all checks found.
-
-    Attributes
-    ----------
-    protections
-        What kept the FMU's process from the rest of the machine; empty where it was not started.
-    used_as
-        Component, scenario and operating point of the case, in words.
-    seed
-        Of the dips, jumps and operating points that were drawn at random.
-    """
+    """What all checks found."""
 
     fmu: Path
     binding: Path | None
     results: list[CheckResult] = field(default_factory=list)
+    # what kept the FMU's process from the rest of the machine; empty where it was not started
     protections: tuple[Protection, ...] = ()
-    used_as: str = ""
-    seed: int = 0
+    used_as: str = ""  # component, scenario and operating point of the case, in words
+    seed: int = 0  # of the dips, jumps and operating points that were drawn at random
 
     @property
     def failures(self) -> list[CheckResult]:

@@ -79,17 +79,10 @@ def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
 
 @dataclass(frozen=True)
 class Strides:
-    """How a path is walked.
+    """How a path is walked."""
 
-    Attributes
-    ----------
-    same
-        Least similarity with which a mode is taken for the same.
-    rival
-        Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
-    """
-
-    same: float = _SAME
+    same: float = _SAME  # least similarity with which a mode is taken for the same
+    # Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
     rival: float = np.inf
     shortest: float = _SHORTEST
 

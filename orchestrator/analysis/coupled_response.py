@@ -52,27 +52,13 @@ which is rounding. It should move if its declared derivatives, times the step, e
 
 @dataclass(frozen=True)
 class Disagreement:
-    """The largest difference of the FMUs' response from that of the linear model.
+    """The largest difference of the FMUs' response from that of the linear model."""
 
-    Attributes
-    ----------
-    state
-        Name ``component.state``.
-    time
-        After the disturbance [s].
-    error
-        Relative to the response's size at that time.
-    seconds
-        How long the response was followed [s].
-    size
-        Of the disturbance, one of `SIZES`.
-    """
-
-    state: str
-    time: float
-    error: float
-    seconds: float
-    size: float
+    state: str  # name ``component.state``
+    time: float  # after the disturbance [s]
+    error: float  # relative to the response's size at that time
+    seconds: float  # how long the response was followed [s]
+    size: float  # of the disturbance, one of `SIZES`
 
 
 def foreign_components(master: Master) -> list[str]:

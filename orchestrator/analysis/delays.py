@@ -34,21 +34,11 @@ LARGEST_ERROR = 1e-3
 
 @dataclass(frozen=True)
 class WireLink:
-    """A connection that does not simply carry its value, as the linear model has it.
+    """A connection that does not simply carry its value, as the linear model has it."""
 
-    Attributes
-    ----------
-    name
-        ``a.out -> b.in``.
-    delay
-        [s]
-    is_cut
-        Whether nothing of the signal arrives.
-    """
-
-    name: str
-    delay: float
-    is_cut: bool
+    name: str  # ``a.out -> b.in``
+    delay: float  # [s]
+    is_cut: bool  # whether nothing of the signal arrives
 
     @property
     def is_ideal(self) -> bool:

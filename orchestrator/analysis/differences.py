@@ -22,19 +22,13 @@ class Differences(NamedTuple):
 
 @dataclass(frozen=True)
 class PerturbedStep:
-    """One communication step of a component, which begins a little beside its operating point.
-
-    Attributes
-    ----------
-    inputs, exits
-        Names of the inputs that are perturbed after the states, and of the outputs that are read.
-    time, step_size
-        Of the operating point, and the communication step [s].
-    """
+    """One communication step of a component, which begins a little beside its operating point."""
 
     component: Component
+    # inputs, exits: names of the inputs that are perturbed after the states, and of the outputs that are read
     inputs: Sequence[str]
     exits: Sequence[str]
+    # time, step_size: of the operating point, and the communication step [s]
     time: float
     step_size: float
 

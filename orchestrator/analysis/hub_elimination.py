@@ -36,19 +36,12 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class HubEquations:
-    """The equations of a linear model without σ, in their parts, and what does not depend on σ.
+    """The equations of a linear model without σ, in their parts, and what does not depend on σ."""
 
-    Attributes
-    ----------
-    whole
-        The equations z⁺ − F·z − G·w = 0, w − H·z − K·w = 0 with turned signs, shape (n + m, n + m), where m counts only
-        what somebody takes.
-    states
-        Number n of states, which come first.
-    """
-
+    # the equations z⁺ − F·z − G·w = 0, w − H·z − K·w = 0 with turned signs, shape (n + m, n + m), where m counts only
+    # what somebody takes
     whole: sp.csr_array
-    states: int
+    states: int  # number n of states, which come first
     hub: Places
     rest: Places
 

@@ -23,17 +23,11 @@ numbers."""
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedMode:
-    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal].
-
-    Attributes
-    ----------
-    doubts
-        Why it may be no mode of the system, where that was asked; see `mode_doubts`.
-    """
+    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal]."""
 
     eigenvalue: complex
     amplitude: float
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # why it may be no mode of the system, where that was asked; see `mode_doubts`
 
     @property
     def frequency_hz(self) -> float:
@@ -91,22 +85,12 @@ def identify_modes(
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """The samples that `identify_modes` uses of a record.
+    """The samples that `identify_modes` uses of a record."""
 
-    Attributes
-    ----------
-    recorded
-        Time between two samples of the record [s].
-    thin
-        Every so many of them are used.
-    finest
-        Time between two samples from which on they are thinned, however short the record [s].
-    """
-
-    recorded: float
-    thin: int
+    recorded: float  # time between two samples of the record [s]
+    thin: int  # every so many of them are used
     number: int
-    finest: float
+    finest: float  # time between two samples from which on they are thinned, however short the record [s]
 
     @property
     def interval(self) -> float:

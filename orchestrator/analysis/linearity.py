@@ -48,21 +48,14 @@ perturbation of 1e-5; beyond the limit it is larger."""
 
 @dataclass(frozen=True)
 class Doubt:
-    """A component for which the modes depend on how it was perturbed.
-
-    Attributes
-    ----------
-    shift
-        The shift of this mode, relative to |λ|.
-    turns
-        Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
-        for small changes.
-    """
+    """A component for which the modes depend on how it was perturbed."""
 
     component: str
     mode: Mode
-    shift: float
+    shift: float  # the shift of this mode, relative to |λ|
     why: str
+    # Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
+    # for small changes.
     turns: bool = False
 
     def __str__(self) -> str:

@@ -40,25 +40,15 @@ Measure = Callable[[Mode], float]
 
 @dataclass(frozen=True)
 class Naming:
-    """What each name went to.
-
-    Attributes
-    ----------
-    reasons
-        Why a name that fits some mode is borne by none, by name.
-    contested
-        Names for which another mode fits at least `CONTESTED` as well as the one that fits best.
-    fits
-        The best mode of each name with the sum of all measures in view, doubts or not; and what its name measures.
-    remarks
-        What else is to be known of a name.
-    """
+    """What each name went to."""
 
     named: Mapping[str, Mode]
-    reasons: Mapping[str, str] = field(default_factory=dict)
+    reasons: Mapping[str, str] = field(default_factory=dict)  # why a name that fits some mode is borne by none, by name
+    # names for which another mode fits at least `CONTESTED` as well as the one that fits best
     contested: tuple[str, ...] = ()
+    # the best mode of each name with the sum of all measures in view, doubts or not; and what its name measures
     fits: Mapping[str, tuple[Mode, Measure]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what else is to be known of a name
 
     @property
     def doubts(self) -> tuple[str, ...]:

@@ -30,18 +30,12 @@ _BESIDE = 1e-3
 
 @dataclass(frozen=True)
 class RefinedModes:
-    """Eigenvalues λ [rad/s], shape (m,), with left and right eigenvectors as columns, shape (n, m).
-
-    Attributes
-    ----------
-    settled
-        Whether the last round left them where they were. Others are not to be trusted.
-    """
+    """Eigenvalues λ [rad/s], shape (m,), with left and right eigenvectors as columns, shape (n, m)."""
 
     values: NDArray[np.complex128]
     left: Vector
     right: Vector
-    settled: bool
+    settled: bool  # Whether the last round left them where they were. Others are not to be trusted.
 
 
 def refine(

@@ -33,17 +33,10 @@ At = TypeVar("At", bound=Hashable)
 
 @dataclass(frozen=True)
 class ModeSet:
-    """The modes of one operating point.
+    """The modes of one operating point."""
 
-    Attributes
-    ----------
-    eigenvalues
-        λ [rad/s], shape (m,).
-    left, right
-        Eigenvectors as rows, shape (m, n), in any scaling.
-    """
-
-    eigenvalues: Complex
+    eigenvalues: Complex  # λ [rad/s], shape (m,)
+    # left, right: eigenvectors as rows, shape (m, n), in any scaling
     left: Complex
     right: Complex
     names: tuple[str, ...]
@@ -148,20 +141,12 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
 @dataclass
 class Followed(Generic[At]):
-    """The trajectory of every mode.
+    """The trajectory of every mode."""
 
-    Attributes
-    ----------
-    trajectory
-        Numbers of the trajectories of a point's modes.
-    similarity
-        Similarity of each mode to its predecessor; NaN where a trajectory begins.
-    origin
-        The predecessor's point; None where a trajectory begins.
-    """
-
-    trajectory: dict[At, list[int]] = field(default_factory=dict)
+    trajectory: dict[At, list[int]] = field(default_factory=dict)  # numbers of the trajectories of a point's modes
+    # similarity of each mode to its predecessor; NaN where a trajectory begins
     similarity: dict[At, list[float]] = field(default_factory=dict)
+    # the predecessor's point; None where a trajectory begins
     origin: dict[At, list[At | None]] = field(default_factory=dict)
 
 

@@ -47,21 +47,12 @@ def damping_percent(eigenvalue: complex) -> float:
 
 @dataclass(frozen=True)
 class Mode:
-    """One eigenvalue λ [rad/s] with its participation factors and its shape.
-
-    Attributes
-    ----------
-    participation
-        Factor of every state, largest first; the factors of a mode sum to 1.
-    shape
-        Right eigenvector by state name, scaled so that its largest element is 1.
-    left
-        Left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere.
-    """
+    """One eigenvalue λ [rad/s] with its participation factors and its shape."""
 
     eigenvalue: complex
-    participation: tuple[tuple[str, float], ...]
-    shape: dict[str, complex]
+    participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
+    shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
+    # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
     left: dict[str, complex] = field(default_factory=dict, repr=False)
 
     @property
@@ -122,16 +113,11 @@ class Mode:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first.
-
-    Attributes
-    ----------
-    rightmost
-        The mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros.
-    """
+    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first."""
 
     eigenvalues: NDArray[np.complex128]
     modes: list[Mode]
+    # the mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros
     rightmost: Mode | None
 
     @property

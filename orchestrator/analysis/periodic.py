@@ -47,30 +47,15 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class PeriodicPoint:
-    """A state that repeats after a period.
+    """A state that repeats after a period."""
 
-    Attributes
-    ----------
-    names
-        Of all states; outputs that are held over a step follow those of the components.
-    x
-        Values of all states, shape (n,).
-    change
-        Of all states over a period, relative to their scale, 0 for those that count, shape (n,).
-    first
-        The largest one at the start.
-    iterations
-        Of Newton's method.
-    counting
-        Whether a state grows by the same in each period without any effect, such as a clock, or an angle by whole
-        turns, shape (n,).
-    """
-
-    names: tuple[str, ...]
-    x: Matrix
-    change: Matrix
-    first: float
-    iterations: int
+    names: tuple[str, ...]  # of all states; outputs that are held over a step follow those of the components
+    x: Matrix  # values of all states, shape (n,)
+    change: Matrix  # of all states over a period, relative to their scale, 0 for those that count, shape (n,)
+    first: float  # the largest one at the start
+    iterations: int  # of Newton's method
+    # whether a state grows by the same in each period without any effect, such as a clock, or an angle by whole turns,
+    # shape (n,)
     counting: Mask
 
     @property

@@ -56,14 +56,9 @@ _ROUNDING = 1e-11
 
 @dataclass(frozen=True)
 class ContinuousModel:
-    """ẋ = A·x + B·u, y = C·x + D·u, with names.
+    """ẋ = A·x + B·u, y = C·x + D·u, with names."""
 
-    Attributes
-    ----------
-    states, rates, inputs, outputs
-        Names of the FMU's variables; rates are the derivatives of the states.
-    """
-
+    # states, rates, inputs, outputs: names of the FMU's variables; rates are the derivatives of the states
     states: tuple[str, ...]
     rates: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -103,24 +98,15 @@ class _Plan:
 
 @dataclass(frozen=True)
 class _Response:
-    """The response of the FMU, divided by the steps' size.
+    """The response of the FMU, divided by the steps' size."""
 
-    Attributes
-    ----------
-    course
-        Half the difference between steps up and down, shape (k, signals).
-    peaks, curved, one_sided
-        Figures of every signal: its largest value, the difference with half a step, and the difference between up and
-        down.
-    floors
-        Difference that rounding alone may cause.
-    """
-
-    course: Matrix
+    course: Matrix  # half the difference between steps up and down, shape (k, signals)
+    # peaks, curved, one_sided: figures of every signal: its largest value, the difference with half a step, and the
+    # difference between up and down
     peaks: Matrix
     curved: Matrix
     one_sided: Matrix
-    floors: Matrix
+    floors: Matrix  # difference that rounding alone may cause
 
     @property
     def too_curved(self) -> NDArray[np.bool_]:

@@ -113,37 +113,19 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Stability:
-    """The verdict on a linearised system.
+    """The verdict on a linearised system."""
 
-    Attributes
-    ----------
-    stable
-        Whether no mode grows; None if this is not known.
-    mode
-        The mode of the largest real part: of the step map, or of the continuous system if only this one grows.
-    growing
-        Number of growing modes of the same model; a conjugate pair counts once.
-    zeros
-        Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle.
-    cause
-        The cause of growth; None if no mode grows.
-    continuous_growth_rate
-        Largest real part [1/s] of the continuous system; None where a component gives no derivatives.
-    step_size
-        Communication step [s]; None for a continuous model.
-    reason
-        Why the verdict is not known, or the region that was not searched.
-    """
-
-    stable: bool | None
+    stable: bool | None  # whether no mode grows; None if this is not known
+    # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None
-    growing: int = 0
-    zeros: int = 0
+    growing: int = 0  # number of growing modes of the same model; a conjugate pair counts once
+    zeros: int = 0  # eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle
     eigenvalues: int = 0
-    cause: Cause | None = None
+    cause: Cause | None = None  # the cause of growth; None if no mode grows
+    # largest real part [1/s] of the continuous system; None where a component gives no derivatives
     continuous_growth_rate: float | None = None
-    step_size: float | None = None
-    reason: str = ""
+    step_size: float | None = None  # communication step [s]; None for a continuous model
+    reason: str = ""  # why the verdict is not known, or the region that was not searched
 
     @property
     def largest_growth_rate(self) -> float | None:

@@ -29,27 +29,13 @@ _SHORT = 1e-4
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A steady state of the coupled system.
+    """A steady state of the coupled system."""
 
-    Attributes
-    ----------
-    residual
-        Largest change of any state over one communication step [the state's unit, mostly pu].
-    drift
-        Largest rate of change of any state [the state's unit per second].
-    initial_residual
-        Residual at the power flow's operating point, before any correction.
-    iterations
-        Number of Newton iterations; 0 if the power flow's point is a steady state already.
-    states
-        Values of the states by ``component.state``.
-    """
-
-    residual: float
-    drift: float
-    initial_residual: float
-    iterations: int
-    states: dict[str, float]
+    residual: float  # largest change of any state over one communication step [the state's unit, mostly pu]
+    drift: float  # largest rate of change of any state [the state's unit per second]
+    initial_residual: float  # residual at the power flow's operating point, before any correction
+    iterations: int  # number of Newton iterations; 0 if the power flow's point is a steady state already
+    states: dict[str, float]  # values of the states by ``component.state``
 
 
 def find_operating_point(

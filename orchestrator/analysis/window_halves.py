@@ -32,23 +32,13 @@ _MOST_SAMPLES = 4000
 
 @dataclass(frozen=True, slots=True)
 class WindowPart:
-    """Modes of a part of a signal, and what they leave of it.
-
-    Attributes
-    ----------
-    length
-        Of this part [s].
-    remainder
-        Root mean square of what the modes leave [unit of the signal].
-    noise_like
-        Whether the remainder is not correlated with itself.
-    """
+    """Modes of a part of a signal, and what they leave of it."""
 
     modes: Sequence[IdentifiedMode]
-    length: float
+    length: float  # of this part [s]
     samples: int
-    remainder: float
-    noise_like: bool
+    remainder: float  # root mean square of what the modes leave [unit of the signal]
+    noise_like: bool  # whether the remainder is not correlated with itself
 
     def shows(self, mode: IdentifiedMode) -> bool | None:
         """Whether this part shows a mode of all of the signal; None where it cannot tell.

@@ -37,23 +37,16 @@ STILL = 1e-9
 
 @dataclass(frozen=True)
 class BoxedSystem:
-    """A coupled system linearised with one component as a black box.
-
-    Attributes
-    ----------
-    residual
-        The larger of two changes: of a known component's state in one communication step, and of the box's current from
-        its start to its rest at the ideal bus.
-    warnings
-        Reasons in the other components for doubts about the modes from 0.1 to 2 Hz.
-    """
+    """A coupled system linearised with one component as a black box."""
 
     component: str
     response: FrequencyResponse
     identified: IdentifiedModel
     model: LinearModel
+    # the larger of two changes: of a known component's state in one communication step, and of the box's current from
+    # its start to its rest at the ideal bus
     residual: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # reasons in the other components for doubts about the modes from 0.1 to 2 Hz
 
     def modes(
         self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]

@@ -10,26 +10,16 @@ from orchestrator.black_box.frequency_response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Powers that a device feeds in, over changes of the voltage at its terminals.
+    """Powers that a device feeds in, over changes of the voltage at its terminals."""
 
-    Attributes
-    ----------
-    frequencies
-        Of the change [Hz], shape (f,).
-    p_theta, q_v
-        P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,).
-    p_v, q_theta
-        The same crosswise [pu, pu/rad], shape (f,).
-    p_omega
-        P over the frequency of the voltage [pu/pu], shape (f,).
-    """
-
-    frequencies: Numbers
+    frequencies: Numbers  # of the change [Hz], shape (f,)
+    # p_theta, q_v: P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,)
     p_theta: Complex
     q_v: Complex
+    # p_v, q_theta: the same crosswise [pu, pu/rad], shape (f,)
     p_v: Complex
     q_theta: Complex
-    p_omega: Complex
+    p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
 
     def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
         """Least size of one of them in a band, and its frequency [Hz].

@@ -23,21 +23,12 @@ _RETURNS = 2
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A bus whose units reach a limit of reactive power.
-
-    Attributes
-    ----------
-    q
-        Reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept.
-    limit
-        The limit [pu, 100 MVA].
-    wanted, voltage
-        Magnitude that the units would hold, and the one that it has [pu].
-    """
+    """A bus whose units reach a limit of reactive power."""
 
     bus: str
-    q: float
-    limit: float
+    q: float  # reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept
+    limit: float  # the limit [pu, 100 MVA]
+    # wanted, voltage: magnitude that the units would hold, and the one that it has [pu]
     wanted: float
     voltage: float
 

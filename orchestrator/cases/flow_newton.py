@@ -30,20 +30,11 @@ _LEAST_VOLTAGE = 0.01
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """What the iterations came to.
+    """What the iterations came to."""
 
-    Attributes
-    ----------
-    voltages
-        Complex bus voltages [pu].
-    converged
-        Whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`.
-    history
-        Largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus.
-    """
-
-    voltages: NDArray[np.complex128]
-    converged: bool
+    voltages: NDArray[np.complex128]  # complex bus voltages [pu]
+    converged: bool  # whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`
+    # largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus
     history: tuple[tuple[float, str], ...]
 
 

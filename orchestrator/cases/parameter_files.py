@@ -16,17 +16,11 @@ _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
 
 @dataclass(frozen=True)
 class ParameterFile:
-    """The values of a parameter file.
-
-    Attributes
-    ----------
-    values
-        By ``component.variable``; the component may be a pattern such as ``gfor*``.
-    """
+    """The values of a parameter file."""
 
     path: Path
     text: str
-    values: dict[str, Value]
+    values: dict[str, Value]  # by ``component.variable``; the component may be a pattern such as ``gfor*``
 
     def place(self, key: str) -> str:
         return _place(self.path, self.text, key)

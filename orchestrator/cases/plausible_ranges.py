@@ -8,24 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Plausible:
-    """A range, both ends included.
-
-    Attributes
-    ----------
-    unit
-        Unit of the variable. The range does not apply to a variable of the same name in another unit.
-    or_zero
-        Whether 0 is usual as well, because it switches a part off.
-    slip
-        The likely mistake behind a value outside; found from the value where empty.
-    """
+    """A range, both ends included."""
 
     low: float
     high: float
-    unit: str
+    unit: str  # Unit of the variable. The range does not apply to a variable of the same name in another unit.
     why: str
-    or_zero: bool = False
-    slip: str = ""
+    or_zero: bool = False  # whether 0 is usual as well, because it switches a part off
+    slip: str = ""  # the likely mistake behind a value outside; found from the value where empty
 
     def fits(self, value: float) -> bool:
         return self.low <= value <= self.high or (self.or_zero and value == 0)

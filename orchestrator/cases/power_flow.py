@@ -39,33 +39,16 @@ class FlowUnit:
 
 @dataclass(frozen=True)
 class PowerFlow:
-    """A solved power flow.
+    """A solved power flow."""
 
-    Attributes
-    ----------
-    voltages
-        Complex bus voltages [pu].
-    powers
-        P + jQ of every unit on its own rating [pu, S_n].
-    residual
-        Largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages.
-    at_limits
-        Buses that feed a limit of reactive power instead of holding their voltage.
-    beyond_limits
-        Buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack.
-    lines
-        What it was solved with; a transformer of three windings is three of them.
-    slack
-        Bus that feeds what is left.
-    """
-
-    voltages: dict[str, complex]
-    powers: dict[str, complex]
-    residual: float
-    at_limits: tuple[Excess, ...] = ()
+    voltages: dict[str, complex]  # complex bus voltages [pu]
+    powers: dict[str, complex]  # P + jQ of every unit on its own rating [pu, S_n]
+    residual: float  # largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages
+    at_limits: tuple[Excess, ...] = ()  # buses that feed a limit of reactive power instead of holding their voltage
+    # buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack
     beyond_limits: tuple[Excess, ...] = ()
-    lines: tuple[FlowLine, ...] = ()
-    slack: str = ""
+    lines: tuple[FlowLine, ...] = ()  # what it was solved with; a transformer of three windings is three of them
+    slack: str = ""  # bus that feeds what is left
 
 
 def solve_power_flow(

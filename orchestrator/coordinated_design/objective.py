@@ -31,38 +31,20 @@ Naming = Callable[[Sequence[str], list[Mode]], Mapping[str, Mode]]
 
 @dataclass(frozen=True)
 class Aim:
-    """Which modes a design damps, and the damping ratio below which it may push no other.
+    """Which modes a design damps, and the damping ratio below which it may push no other."""
 
-    Attributes
-    ----------
-    names
-        Of the case's modes; none for all electromechanical ones.
-    naming
-        Gives the named modes; None where none is named.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the case's modes; none for all electromechanical ones
     least: float
-    naming: Naming | None = None
+    naming: Naming | None = None  # gives the named modes; None where none is named
 
 
 @dataclass(frozen=True)
 class Watched:
-    """A mode at one operating point.
+    """A mode at one operating point."""
 
-    Attributes
-    ----------
-    value
-        λ [rad/s].
-    place
-        Its column among the eigenvectors.
-    floor
-        Damping ratio that it may not fall below; None for a mode that the design damps.
-    """
-
-    value: complex
-    place: int
-    floor: float | None
+    value: complex  # λ [rad/s]
+    place: int  # its column among the eigenvectors
+    floor: float | None  # damping ratio that it may not fall below; None for a mode that the design damps
     hardly_moved: bool = False
 
     @property
@@ -124,24 +106,13 @@ def growth(values: Complex) -> float:
 
 @dataclass(frozen=True)
 class Worth:
-    """What a setting is worth at one or at all operating points.
+    """What a setting is worth at one or at all operating points."""
 
-    Attributes
-    ----------
-    worst
-        Least damping ratio of the modes that the design damps; 1 where there are none.
-    breach
-        By how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither.
-    point
-        Number of the point with the least damping.
-    rest
-        Least damping ratio of those that the loops move more than hardly; at least ``worst``.
-    """
-
-    worst: float
+    worst: float  # least damping ratio of the modes that the design damps; 1 where there are none
+    # by how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither
     breach: float
-    point: int = 0
-    rest: float = 1.0
+    point: int = 0  # number of the point with the least damping
+    rest: float = 1.0  # least damping ratio of those that the loops move more than hardly; at least ``worst``
 
     @property
     def allowed(self) -> bool:

@@ -57,44 +57,30 @@ class PodPlace:
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """Eigenvalues of a closed loop.
+    """Eigenvalues of a closed loop."""
 
-    Attributes
-    ----------
-    values
-        λ [rad/s]; of a reduced system, those that it left out stand last.
-    left, right
-        Eigenvectors as columns, of a reduced system in its own coordinates and without those that it left out.
-    """
-
-    values: Complex
+    values: Complex  # λ [rad/s]; of a reduced system, those that it left out stand last
+    # left, right: eigenvectors as columns, of a reduced system in its own coordinates and without those that it left
+    # out
     left: Complex
     right: Complex
 
 
 @dataclass(frozen=True)
 class OpenLoops:
-    """ẋ = A·x + U·w and y = V·x + D·w: y are the loops' signals with unit gain, w is what acts in their place.
+    """ẋ = A·x + U·w and y = V·x + D·w: y are the loops' signals with unit gain, w is what acts in their place."""
 
-    Attributes
-    ----------
-    A, U, V, D
-        Shapes (r, r), (r, m), (m, r), (m, m).
-    right, left
-        From the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same.
-    rest
-        Eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast.
-    """
-
+    # A, U, V, D: shapes (r, r), (r, m), (m, r), (m, m)
     A: Vector
     U: Vector
     V: Vector
     D: Vector
     places: tuple[PodPlace, ...]
     names: tuple[str, ...]
+    # right, left: from the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same
     right: Matrix | None = None
     left: Matrix | None = None
-    rest: Complex | None = None
+    rest: Complex | None = None  # eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast
 
     @classmethod
     def of(

@@ -14,26 +14,16 @@ from orchestrator.pod_design.closed_loop import PodSetting
 
 @dataclass(frozen=True)
 class RankedConverter:
-    """What a controller at one converter can do, with all others that are designed off.
-
-    Attributes
-    ----------
-    shift
-        How far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
-        the residues' sizes over all points [rad/s per pu].
-    setting
-        The best setting that a search finds for it alone; None where none was searched.
-    worst
-        Least damping ratio with that setting, of all points and all modes to be damped; None where it is not known.
-    stages
-        N_S of its lead/lag.
-    """
+    """What a controller at one converter can do, with all others that are designed off."""
 
     place: PodPlace
+    # how far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
+    # the residues' sizes over all points [rad/s per pu]
     shift: float
-    setting: PodSetting | None = None
+    setting: PodSetting | None = None  # the best setting that a search finds for it alone; None where none was searched
+    # least damping ratio with that setting, of all points and all modes to be damped; None where it is not known
     worst: float | None = None
-    stages: int = 0
+    stages: int = 0  # N_S of its lead/lag
 
 
 def ranked(

@@ -20,22 +20,12 @@ _OFF = 1e-9
 
 @dataclass(frozen=True)
 class PodGroup:
-    """Converters whose controllers get one setting.
+    """Converters whose controllers get one setting."""
 
-    Attributes
-    ----------
-    controller
-        ``pod_p`` or ``pod_q``.
-    key
-        Their names in a parameter file.
-    stages
-        N_S of the lead/lag.
-    """
-
-    controller: str
+    controller: str  # ``pod_p`` or ``pod_q``
     components: tuple[str, ...]
-    key: tuple[str, ...]
-    stages: int
+    key: tuple[str, ...]  # their names in a parameter file
+    stages: int  # N_S of the lead/lag
 
     @property
     def name(self) -> str:

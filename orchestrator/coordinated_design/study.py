@@ -49,29 +49,21 @@ TOGETHER = 4
 
 @dataclass(frozen=True)
 class PointsDesignRequest:
-    """What is asked of a design over operating points.
-
-    Attributes
-    ----------
-    modes
-        All electromechanical ones where empty.
-    damping
-        None for the best that there is.
-    least_damping
-        No other mode may fall below this damping ratio, or, where it is below already, below what it has.
-    """
+    """What is asked of a design over operating points."""
 
     controllers: tuple[str, ...]
     components: tuple[str, ...] = asked(
         NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
     )
     scenario: str | None = None
+    # all electromechanical ones where empty
     modes: tuple[str, ...] = asked(
         NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
     )
-    damping: float | None = asked(DAMPING, None, "required damping, such as 20")
+    damping: float | None = asked(DAMPING, None, "required damping, such as 20")  # None for the best that there is
     gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
     stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
+    # no other mode may fall below this damping ratio, or, where it is below already, below what it has
     least_damping: float = asked(
         DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
     )
@@ -195,30 +187,17 @@ def _candidates(
 
 @dataclass(frozen=True)
 class PointsDesign:
-    """A design over operating points with what it comes to.
-
-    Attributes
-    ----------
-    frequency
-        ω that the centres relate to [rad/s].
-    found
-        The search's own figures, on the linear models; nothing of the verdict rests on them.
-    points
-        Every operating point with every outage, without the controllers and with them, all modes computed anew.
-    ranking
-        Converters by what a controller there alone would give, the best first.
-    compared
-        Number of settings of an exhaustive grid that were tried; 0 without one.
-    """
+    """A design over operating points with what it comes to."""
 
     plan: PointsDesignPlan
-    frequency: float
+    frequency: float  # ω that the centres relate to [rad/s]
     settings: tuple[PodSetting, ...]
-    found: Tried
+    found: Tried  # the search's own figures, on the linear models; nothing of the verdict rests on them
+    # every operating point with every outage, without the controllers and with them, all modes computed anew
     points: tuple[JudgedPoint, ...]
-    ranking: tuple[RankedConverter, ...]
+    ranking: tuple[RankedConverter, ...]  # converters by what a controller there alone would give, the best first
     evaluations: int
-    compared: int = 0
+    compared: int = 0  # number of settings of an exhaustive grid that were tried; 0 without one
 
     @property
     def verdict(self) -> PointsVerdict:

@@ -80,21 +80,11 @@ Imperfection = Bias | Noise | Quantisation | Delay | DropOut
 
 @dataclass
 class WirePlan:
-    """What one connection does, and may do later.
+    """What one connection does, and may do later."""
 
-    Attributes
-    ----------
-    name
-        ``a.out -> b.in``.
-    permanent
-        From t = 0 on, by kind.
-    later
-        What events may bring.
-    """
-
-    name: str
-    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)
-    later: list[Imperfection] = field(default_factory=list)
+    name: str  # ``a.out -> b.in``
+    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)  # from t = 0 on, by kind
+    later: list[Imperfection] = field(default_factory=list)  # what events may bring
 
     def disturb(self, imperfection: Imperfection) -> None:
         """From t = 0 on."""

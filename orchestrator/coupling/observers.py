@@ -55,15 +55,9 @@ class ObservedRun(Protocol):
 
 
 class Observer(Protocol):
-    """Called by the master at communication points.
+    """Called by the master at communication points."""
 
-    Attributes
-    ----------
-    every
-        Number of communication steps between two calls of `observe`.
-    """
-
-    every: int
+    every: int  # number of communication steps between two calls of `observe`
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
         """Called once, when the run is about to start."""

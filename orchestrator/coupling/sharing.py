@@ -12,21 +12,12 @@ HANDOVER = 2e-6
 
 @dataclass(frozen=True)
 class Shares:
-    """Who does the calls of one group.
+    """Who does the calls of one group."""
 
-    Attributes
-    ----------
-    own
-        Calls that the calling thread alone may do.
-    of
-        Calls of each thread, the calling one first; any of them may do those of another that has not begun them.
-    seconds
-        Cost of the thread that has most to do [s].
-    """
-
-    own: tuple[int, ...]
+    own: tuple[int, ...]  # calls that the calling thread alone may do
+    # calls of each thread, the calling one first; any of them may do those of another that has not begun them
     of: tuple[tuple[int, ...], ...]
-    seconds: float
+    seconds: float  # cost of the thread that has most to do [s]
 
 
 def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:

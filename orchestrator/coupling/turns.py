@@ -109,15 +109,7 @@ class Turn(Protocol):
 
 
 class Loop(Protocol):
-    """Steps a system.
-
-    Attributes
-    ----------
-    completed
-        Communication steps that the last call did.
-    before
-        The outputs one step earlier, where inputs are extrapolated; else None.
-    """
+    """Steps a system."""
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
@@ -130,8 +122,8 @@ class Loop(Protocol):
             If a step gives an output that is no finite number.
         """
 
-    completed: int
-    before: NDArray[np.float64] | None
+    completed: int  # communication steps that the last call did
+    before: NDArray[np.float64] | None  # the outputs one step earlier, where inputs are extrapolated; else None
 
     def seconds(self) -> list[float]:
         """Time spent inside each component's FMI calls [s], in the order of the schedule."""

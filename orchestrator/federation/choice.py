@@ -31,30 +31,20 @@ DEFAULT_PORT = 23405
 
 @dataclass(frozen=True, slots=True)
 class Federates:
-    """A choice of federates.
+    """A choice of federates."""
 
-    Attributes
-    ----------
-    names
-        Components that gfor starts as federates on this machine, each in a process of its own.
-    external
-        Components that somebody else starts as federates: `gfor federate`, or a HELICS program of their own.
-    broker
-        Address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one.
-    port
-        Where a broker that gfor starts listens on all network interfaces; None takes a free port of this machine alone.
-    patience, to_join
-        Time for one step or answer, and for all to join [s].
-    announce
-        Takes sentences that the user should read meanwhile: who is waited for, and how long the run will take.
-    """
-
+    # components that gfor starts as federates on this machine, each in a process of its own
     names: tuple[str, ...] = ()
+    # components that somebody else starts as federates: `gfor federate`, or a HELICS program of their own
     external: tuple[str, ...] = ()
+    # address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one
     broker: str | None = None
+    # where a broker that gfor starts listens on all network interfaces; None takes a free port of this machine alone
     port: int | None = None
+    # patience, to_join: time for one step or answer, and for all to join [s]
     patience: float = PATIENCE
     to_join: float = TO_JOIN
+    # takes sentences that the user should read meanwhile: who is waited for, and how long the run will take
     announce: Callable[[str], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:

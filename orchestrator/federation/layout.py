@@ -10,14 +10,9 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One exchange within each communication step, for the federates of one group; times from its beginning [ns].
+    """One exchange within each communication step, for the federates of one group; times from its beginning [ns]."""
 
-    Attributes
-    ----------
-    publish, compute, read
-        When gfor publishes inputs, when the federates compute, and when gfor reads their outputs.
-    """
-
+    # publish, compute, read: when gfor publishes inputs, when the federates compute, and when gfor reads their outputs
     publish: int
     compute: int
     read: int

@@ -18,20 +18,11 @@ from orchestrator.fmi.interrupts import calls
 
 
 class Component(Protocol):
-    """An instance of an FMU.
+    """An instance of an FMU."""
 
-    Attributes
-    ----------
-    name
-        Name of the instance, used in errors and results.
-    pointer
-        First argument of the three functions below [address].
-    set_real, get_real, do_step
-        As fmi2SetReal, fmi2GetReal and fmi2DoStep, callable from C; they return a status.
-    """
-
-    name: str
-    pointer: Any
+    name: str  # name of the instance, used in errors and results
+    pointer: Any  # first argument of the three functions below [address]
+    # set_real, get_real, do_step: as fmi2SetReal, fmi2GetReal and fmi2DoStep, callable from C; they return a status
     set_real: Any
     get_real: Any
     do_step: Any

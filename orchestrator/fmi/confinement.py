@@ -46,27 +46,15 @@ _OF_THE_KERNEL = ("/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", 
 
 @dataclass
 class Means:
-    """Which means are in force.
+    """Which means are in force."""
 
-    Attributes
-    ----------
-    namespaces
-        Empty where they are, else why not; likewise ``landlock`` and ``seccomp``.
-    own_processes
-        Whether /proc shows its own processes only.
-    read_only
-        Whether it sees every folder but its own read-only, with a limit on the size of its own.
-    supervised
-        Whether another process watches over its end.
-    """
-
-    namespaces: str = "not tried"
-    own_processes: bool = False
-    read_only: bool = False
+    namespaces: str = "not tried"  # empty where they are, else why not; likewise ``landlock`` and ``seccomp``
+    own_processes: bool = False  # whether /proc shows its own processes only
+    read_only: bool = False  # whether it sees every folder but its own read-only, with a limit on the size of its own
     version: int = 0
     landlock: str = "not tried"
     seccomp: str = "not tried"
-    supervised: bool = False
+    supervised: bool = False  # whether another process watches over its end
 
 
 def confine(

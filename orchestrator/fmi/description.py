@@ -50,29 +50,20 @@ _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "fo
 
 @dataclass(frozen=True, slots=True)
 class VariableInfo:
-    """One variable of a modelDescription.
-
-    Attributes
-    ----------
-    type
-        By FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``.
-    start
-        By the type: a number of a Real, Integer or Enumeration, a bool of a Boolean, else text; None without one.
-    declared_type
-        As the file has it, such as ``Float64``.
-    """
+    """One variable of a modelDescription."""
 
     name: str
     reference: int
-    type: str
+    type: str  # by FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``
     causality: str
     variability: str
     unit: str
+    # by the type: a number of a Real, Integer or Enumeration, a bool of a Boolean, else text; None without one
     start: Scalar | None
     minimum: float | None
     maximum: float | None
     description: str
-    declared_type: str = ""
+    declared_type: str = ""  # as the file has it, such as ``Float64``
 
     @property
     def start_number(self) -> float:

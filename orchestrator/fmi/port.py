@@ -39,23 +39,15 @@ class Form(IntEnum):
 
 @dataclass(frozen=True)
 class PhasorMap:
-    """Voltage or current as the FMU has it.
-
-    Attributes
-    ----------
-    matrix
-        Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
-        its own rating. Magnitude and angle, phases and powers are taken behind or before it.
-    angle_factor
-        The FMU's unit of angle per radian.
-    per_rating
-        Current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating).
-    """
+    """Voltage or current as the FMU has it."""
 
     form: Form
     variables: tuple[str, ...]
+    # Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
+    # its own rating. Magnitude and angle, phases and powers are taken behind or before it.
     matrix: Matrix2
-    angle_factor: float = 1.0
+    angle_factor: float = 1.0  # the FMU's unit of angle per radian
+    # current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating)
     per_rating: bool = True
 
 
@@ -81,28 +73,17 @@ class SignalMap:
 
 @dataclass(frozen=True)
 class PortMap:
-    """All of a binding, in numbers.
+    """All of a binding, in numbers."""
 
-    Attributes
-    ----------
-    rating
-        S_n of the FMU as delivered [MVA].
-    start
-        For each of `START` the variables that take it; none for those that the FMU does not know.
-    settings
-        Values of the FMU's own parameters and inputs.
-    current_limit
-        Largest current that it gives, as somebody declares it [pu, rating].
-    """
-
-    rating: float
+    rating: float  # S_n of the FMU as delivered [MVA]
     f_n: float
     voltage: PhasorMap
     current: PhasorMap
+    # for each of `START` the variables that take it; none for those that the FMU does not know
     start: Mapping[str, tuple[StartMap, ...]]
     signals: Mapping[str, SignalMap]
-    settings: Mapping[str, float | bool]
-    current_limit: float | None = None
+    settings: Mapping[str, float | bool]  # values of the FMU's own parameters and inputs
+    current_limit: float | None = None  # largest current that it gives, as somebody declares it [pu, rating]
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -136,17 +117,12 @@ class PortMap:
 
 @dataclass(frozen=True, kw_only=True)
 class BoundDescription(FmuDescription):
-    """A foreign FMU, described with the variables of our port and whatever else it has.
-
-    Attributes
-    ----------
-    inner_names
-        For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of
-        the port's is called ``native.<name>`` here.
-    """
+    """A foreign FMU, described with the variables of our port and whatever else it has."""
 
     inner: FmuDescription
     port: PortMap
+    # For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of the
+    # port's is called ``native.<name>`` here.
     inner_names: Mapping[str, str]
 
     def unlike_delivered(self) -> dict[str, str]:

@@ -56,19 +56,12 @@ class SystemTask:
 
 @dataclass(frozen=True)
 class SharedMode:
-    """A mode with who takes part in it.
+    """A mode with who takes part in it."""
 
-    Attributes
-    ----------
-    real, imag
-        Of the eigenvalue [1/s, rad/s].
-    components
-        Participation of every component; the shares sum to 1.
-    """
-
+    # real, imag: of the eigenvalue [1/s, rad/s]
     real: float
     imag: float
-    components: dict[str, float]
+    components: dict[str, float]  # participation of every component; the shares sum to 1
 
     @classmethod
     def of(cls, mode: Mode) -> Self:
@@ -92,34 +85,20 @@ class SharedMode:
 
 @dataclass(frozen=True)
 class SystemRecord:
-    """What was found of one system.
+    """What was found of one system."""
 
-    Attributes
-    ----------
-    modes
-        Oscillations of the range, least damped first.
-    growing
-        The mode that grows fastest, at any frequency; None where nothing is known to grow.
-    stability, because
-        The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where it
-        failed.
-    identified
-        Components that hide their states and were identified.
-    residual
-        Of the steady state, as in `OperatingPoint`.
-    failure
-        Why there are no modes; None where there are.
-    """
-
-    modes: tuple[SharedMode, ...] = ()
+    modes: tuple[SharedMode, ...] = ()  # oscillations of the range, least damped first
+    # the mode that grows fastest, at any frequency; None where nothing is known to grow
     growing: SharedMode | None = None
+    # stability, because: the verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in
+    # words; empty where it failed
     stability: dict[str, Any] = field(default_factory=dict)
     because: str = ""
     warnings: tuple[str, ...] = ()
-    identified: tuple[str, ...] = ()
+    identified: tuple[str, ...] = ()  # components that hide their states and were identified
     states: int = 0
-    residual: float = float("nan")
-    failure: Failure | None = None
+    residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
+    failure: Failure | None = None  # why there are no modes; None where there are
 
     @property
     def error(self) -> str | None:

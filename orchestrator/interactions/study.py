@@ -25,39 +25,19 @@ Placed = Mapping[str, tuple[ComponentTable, Any]]
 
 @dataclass(frozen=True)
 class InteractionsPlan:
-    """What a study computes.
-
-    Attributes
-    ----------
-    layers
-        Parameter files, and after them the values of the command line; weakest first.
-    step_size
-        Communication step [s]; None for the case's.
-    places
-        The converters, by component.
-    groups
-        Group of every component: its vendor, or what else it is.
-    stand_in
-        Model at the places of the vendors that a system does without.
-    swapped
-        Places that are swapped; none without a swap.
-    systems
-        Devices that are other than the case's, of every system.
-    files
-        What stands for the files of such devices in keys, by model or file.
-    """
+    """What a study computes."""
 
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]
-    step_size: float | None
+    layers: tuple[ParameterFile, ...]  # parameter files, and after them the values of the command line; weakest first
+    step_size: float | None  # communication step [s]; None for the case's
     request: InteractionsRequest
-    places: dict[str, Place]
-    groups: dict[str, str]
-    stand_in: str
-    swapped: tuple[str, ...]
-    systems: dict[SystemName, Exchanged]
-    files: dict[str, list[str]]
+    places: dict[str, Place]  # the converters, by component
+    groups: dict[str, str]  # group of every component: its vendor, or what else it is
+    stand_in: str  # model at the places of the vendors that a system does without
+    swapped: tuple[str, ...]  # places that are swapped; none without a swap
+    systems: dict[SystemName, Exchanged]  # devices that are other than the case's, of every system
+    files: dict[str, list[str]]  # what stands for the files of such devices in keys, by model or file
 
     @property
     def vendors(self) -> tuple[str, ...]:
@@ -92,16 +72,12 @@ class InteractionsPlan:
 
 @dataclass
 class InteractionsResult:
-    """All systems of a study.
-
-    Attributes
-    ----------
-    computed, stored
-        Number of systems computed now, and number read from an earlier start. Systems of the same devices count once.
-    """
+    """All systems of a study."""
 
     plan: InteractionsPlan
     records: dict[SystemName, SystemRecord] = field(default_factory=dict)
+    # computed, stored: Number of systems computed now, and number read from an earlier start. Systems of the same
+    # devices count once.
     computed: int = 0
     stored: int = 0
 

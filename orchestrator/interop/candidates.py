@@ -25,26 +25,14 @@ LABELS = (0, 1, -1)
 
 @dataclass(frozen=True)
 class Candidate:
-    """One schedule.
+    """One schedule."""
 
-    Attributes
-    ----------
-    order
-        A key of `ORDERS`.
-    early_label
-        A row labelled t holds what t/H + ``early_label`` steps gave.
-    after_exchange
-        Outputs are read after the inputs of the next step were set.
-    wire_by_wire
-        See `Schedule`.
-    """
-
-    order: str
+    order: str  # a key of `ORDERS`
     first_inputs: FirstInputs
     extrapolation: float
-    early_label: int
-    after_exchange: bool
-    wire_by_wire: bool
+    early_label: int  # a row labelled t holds what t/H + ``early_label`` steps gave
+    after_exchange: bool  # outputs are read after the inputs of the next step were set
+    wire_by_wire: bool  # see `Schedule`
 
 
 def probe_system() -> System:

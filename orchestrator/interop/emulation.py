@@ -18,21 +18,11 @@ from orchestrator.interop.rules import MasterRules
 
 @dataclass(frozen=True)
 class Emulation:
-    """What the other master would have recorded.
+    """What the other master would have recorded."""
 
-    Attributes
-    ----------
-    times
-        Times of the rows, as the other master labels them [s], shape (n,).
-    values
-        Shape (n, number of names).
-    names
-        ``component.variable``.
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    names: tuple[str, ...]
+    times: NDArray[np.float64]  # times of the rows, as the other master labels them [s], shape (n,)
+    values: NDArray[np.float64]  # shape (n, number of names)
+    names: tuple[str, ...]  # ``component.variable``
 
 
 def emulate(

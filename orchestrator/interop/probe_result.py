@@ -18,21 +18,11 @@ _NEEDED = ("a.y", "b.y")
 
 @dataclass(frozen=True)
 class ProbeResult:
-    """The recorded signals of the probe pair.
+    """The recorded signals of the probe pair."""
 
-    Attributes
-    ----------
-    times
-        Labels [s], shape (n,), rising.
-    values
-        Shape (n, number of `SIGNALS`); NaN where a signal was not recorded.
-    columns
-        Signal → heading of the column it was read from.
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    columns: dict[str, str]
+    times: NDArray[np.float64]  # labels [s], shape (n,), rising
+    values: NDArray[np.float64]  # shape (n, number of `SIGNALS`); NaN where a signal was not recorded
+    columns: dict[str, str]  # signal → heading of the column it was read from
 
 
 def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> ProbeResult:

@@ -26,25 +26,14 @@ signals are near 1."""
 
 @dataclass(frozen=True)
 class Identified:
-    """The schedules that fit a record.
+    """The schedules that fit a record."""
 
-    Attributes
-    ----------
-    fits
-        Every schedule that gives the recorded values; empty if none does.
-    rows
-        How many rows were at communication points and so were compared.
-    last_row
-        Index of the last of them: it has the label ``last_row``·H.
-    step_size, stop_time
-        Step size and stop time with which the tool was run [s].
-    """
-
-    fits: tuple[Candidate, ...]
+    fits: tuple[Candidate, ...]  # every schedule that gives the recorded values; empty if none does
     nearest: Candidate
     difference: float
-    rows: int
-    last_row: int
+    rows: int  # how many rows were at communication points and so were compared
+    last_row: int  # index of the last of them: it has the label ``last_row``·H
+    # step_size, stop_time: step size and stop time with which the tool was run [s]
     step_size: float
     stop_time: float
 

@@ -19,14 +19,9 @@ LARGEST_TURN = 85.0
 
 @dataclass(frozen=True)
 class LeadLag:
-    """N_S equal stages (1 + s·T_S1)/(1 + s·T_S2).
+    """N_S equal stages (1 + s·T_S1)/(1 + s·T_S2)."""
 
-    Attributes
-    ----------
-    T_S1, T_S2
-        Lead and lag time constants [s]; both 0 for no compensation.
-    """
-
+    # T_S1, T_S2: lead and lag time constants [s]; both 0 for no compensation
     T_S1: float
     T_S2: float
     N_S: int

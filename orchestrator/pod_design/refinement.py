@@ -58,51 +58,30 @@ _TOLERANCE = 2e-4
 
 @dataclass(frozen=True)
 class GainSweep:
-    """The target mode over the range of the gain, with one lead/lag.
-
-    Attributes
-    ----------
-    chosen
-        The smallest gain that meets the requirement, else the gain of the best damping.
-    unstable
-        The gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which
-        are not examined.
-    least
-        Least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems.
-    chosen_least
-        The same with ``chosen``; None where it is not known.
-    """
+    """The target mode over the range of the gain, with one lead/lag."""
 
     why: str
     filters: LeadLag
     points: tuple[Placed, ...]
-    chosen: Placed
+    chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
+    # the gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which are
+    # not examined
     unstable: tuple[float, ...] = ()
+    # least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems
     least: tuple[float, ...] = ()
-    chosen_least: float | None = None
+    chosen_least: float | None = None  # the same with ``chosen``; None where it is not known
 
 
 @dataclass
 class Refinement:
-    """The settings that the refinement tried, and its result.
-
-    Attributes
-    ----------
-    chosen
-        The best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists.
-    score
-        Damping ratio of ``chosen`` that counts.
-    met
-        Whether ``chosen`` has the required damping.
-    even
-        The setting with the best least damping of all modes; None where it is not asked for.
-    """
+    """The settings that the refinement tried, and its result."""
 
     sweeps: list[GainSweep] = field(default_factory=list)
+    # the best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists
     chosen: Placed | None = None
-    score: float = -1.0
-    met: bool = False
-    even: Placed | None = None
+    score: float = -1.0  # damping ratio of ``chosen`` that counts
+    met: bool = False  # whether ``chosen`` has the required damping
+    even: Placed | None = None  # the setting with the best least damping of all modes; None where it is not asked for
     notes: list[str] = field(default_factory=list)
 
     @property

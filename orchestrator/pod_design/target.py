@@ -15,20 +15,13 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True)
 class Target:
-    """A scenario, and those of its components that get one common setting.
-
-    Attributes
-    ----------
-    key
-        Names of the components in a parameter file: one pattern that fits exactly these components, or each name.
-    stages
-        N_S of the components' lead/lag.
-    """
+    """A scenario, and those of its components that get one common setting."""
 
     scenario: str
     components: tuple[str, ...]
+    # names of the components in a parameter file: one pattern that fits exactly these components, or each name
     key: tuple[str, ...]
-    stages: int
+    stages: int  # N_S of the components' lead/lag
 
 
 def find_target(

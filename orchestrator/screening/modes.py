@@ -57,28 +57,17 @@ class CriticalRegion:
 
 @dataclass(frozen=True)
 class FoundModes:
-    """Modes of one operating point.
-
-    Attributes
-    ----------
-    searched
-        Whether they come from a search of their own rather than from a neighbour's.
-    growing_elsewhere
-        Number of growing eigenvalues that are none of these modes; None where they were not counted.
-    fastest
-        The one of them with the largest real part [rad/s]; None where there is none, or they were only counted.
-    zeros
-        Number of eigenvalues that are zero, where growth was counted: one may be the free angle.
-    slowest
-        Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0
-        only. 0 where all eigenvalues are known.
-    """
+    """Modes of one operating point."""
 
     modes: ModeSet
-    searched: bool
+    searched: bool  # whether they come from a search of their own rather than from a neighbour's
+    # number of growing eigenvalues that are none of these modes; None where they were not counted
     growing_elsewhere: int | None
+    # the one of them with the largest real part [rad/s]; None where there is none, or they were only counted
     fastest: complex | None = None
-    zeros: int = 0
+    zeros: int = 0  # number of eigenvalues that are zero, where growth was counted: one may be the free angle
+    # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
+    # 0 where all eigenvalues are known.
     slowest: float = 0.0
 
     def critical(self, wanted: CriticalRegion) -> list[int]:

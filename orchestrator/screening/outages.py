@@ -63,26 +63,15 @@ def _of_kind(kind: str, elements: Elements) -> list[str]:
 
 @dataclass(frozen=True)
 class Remains:
-    """What outages leave of a network.
+    """What outages leave of a network."""
 
-    Attributes
-    ----------
-    none
-        Why no system remains; "" where one does.
-    units, loads, shunts
-        What is out of service or dead: without a way to the part that remains.
-    charging
-        The grid's variables of the charging of dead lines.
-    ties
-        Lost branches that stay closed, because a dead part hangs on each: nothing flows there.
-    """
-
-    none: str = ""
+    none: str = ""  # why no system remains; "" where one does
+    # units, loads, shunts: what is out of service or dead: without a way to the part that remains
     units: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     shunts: tuple[str, ...] = ()
-    charging: tuple[str, ...] = ()
-    ties: tuple[str, ...] = ()
+    charging: tuple[str, ...] = ()  # the grid's variables of the charging of dead lines
+    ties: tuple[str, ...] = ()  # lost branches that stay closed, because a dead part hangs on each: nothing flows there
     dead: tuple[str, ...] = ()
 
 

@@ -16,24 +16,12 @@ _LABELS = ("time", "name")
 
 @dataclass(frozen=True)
 class OperatingCase:
-    """One operating point.
+    """One operating point."""
 
-    Attributes
-    ----------
-    name
-        Time or name of the row.
-    hours
-        How long the point lasts [h]; the weight in duration curves.
-    values
-        By ``component.variable``.
-    out
-        Elements out of service.
-    """
-
-    name: str
-    hours: float
-    values: dict[str, Value]
-    out: tuple[str, ...]
+    name: str  # time or name of the row
+    hours: float  # how long the point lasts [h]; the weight in duration curves
+    values: dict[str, Value]  # by ``component.variable``
+    out: tuple[str, ...]  # elements out of service
     place: str
 
 

@@ -54,21 +54,13 @@ class Shard:
 
 @dataclass(frozen=True)
 class ScreeningPlan:
-    """What a screening computes.
+    """What a screening computes."""
 
-    Attributes
-    ----------
-    case, prepared
-        The case, and its scenario as it is without the values of any point.
-    layers
-        As in `orchestrator.sweep.sweep.SweepPlan`.
-    points, outages
-        Operating points, and outages; the first outage is the intact network.
-    """
-
+    # case, prepared: the case, and its scenario as it is without the values of any point
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]
+    layers: tuple[ParameterFile, ...]  # as in `orchestrator.sweep.sweep.SweepPlan`
+    # points, outages: operating points, and outages; the first outage is the intact network
     points: tuple[OperatingCase, ...]
     outages: tuple[Outage, ...]
     wanted: CriticalRegion
@@ -184,22 +176,15 @@ class ScreenedItem:
 
 @dataclass
 class ScreeningResult:
-    """What a screening found.
-
-    Attributes
-    ----------
-    items
-        In the order of points and outages; of a part, only the part's.
-    computed, stored
-        Numbers of items computed now, and read from an earlier start.
-    perturbed, reused
-        Numbers of components perturbed, and taken from where they were alike.
-    """
+    """What a screening found."""
 
     plan: ScreeningPlan
+    # in the order of points and outages; of a part, only the part's
     items: list[ScreenedItem] = field(default_factory=list)
+    # computed, stored: numbers of items computed now, and read from an earlier start
     computed: int = 0
     stored: int = 0
+    # perturbed, reused: numbers of components perturbed, and taken from where they were alike
     perturbed: int = 0
     reused: int = 0
 

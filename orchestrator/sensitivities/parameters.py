@@ -15,25 +15,14 @@ SHARE = 0.01
 
 @dataclass(frozen=True)
 class Parameter:
-    """A Real parameter of a component.
-
-    Attributes
-    ----------
-    unit
-        As the FMU declares it; "1" for a plain number.
-    value
-        At the operating point, in ``unit``.
-    tunable
-        Whether the FMU takes a change while it runs; a fixed one is set before the start only.
-    minimum, maximum
-        Declared bounds; None without.
-    """
+    """A Real parameter of a component."""
 
     component: str
     variable: str
-    unit: str
-    value: float
-    tunable: bool
+    unit: str  # as the FMU declares it; "1" for a plain number
+    value: float  # at the operating point, in ``unit``
+    tunable: bool  # whether the FMU takes a change while it runs; a fixed one is set before the start only
+    # minimum, maximum: declared bounds; None without
     minimum: float | None = None
     maximum: float | None = None
 

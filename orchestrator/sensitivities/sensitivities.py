@@ -61,26 +61,17 @@ Again = Callable[[Mapping[str, float]], PreparedScenario]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The effect of one parameter on the mode.
-
-    Attributes
-    ----------
-    derivative
-        ∂λ/∂p [rad/s per unit of the parameter] of the step map; None where there is none, for ``reason``.
-    continuous
-        The same of the model without a communication step; None where a component gives no derivatives.
-    operating_point
-        ``stays`` or ``moves`` with the parameter; ``held`` where the derivative leaves it where it is.
-    doubts
-        Why the figure may be wrong; empty if it is trusted.
-    """
+    """The effect of one parameter on the mode."""
 
     parameter: Parameter
     eigenvalue: complex
+    # ∂λ/∂p [rad/s per unit of the parameter] of the step map; None where there is none, for ``reason``
     derivative: complex | None
+    # the same of the model without a communication step; None where a component gives no derivatives
     continuous: complex | None
+    # ``stays`` or ``moves`` with the parameter; ``held`` where the derivative leaves it where it is
     operating_point: str
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # why the figure may be wrong; empty if it is trusted
     reason: str = ""
 
     @property

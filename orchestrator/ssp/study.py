@@ -21,26 +21,16 @@ _OMS_TYPE = "org.openmodelica"
 
 @dataclass(frozen=True)
 class SspStudy:
-    """A scenario without its system.
-
-    Attributes
-    ----------
-    step_size
-        Communication step [s].
-    groups
-        Groups of components of the schedule, in the order of stepping.
-    settings
-        The changes by events, in order: time [s], component, variable, value.
-    tables
-        Tables of the case file that only this project knows, such as ``analysis`` and ``plots``.
-    """
+    """A scenario without its system."""
 
     scenario: str
     title: str
-    step_size: float
+    step_size: float  # communication step [s]
     schedule: str
-    groups: tuple[tuple[str, ...], ...]
+    groups: tuple[tuple[str, ...], ...]  # groups of components of the schedule, in the order of stepping
+    # the changes by events, in order: time [s], component, variable, value
     settings: tuple[tuple[float, str, str, float | bool], ...]
+    # tables of the case file that only this project knows, such as ``analysis`` and ``plots``
     tables: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -28,20 +28,12 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ScenarioAnswer:
-    """One line of the first table.
-
-    Attributes
-    ----------
-    good
-        Whether that is good; None where it is not known.
-    mode
-        The least damped mode of the range.
-    """
+    """One line of the first table."""
 
     subject: str
-    good: bool | None
+    good: bool | None  # whether that is good; None where it is not known
     verdict: str
-    mode: Mode | None
+    mode: Mode | None  # the least damped mode of the range
     remark: str
 
     def as_json(self) -> dict[str, Any]:

@@ -13,18 +13,10 @@ _NOISE = 1e-6
 
 @dataclass(frozen=True)
 class CommonTimes:
-    """Times of the run with the longer interval, within the time that both runs have.
+    """Times of the run with the longer interval, within the time that both runs have."""
 
-    Attributes
-    ----------
-    times
-        Shape (n,) [s].
-    remark
-        Sentence on runs with different intervals; empty where both have the same times.
-    """
-
-    times: Numbers
-    remark: str
+    times: Numbers  # shape (n,) [s]
+    remark: str  # sentence on runs with different intervals; empty where both have the same times
     _rows: tuple[Vector | None, Vector | None]
     _recorded: tuple[Numbers, Numbers]
 

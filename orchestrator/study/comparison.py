@@ -36,27 +36,17 @@ _WEAKEST = 1e-3
 
 @dataclass(frozen=True)
 class Comparison:
-    """One signal of two runs over the time that both have.
-
-    Attributes
-    ----------
-    deviations
-        Largest deviation of each run from its own start [unit of the signal].
-    largest, rms
-        Difference between the runs at the times of the run with the longer interval [unit of the signal]; see
-        `common_times`.
-    at
-        Time of the largest difference [s].
-    modes
-        Strongest oscillation in each run from ``start`` on; None where none is found.
-    """
+    """One signal of two runs over the time that both have."""
 
     expression: str
     unit: str
-    deviations: tuple[float, float]
+    deviations: tuple[float, float]  # largest deviation of each run from its own start [unit of the signal]
+    # largest, rms: difference between the runs at the times of the run with the longer interval [unit of the signal];
+    # see `common_times`
     largest: float
     rms: float
-    at: float
+    at: float  # time of the largest difference [s]
+    # strongest oscillation in each run from ``start`` on; None where none is found
     modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
 
 

@@ -57,40 +57,25 @@ BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 
 @dataclass(frozen=True)
 class ModesResult:
-    """Steady state and modes of one scenario.
-
-    Attributes
-    ----------
-    named
-        The modes that the case looks for by their shape, as far as they are in range.
-    references
-        Somebody else's figures for them, where their conditions hold.
-    swing
-        States that show who swings against whom, mostly speeds.
-    hidden
-        The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
-    system
-        The continuous model, without a communication step; None where a component gives no derivatives.
-    fit_errors
-        Of the components that were identified: largest relative difference of model and measured response.
-    unnamed
-        Why no mode bears a name that the case gives, by name.
-    """
+    """Steady state and modes of one scenario."""
 
     prepared: PreparedScenario
     operating_point: OperatingPoint
     model: LinearModel
     modes: list[Mode]
-    named: dict[str, Mode]
-    references: dict[str, ReferenceModeTable]
+    named: dict[str, Mode]  # the modes that the case looks for by their shape, as far as they are in range
+    references: dict[str, ReferenceModeTable]  # somebody else's figures for them, where their conditions hold
     warnings: tuple[str, ...]
-    swing: tuple[str, ...]
+    swing: tuple[str, ...]  # states that show who swings against whom, mostly speeds
     areas: dict[str, str]
     stability: Stability
+    # the oscillatory modes outside of the range; None where the system is too large for all its eigenvalues
     hidden: Hidden | None
+    # the continuous model, without a communication step; None where a component gives no derivatives
     system: LinearModel | None
+    # of the components that were identified: largest relative difference of model and measured response
     fit_errors: dict[str, float] = field(default_factory=dict)
-    unnamed: Mapping[str, str] = field(default_factory=dict)
+    unnamed: Mapping[str, str] = field(default_factory=dict)  # why no mode bears a name that the case gives, by name
     misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property

@@ -69,17 +69,7 @@ class ModeShift:
 
 @dataclass
 class RunResult:
-    """A scenario's modes and its simulated response.
-
-    Attributes
-    ----------
-    failure
-        The error that ended the run before its time.
-    findings
-        What the run did wrong, each said once, in the order of its beginning.
-    protections
-        What kept each foreign FMU from the rest of the machine, by component.
-    """
+    """A scenario's modes and its simulated response."""
 
     modes: ModesResult
     dataset: xr.Dataset
@@ -87,8 +77,10 @@ class RunResult:
     ring_down: IdentifiedMode | None = None
     shifts: list[ModeShift] = field(default_factory=list)
     linear: xr.Dataset | None = None
-    failure: CosimError | None = None
+    failure: CosimError | None = None  # the error that ended the run before its time
+    # what the run did wrong, each said once, in the order of its beginning
     findings: list[Finding] = field(default_factory=list)
+    # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
 
     @property

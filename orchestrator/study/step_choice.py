@@ -51,35 +51,21 @@ class Allowed:
 
 @dataclass(frozen=True)
 class TriedStep:
-    """What one schedule does at one step.
+    """What one schedule does at one step."""
 
-    Attributes
-    ----------
-    schedule, step_size
-        Name, and communication step [s].
-    hertz, points
-        Errors of the critical modes' frequencies [Hz] and damping ratios [points], shape (modes,), in their order.
-    eigenvalues
-        The critical modes in the step map [rad/s].
-    growth
-        Largest growth rate of the step map [1/s]; 0 where nothing grows.
-    stable
-        Whether the step makes nothing grow that does not grow in the continuous system, and hides no growth.
-    refused
-        Why nothing could be computed; else empty.
-    doubts
-        Why the figures may be none of the run's, such as a limit at the operating point.
-    """
-
+    # schedule, step_size: name, and communication step [s]
     schedule: ScheduleName
     step_size: float
+    # hertz, points: errors of the critical modes' frequencies [Hz] and damping ratios [points], shape (modes,), in
+    # their order
     hertz: NDArray[np.float64]
     points: NDArray[np.float64]
-    eigenvalues: NDArray[np.complex128]
-    growth: float = 0.0
+    eigenvalues: NDArray[np.complex128]  # the critical modes in the step map [rad/s]
+    growth: float = 0.0  # largest growth rate of the step map [1/s]; 0 where nothing grows
+    # whether the step makes nothing grow that does not grow in the continuous system, and hides no growth
     stable: bool = False
-    refused: str = ""
-    doubts: tuple[str, ...] = ()
+    refused: str = ""  # why nothing could be computed; else empty
+    doubts: tuple[str, ...] = ()  # why the figures may be none of the run's, such as a limit at the operating point
 
     def is_within(self, allowed: Allowed) -> bool:
         """Whether the step is stable, beyond doubt, and moves no critical mode by more than is allowed."""
@@ -90,23 +76,14 @@ class TriedStep:
 
 @dataclass(frozen=True)
 class StepChoice:
-    """All trials of a scenario.
-
-    Attributes
-    ----------
-    critical
-        The continuous system's critical modes [rad/s], least damped first.
-    growth
-        Largest growth rate of the continuous system [1/s]; 0 where nothing grows.
-    left_out
-        Steps [s] that were not tried, as an event of the case or its end does not fall on them.
-    """
+    """All trials of a scenario."""
 
     prepared: PreparedScenario
     allowed: Allowed
-    critical: NDArray[np.complex128]
-    growth: float
+    critical: NDArray[np.complex128]  # the continuous system's critical modes [rad/s], least damped first
+    growth: float  # largest growth rate of the continuous system [1/s]; 0 where nothing grows
     trials: tuple[TriedStep, ...]
+    # steps [s] that were not tried, as an event of the case or its end does not fall on them
     left_out: tuple[float, ...] = ()
 
     @property

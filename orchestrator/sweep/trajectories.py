@@ -35,19 +35,12 @@ class TrajectoryPoint:
 
 @dataclass
 class Trajectory:
-    """One mode that was followed over the grid.
+    """One mode that was followed over the grid."""
 
-    Attributes
-    ----------
-    name
-        The case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode"
-        and a number.
-    carries
-        The case's name.
-    """
-
+    # the case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode" and
+    # a number
     name: str = ""
-    carries: str | None = None
+    carries: str | None = None  # the case's name
     points: dict[GridPlace, TrajectoryPoint] = field(default_factory=dict)
 
 

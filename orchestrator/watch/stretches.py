@@ -25,17 +25,11 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Stretch:
-    """The time from one noticed event, or the start, to the next one, or the end [s].
-
-    Attributes
-    ----------
-    breaks
-        Times of unnoticed events inside the stretch [s].
-    """
+    """The time from one noticed event, or the start, to the next one, or the end [s]."""
 
     begin: float
     end: float
-    breaks: tuple[float, ...] = ()
+    breaks: tuple[float, ...] = ()  # times of unnoticed events inside the stretch [s]
     last: bool = False
 
     def parts(self) -> Iterator["Stretch"]:

@@ -75,24 +75,14 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class _After:
-    """What a disturbance left behind.
-
-    Attributes
-    ----------
-    away
-        Distance of the current from where it was [pu, S_n].
-    changed
-        By which part of it the answer to a small change differs, and to which.
-    kept
-        Bytes kept by each step meanwhile.
-    """
+    """What a disturbance left behind."""
 
     words: str
     end: _End
-    away: float = 0.0
-    changed: float = 0.0
+    away: float = 0.0  # distance of the current from where it was [pu, S_n]
+    changed: float = 0.0  # by which part of it the answer to a small change differs, and to which
     of: str = ""
-    kept: float = 0.0
+    kept: float = 0.0  # bytes kept by each step meanwhile
 
 
 @check("after_dips", "Is it after dips and jumps what it was before?", needs=SAME)

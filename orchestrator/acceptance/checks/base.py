@@ -29,27 +29,16 @@ class Whose(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What one check found.
-
-    Attributes
-    ----------
-    fault
-        Name of what is wrong, or not supported; else empty.
-    evidence
-        What was seen, with figures; for `NOT_APPLICABLE` the reason.
-    figures
-        The measured figures, for programs.
-    whose
-        Whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids
-        and only the check makes.
-    """
+    """What one check found."""
 
     check: str
     verdict: Verdict
-    evidence: str
-    fault: str = ""
+    evidence: str  # what was seen, with figures; for `NOT_APPLICABLE` the reason
+    fault: str = ""  # name of what is wrong, or not supported; else empty
     remedy: str = ""
-    figures: dict[str, Any] = field(default_factory=dict)
+    figures: dict[str, Any] = field(default_factory=dict)  # the measured figures, for programs
+    # whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids and
+    # only the check makes
     whose: Whose = Whose.NOBODY
 
     def as_dict(self) -> dict[str, Any]:

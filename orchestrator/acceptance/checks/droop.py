@@ -42,28 +42,17 @@ def further(point: OperatingAt) -> tuple[OperatingAt, ...]:
 
 @dataclass(frozen=True)
 class Way:
-    """What a change in one direction brings.
+    """What a change in one direction brings."""
 
-    Attributes
-    ----------
-    power
-        Change of the power in the end [pu, S_n].
-    moving
-        How much P and Q still move in the end [pu, S_n].
-    far
-        How far they go away at most [pu, S_n].
-    omega, omega_moving
-        Its frequency in the end, and how much that still moves [pu]; None for an FMU that does not say it.
-    ringing
-        How far P or Q swings about its course in the middle and in the end, from crest to trough [pu, S_n], and how
-        often that changes its sign in the end.
-    """
-
-    power: complex
-    moving: float
-    far: float
+    power: complex  # change of the power in the end [pu, S_n]
+    moving: float  # how much P and Q still move in the end [pu, S_n]
+    far: float  # how far they go away at most [pu, S_n]
+    # omega, omega_moving: its frequency in the end, and how much that still moves [pu]; None for an FMU that does not
+    # say it
     omega: float | None
     omega_moving: float
+    # how far P or Q swings about its course in the middle and in the end, from crest to trough [pu, S_n], and how often
+    # that changes its sign in the end
     ringing: tuple[float, float, int]
 
 

@@ -75,28 +75,14 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an event brought [pu, S_n].
-
-    Attributes
-    ----------
-    peak
-        The largest current.
-    mean
-        Over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that.
-    away
-        Distance of the current from where it was, afterwards.
-    blocked
-        Time [s] without current at a healthy voltage, where it gives current before and after.
-    gone
-        Whether it gives no current in the end.
-    """
+    """What an event brought [pu, S_n]."""
 
     event: Disturbance
-    peak: float
-    mean: float
-    away: float
-    blocked: float
-    gone: bool
+    peak: float  # the largest current
+    mean: float  # over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that
+    away: float  # distance of the current from where it was, afterwards
+    blocked: float  # time [s] without current at a healthy voltage, where it gives current before and after
+    gone: bool  # whether it gives no current in the end
 
 
 def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:

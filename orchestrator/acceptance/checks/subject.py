@@ -41,25 +41,14 @@ class OperatingAt:
 
 @dataclass(frozen=True)
 class Use:
-    """How somebody uses it: what a case gives it.
+    """How somebody uses it: what a case gives it."""
 
-    Attributes
-    ----------
-    step_size
-        Communication step [s].
-    point
-        Where the power flow puts it.
-    values, inputs
-        Of its parameters, and of inputs that nothing feeds.
-    said
-        Where that comes from, and the operating point, in words.
-    """
-
-    step_size: float | None = None
-    point: OperatingAt | None = None
+    step_size: float | None = None  # communication step [s]
+    point: OperatingAt | None = None  # where the power flow puts it
+    # values, inputs: of its parameters, and of inputs that nothing feeds
     values: Mapping[str, float | bool] = field(default_factory=dict)
     inputs: Mapping[str, float] = field(default_factory=dict)
-    said: str = ""
+    said: str = ""  # where that comes from, and the operating point, in words
 
 
 class Subject:

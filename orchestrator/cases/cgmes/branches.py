@@ -16,23 +16,14 @@ BASE_MVA = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """A branch between two buses.
-
-    Attributes
-    ----------
-    z
-        Series impedance [pu].
-    to_earth
-        Admittances behind the ratio at the first side, and at the second side [pu].
-    tap, shift
-        MATPOWER's ratio, and its angle [degrees].
-    """
+    """A branch between two buses."""
 
     name: str
     start: str
     end: str
-    z: complex
-    to_earth: tuple[complex, complex]
+    z: complex  # series impedance [pu]
+    to_earth: tuple[complex, complex]  # admittances behind the ratio at the first side, and at the second side [pu]
+    # tap, shift: MATPOWER's ratio, and its angle [degrees]
     tap: float
     shift: float
 

@@ -30,27 +30,18 @@ _SAME_VOLTAGE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One generator in service.
-
-    Attributes
-    ----------
-    p_mw, v_pu
-        Active power [MW], and voltage that it holds at its bus [pu].
-    rating_mva
-        MBASE [MVA].
-    source
-        ZSORCE [pu of the rating].
-    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
-        Limits of reactive and of active power; infinite where the file has none.
-    """
+    """One generator in service."""
 
     bus: int
     name: str
     line: int
+    # p_mw, v_pu: active power [MW], and voltage that it holds at its bus [pu]
     p_mw: float
     v_pu: float
-    rating_mva: float
-    source: complex
+    rating_mva: float  # MBASE [MVA]
+    source: complex  # ZSORCE [pu of the rating]
+    # q_min_mvar, q_max_mvar, p_min_mw, p_max_mw: limits of reactive and of active power; infinite where the file has
+    # none
     q_min_mvar: float
     q_max_mvar: float
     p_min_mw: float = -math.inf

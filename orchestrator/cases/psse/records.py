@@ -75,24 +75,17 @@ class Record:
 
 @dataclass(frozen=True)
 class RawFile:
-    """What a file holds.
-
-    Attributes
-    ----------
-    base_mva, frequency
-        System base [MVA], and rated frequency [Hz] where the file says it.
-    sections
-        Records by the section's name in small letters; one with several lines is several records.
-    guessed
-        Lines between sections that do not say which data begin, though others do, and the section that was taken by the
-        revision's order.
-    """
+    """What a file holds."""
 
     place: str
     revision: int
+    # base_mva, frequency: system base [MVA], and rated frequency [Hz] where the file says it
     base_mva: float
     frequency: float | None
+    # records by the section's name in small letters; one with several lines is several records
     sections: dict[str, list[Record]] = field(default_factory=dict)
+    # lines between sections that do not say which data begin, though others do, and the section that was taken by the
+    # revision's order
     guessed: dict[int, str] = field(default_factory=dict)
 
     def of(self, section: str) -> list[Record]:

@@ -27,28 +27,13 @@ class Winding:
 
 @dataclass(frozen=True)
 class Transformer:
-    """A transformer.
-
-    Attributes
-    ----------
-    record
-        Its first line.
-    impedances
-        Between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system].
-    magnetisation
-        At the bus of winding 1 [pu of the system].
-    off
-        Windings that are out of service.
-    controlled, corrected
-        Whether a tap changer acts on it, and whether its impedance depends on its tap.
-    """
-
-    record: Record
+    record: Record  # its first line
     circuit: str
     windings: tuple[Winding, ...]
-    impedances: tuple[complex, ...]
-    magnetisation: complex
-    off: tuple[int, ...]
+    impedances: tuple[complex, ...]  # between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system]
+    magnetisation: complex  # at the bus of winding 1 [pu of the system]
+    off: tuple[int, ...]  # windings that are out of service
+    # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
     controlled: bool
     corrected: bool
 

@@ -18,28 +18,20 @@ from orchestrator.results.recording import TRAJECTORY
 
 @dataclass
 class Results:
-    """Contents of result folders, read as far as they are there.
-
-    Attributes
-    ----------
-    scenarios
-        One summary a scenario, as in ``summary.json``.
-    sweeps, designs
-        Datasets and calculation sheets that were found beside the run.
-    ended_early
-        How and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end.
-    """
+    """Contents of result folders, read as far as they are there."""
 
     folder: Path
     case: Case
-    scenarios: list[dict[str, Any]]
+    scenarios: list[dict[str, Any]]  # one summary a scenario, as in ``summary.json``
     modes: list[dict[str, str]]
     participation: list[dict[str, str]]
     step_sizes: list[dict[str, str]]
     trajectories: dict[str, xr.Dataset]
     linear: dict[str, xr.Dataset]
+    # sweeps, designs: datasets and calculation sheets that were found beside the run
     sweeps: list[xr.Dataset] = field(default_factory=list)
     designs: list[dict[str, Any]] = field(default_factory=list)
+    # how and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end
     ended_early: dict[str, Any] | None = None
 
 

@@ -22,45 +22,19 @@ MOST_CHANNELS = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One channel.
-
-    Attributes
-    ----------
-    name
-        The name by which it is asked for; no two channels of a recording have the same.
-    unit
-        As the file says; empty for a status channel.
-    scale, offset
-        A sample's value is ``scale · x + offset`` [unit], referred to the primary side.
-    skew
-        Time of this channel's samples after those of the recording [s].
-    secondary
-        Whether the file holds the values of the secondary side; ``scale`` and ``offset`` have the ratio in them.
-    """
-
-    name: str
-    unit: str = ""
+    name: str  # the name by which it is asked for; no two channels of a recording have the same
+    unit: str = ""  # as the file says; empty for a status channel
+    # scale, offset: a sample's value is ``scale · x + offset`` [unit], referred to the primary side
     scale: float = 1.0
     offset: float = 0.0
-    skew: float = 0.0
+    skew: float = 0.0  # time of this channel's samples after those of the recording [s]
+    # whether the file holds the values of the secondary side; ``scale`` and ``offset`` have the ratio in them
     secondary: bool = False
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """What a ``.cfg`` says.
-
-    Attributes
-    ----------
-    frequency
-        Frequency of the line [Hz]; 0 where the file leaves it open.
-    rates
-        Sampling rate [Hz] and number of the last sample that has it, in order; a rate of 0: the samples carry times.
-    start, trigger
-        Dates and times as the file writes them.
-    time_unit
-        Of the samples' time stamps [s].
-    """
+    """What a ``.cfg`` says."""
 
     place: str
     station: str
@@ -68,12 +42,14 @@ class Configuration:
     revision: str
     analog: tuple[Channel, ...]
     status: tuple[Channel, ...]
-    frequency: float
+    frequency: float  # frequency of the line [Hz]; 0 where the file leaves it open
+    # sampling rate [Hz] and number of the last sample that has it, in order; a rate of 0: the samples carry times
     rates: tuple[tuple[float, int], ...]
+    # start, trigger: dates and times as the file writes them
     start: str
     trigger: str
     form: str
-    time_unit: float
+    time_unit: float  # of the samples' time stamps [s]
 
     @property
     def samples(self) -> int:
