@@ -17,15 +17,6 @@ def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
 
 
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
-    """Where the points are computed, as `executors.choose_executor` chooses it.
-
-    Parameters
-    ----------
-    options
-        With those of `add_executor_arguments`.
-    imports
-        Modules that a worker imports once.
-    """
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
     return executors.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -97,13 +97,7 @@ def _refuse_other_options(options: argparse.Namespace) -> None:
 
 
 def how_it_goes_on(options: argparse.Namespace) -> str:
-    """The command that resumes a run that was ended; "" where it would be refused.
-
-    Parameters
-    ----------
-    options
-        As `with_request` gave them; ``out`` is None until the folder of the results is known.
-    """
+    """The command that resumes a run that was ended; "" where it would be refused, or its folder is not known."""
     folder = options.out
     if folder is None or asked_by(folder) != options.run:  # another run's request is not this one's
         return ""
@@ -122,13 +116,7 @@ def asked_by(folder: Path) -> str | None:
 
 
 def keep_request(folder: Path, options: argparse.Namespace) -> None:
-    """Keep what a run was asked for beside its checkpoints.
-
-    Parameters
-    ----------
-    options
-        As `with_request` gave them.
-    """
+    """Keep the options of `with_request` beside the checkpoints."""
     content = {name: getattr(options, name) for name in _OF_THE_RUN} | {"run": options.run}
     content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
     content["parameters"] = [str(path.resolve()) for path in options.parameters]
