@@ -50,12 +50,8 @@ def asked(
 ) -> Any:
     """A field of a request.
 
-    Parameters
-    ----------
-    text
-        Help of the option, and what the field means.
-    option, keyword
-        Where they are not spelt as the field is; None for a field that only Python has.
+    ``text``: help of the option, and what the field means.
+    ``option`` and ``keyword``: where they are not spelt as the field is; None for a field that only Python has.
     """
     return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, keyword)})
 
@@ -74,10 +70,7 @@ def asked_of(request: type) -> dict[str, Asked]:
 def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a request from keywords, of those that it has; None stays where it is the default.
 
-    Raises
-    ------
-    InputError
-        If one of them is not of its kind or outside of its range; it is named.
+    Raises an `InputError` if one of them is not of its kind or outside of its range; it is named.
     """
     found = {}
     for name, one in asked_of(request).items():

@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING, Any
 class Late:
     """A stand-in for a module, which is imported when one of its names is first asked for.
 
-    Parameters
-    ----------
-    module
-        Its name, such as ``"xarray"``.
+    ``module``: its name, such as ``"xarray"``.
     """
 
     def __init__(self, module: str) -> None:

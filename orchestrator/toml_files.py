@@ -22,10 +22,8 @@ class Table(BaseModel):
 def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[str, dict[str, Any]]:
     """Read a TOML file; its text, and what the text says.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not TOML.
+    Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
+    TOML.
     """
     source = f"{option} {path}".lstrip()
     try:

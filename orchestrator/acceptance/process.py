@@ -279,18 +279,11 @@ class HostedComponent(RemoteCalls, Derived):
     def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
-        Parameters
-        ----------
-        into, out
-            Variables that are set before a step, and read after it.
-        rows
-            Values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
-        steps
-            How many; with 0 the first row is set and one row read, without a step.
-        time
-            At which the first step starts [s].
-        step_size
-            Communication step [s].
+        ``into`` and ``out``: variables that are set before a step, and read after it.
+        ``rows``: values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
+        ``steps``: how many; with 0 the first row is set and one row read, without a step.
+        ``time``: at which the first step starts [s].
+        ``step_size``: communication step [s].
         """
         status, stage, done, values = self._process.run(
             self.number, _references(into), rows, _references(out), steps, time, step_size

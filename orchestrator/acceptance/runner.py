@@ -137,23 +137,14 @@ def check_fmu(
 ) -> AcceptanceReport:
     """Run the acceptance tests.
 
-    Parameters
-    ----------
-    limits
-        What the FMU may take; the usual limits where None.
-    only
-        Names of checks; all of them where empty.
-    run_for
-        Wall-clock time for which it is made to run [s].
-    use
-        Step, operating point and values with which it is used; what the file declares where None.
-    seed
-        Of what is drawn at random; from the file's own bytes where None, so that its author cannot know it before.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or no such check, or the binding is not TOML, not of its form or not filled in.
+    ``limits``: what the FMU may take; the usual limits where None.
+    ``only``: names of checks; all of them where empty.
+    ``run_for``: wall-clock time for which it is made to run [s].
+    ``use``: step, operating point and values with which it is used; what the file declares where None.
+    ``seed``: of what is drawn at random; from the file's own bytes where None, so that its author cannot know it
+    before.
+    Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
+    filled in.
     """
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:

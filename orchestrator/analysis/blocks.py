@@ -231,12 +231,8 @@ def linearize_within(
 ) -> ComponentLinearization:
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
 
-    Parameters
-    ----------
-    master
-        At the operating point; it is left as it was.
-    step_size
-        Communication step to linearise over [s].
+    ``master``: at the operating point; it is left as it was.
+    ``step_size``: communication step to linearise over [s].
     """
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):

@@ -103,14 +103,10 @@ def follow_along(
 ) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
-    Parameters
-    ----------
-    start
-        The mode at ``begin``.
-    begin, end
-        Ends of the path; the end may be the smaller one.
-    common
-        States by which modes are recognised, where not all models have the same; the start's vectors hold these alone.
+    ``start``: the mode at ``begin``.
+    ``begin`` and ``end``: ends of the path; the end may be the smaller one.
+    ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
+    alone.
     """
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin

@@ -74,14 +74,9 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
     """The verdict on a system, or "not known" if the linear model calls it stable and the response of a foreign FMU
     differs.
 
-    Parameters
-    ----------
-    master
-        The running system at the model's operating point; it is restored.
-    model
-        The step map composed of the blocks.
-    stability
-        The verdict on ``model``.
+    ``master``: the running system at the model's operating point; it is restored.
+    ``model``: the step map composed of the blocks.
+    ``stability``: the verdict on ``model``.
     """
     if not stability.stable:
         return stability

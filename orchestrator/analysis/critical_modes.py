@@ -78,14 +78,10 @@ def find_critical_modes(
 ) -> list[Mode]:
     """Modes of a frequency range with less than a given damping, least damped first.
 
-    Parameters
-    ----------
-    model
-        Step map or continuous matrix, of any size.
-    lowest_hz, highest_hz
-        Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
-    damping
-        Damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of −0.1.
+    ``model``: step map or continuous matrix, of any size.
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
+    ``damping``: damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of
+    −0.1.
     """
     if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
@@ -219,12 +215,8 @@ class Search:
     ) -> NDArray[np.complex128] | None:
         """All eigenvalues nearer than ``radius``; None if there are too many. Those that are not wanted may be rough.
 
-        Parameters
-        ----------
-        radius
-            Distance from ``centre`` [rad/s].
-        wanted
-            Whether an eigenvalue λ is looked for.
+        ``radius``: distance from ``centre`` [rad/s].
+        ``wanted``: whether an eigenvalue λ is looked for.
         """
         if self._solver.takes_many:
             self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))

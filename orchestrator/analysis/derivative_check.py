@@ -31,16 +31,10 @@ size of the difference."""
 def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
     """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back.
 
-    Parameters
-    ----------
-    component
-        Lets its states be set, and saves and restores its state.
-    given
-        Shape (unknowns, knowns).
-    unknowns
-        Variables whose derivatives are given, one for each row: rates and outputs.
-    knowns
-        Variables by which the unknowns are differentiated, one for each column: states and inputs.
+    ``component``: lets its states be set, and saves and restores its state.
+    ``given``: shape (unknowns, knowns).
+    ``unknowns``: variables whose derivatives are given, one for each row: rates and outputs.
+    ``knowns``: variables by which the unknowns are differentiated, one for each column: states and inputs.
     """
     one, two = _central_differences(component, unknowns, knowns)
     allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]

@@ -43,14 +43,9 @@ class PerturbedStep:
     def differences(self, varied: Sequence[int], size: float, rates: Sequence[str] = ()) -> Differences:
         """Central differences, one column for each perturbed state or input; the component is put back.
 
-        Parameters
-        ----------
-        varied
-            Places in ``names``.
-        size
-            Of the perturbation, relative to max(1, |value|).
-        rates
-            Names of the states' time derivatives, which are read before the step.
+        ``varied``: places in ``names``.
+        ``size``: of the perturbation, relative to max(1, |value|).
+        ``rates``: names of the states' time derivatives, which are read before the step.
         """
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()

@@ -35,11 +35,8 @@ _FIRST = 160
 def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector) -> int:
     """Number of eigenvalues to the right of `GROWING`, at any frequency; a pair counts twice.
 
-    Parameters
-    ----------
-    alone
-        All eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
-        determinant is theirs.
+    ``alone``: all eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
+    determinant is theirs.
     """
     poles = np.asarray(alone, dtype=complex)
 

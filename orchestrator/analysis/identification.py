@@ -50,14 +50,9 @@ def identify_modes(
 ) -> list[IdentifiedMode]:
     """Write a signal as a sum of damped exponentials.
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); equally spaced samples of a free response, [s] and any unit.
-    tolerance
-        Singular values below this fraction of the largest are taken for noise.
-    highest_hz
-        The signal is thinned to ten samples per period of this frequency.
+    ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.
+    ``tolerance``: singular values below this fraction of the largest are taken for noise.
+    ``highest_hz``: the signal is thinned to ten samples per period of this frequency.
     """
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval

@@ -62,16 +62,10 @@ class LinearModel:
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
         """The model of one matrix, without outputs that travel between components.
 
-        Parameters
-        ----------
-        A
-            Shape (n, n); in 1/s for a continuous model.
-        names
-            Of the states, length n.
-        step_size
-            Communication step [s]; None for a continuous model.
-        disagreement
-            As in `LinearModel`.
+        ``A``: shape (n, n); in 1/s for a continuous model.
+        ``names``: of the states, length n.
+        ``step_size``: communication step [s]; None for a continuous model.
+        ``disagreement``: as in `LinearModel`.
         """
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))

@@ -36,12 +36,8 @@ def missed(
 ) -> list[complex]:
     """Eigenvalues [rad/s] of a region beside the known ones.
 
-    Parameters
-    ----------
-    lowest, highest
-        Range of Im λ [rad/s], above 0.
-    damping
-        Damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
+    ``lowest`` and ``highest``: range of Im λ [rad/s], above 0.
+    ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
     """
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T

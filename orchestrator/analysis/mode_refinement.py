@@ -47,10 +47,7 @@ def refine(
 ) -> RefinedModes:
     """Modes of a continuous model, from values and vectors that are nearly so.
 
-    Parameters
-    ----------
-    values, left, right
-        As in `RefinedModes`, of a similar model with the same states.
+    ``values`` and ``left`` and ``right``: as in `RefinedModes`, of a similar model with the same states.
     """
     settled = False
     for _ in range(_ROUNDS):

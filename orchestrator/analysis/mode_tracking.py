@@ -123,12 +123,8 @@ def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
 def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD) -> bool:
     """Whether a mode of one point has no partner in the other without being near an end of the range [Hz].
 
-    Parameters
-    ----------
-    frequency_range
-        In which modes were looked for [Hz].
-    threshold
-        Least similarity of partners, from 0 to 1.
+    ``frequency_range``: in which modes were looked for [Hz].
+    ``threshold``: least similarity of partners, from 0 to 1.
     """
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})

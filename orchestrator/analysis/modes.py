@@ -159,12 +159,8 @@ def find_spectrum(
 ) -> Spectrum:
     """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
-    Parameters
-    ----------
-    model
-        Step map or continuous matrix.
-    lowest_hz, highest_hz
-        Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
+    ``model``: step map or continuous matrix.
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
     """
     lambdas, vectors = _values_and_vectors(model)
     chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
@@ -221,14 +217,9 @@ def make_mode(
 ) -> Mode:
     """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
 
-    Parameters
-    ----------
-    value
-        λ [rad/s].
-    left
-        Eigenvector of Aᴴ, shape (n,), of any length and angle.
-    right
-        Eigenvector of A, shape (n,), of any length and angle.
+    ``value``: λ [rad/s].
+    ``left``: eigenvector of Aᴴ, shape (n,), of any length and angle.
+    ``right``: eigenvector of A, shape (n,), of any length and angle.
     """
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()

@@ -48,10 +48,7 @@ class RealSchur:
     def vectors(self, chosen: Sequence[int]) -> tuple[Vector, Vector]:
         """Left and right eigenvectors, each of shape (n, m), of any length: lᴴ·A = λ·lᴴ and A·r = λ·r.
 
-        Parameters
-        ----------
-        chosen
-            Places of m eigenvalues in ``values``.
+        ``chosen``: places of m eigenvalues in ``values``.
         """
         places = np.asarray(chosen, dtype=np.int64)
         if self._all is not None:

@@ -247,14 +247,9 @@ def judge(
 ) -> Stability:
     """The verdict on a step map, or on a continuous model.
 
-    Parameters
-    ----------
-    spectrum
-        All eigenvalues of the model where they are known already.
-    system
-        The continuous model of the same system; None where a component gives no derivatives.
-    of_system
-        All eigenvalues of ``system`` where they are known already.
+    ``spectrum``: all eigenvalues of the model where they are known already.
+    ``system``: the continuous model of the same system; None where a component gives no derivatives.
+    ``of_system``: all eigenvalues of ``system`` where they are known already.
     """
     spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)

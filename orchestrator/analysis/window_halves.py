@@ -87,10 +87,7 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
 def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]) -> WindowPart:
     """What the modes of a part of a signal leave of it.
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); the part of the signal, [s] and any unit.
+    ``times`` and ``signal``: shape (n,); the part of the signal, [s] and any unit.
     """
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]

@@ -84,16 +84,11 @@ def linearize_with_box(
 ) -> BoxedSystem:
     """Identify one component and linearise the coupled system around where the master is.
 
-    Parameters
-    ----------
-    master
-        Initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
-    component
-        Name of the black box. Only its inputs are set and its outputs read.
-    excitation
-        Signals that excite the box; the usual signals where None.
-    restore
-        Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
+    ``master``: initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as
+    well.
+    ``component``: name of the black box. Only its inputs are set and its outputs read.
+    ``excitation``: signals that excite the box; the usual signals where None.
+    ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
@@ -118,10 +113,8 @@ def modes_with_boxes(
 ) -> ModesResult:
     """Modes as `modes_of` finds them; components that hide their states are identified first.
 
-    Parameters
-    ----------
-    prepared, master, frequency_range, critical
-        As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
+    ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
+    master must be at rest at the power flow's operating point.
     """
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:

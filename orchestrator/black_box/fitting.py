@@ -71,10 +71,7 @@ class IdentifiedModel:
 def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedModel:
     """Fit the smallest model that is as close as the measurement is certain.
 
-    Raises
-    ------
-    AnalysisError
-        If none of `ORDERS` comes within ``largest_error``.
+    Raises an `AnalysisError` if none of `ORDERS` comes within ``largest_error``.
     """
     wanted = max(_WANTED, response.largest_bound)
     best: IdentifiedModel | None = None

@@ -189,10 +189,7 @@ def _by_pulses(
 def _check_returned(bench: Bench, column: int, away: float, size: float) -> None:
     """A device that ran away to another operating point, a limit for instance, answers there as calmly as a stable one.
 
-    Raises
-    ------
-    AnalysisError
-        If the rest of the response [pu] is too large a part of it.
+    Raises an `AnalysisError` if the rest of the response [pu] is too large a part of it.
     """
     if not away <= _AWAY * size:
         raise AnalysisError(

@@ -21,11 +21,8 @@ MOST_ROWS = 100_000
 def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     """All rows of a file that must have some columns.
 
-    Raises
-    ------
-    InputError
-        If the file or one of the columns is missing, a column stands twice, columns are separated by semicolons or
-        tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
+    Raises an `InputError` if the file or one of the columns is missing, a column stands twice, columns are separated by
+    semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
     """
     path = seen_from_here(path)
     if not path.is_file():

@@ -45,14 +45,9 @@ class FlowEquations:
     ) -> "FlowEquations":
         """The equations of a network.
 
-        Parameters
-        ----------
-        active
-            Active power that units feed, by bus [pu, 100 MVA].
-        held
-            Magnitudes of held voltages, by bus [pu].
-        slack_bus
-            The bus that balances the power.
+        ``active``: active power that units feed, by bus [pu, 100 MVA].
+        ``held``: magnitudes of held voltages, by bus [pu].
+        ``slack_bus``: the bus that balances the power.
         """
         position = {bus: k for k, bus in enumerate(buses)}
         triplets: list[tuple[int, int, complex]] = []

@@ -19,10 +19,7 @@ _SHOWN = 6
 def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
     """Sentences about a power flow without a solution.
 
-    Parameters
-    ----------
-    with_stray
-        The same power flow with a share of its stray capacitances; None where it has none.
+    ``with_stray``: the same power flow with a share of its stray capacitances; None where it has none.
     """
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]

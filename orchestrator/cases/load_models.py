@@ -43,12 +43,8 @@ def with_laws(
 
     Without a key, a load is a constant impedance, and static generation (P < 0) a constant current.
 
-    Parameters
-    ----------
-    own
-        The load's own keys, which decide first.
-    parts
-        What of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
+    ``own``: the load's own keys, which decide first.
+    ``parts``: what of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
     """
     feeds = load.p_mw < 0
     models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]

@@ -54,11 +54,8 @@ class NetworkData:
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
 
-    Raises
-    ------
-    InputError
-        If a file is missing, lacks a column, holds something that is not a number, or a source holds something
-        that the grid model does not have.
+    Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
+    something that the grid model does not have.
     """
     found = _source(table, directory)
     source = found.network

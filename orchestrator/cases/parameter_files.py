@@ -29,12 +29,8 @@ class ParameterFile:
 def read_parameter_file(path: Path) -> ParameterFile:
     """Read a file whose one table ``[set]`` holds values by ``component.variable``.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not TOML, or it has no table ``[set]``.
-    CaseError
-        With every key and value that is not valid.
+    Raises an `InputError` if there is no such file, it is not TOML, or it has no table ``[set]``.
+    Raises a `CaseError` with every key and value that is not valid.
     """
     text, raw = read_toml(path, "the parameter file", "`gfor design` writes one")
     table = raw.get(_TABLE)

@@ -19,10 +19,7 @@ _CHOICES = re.compile(r"\b0: .*\b1: ")
 def convert(info: VariableInfo, value: Value) -> float | bool:
     """Return the value in the variable's own unit.
 
-    Raises
-    ------
-    ValueError
-        If type, unit or range do not fit; the message names the variable, the value and the rule.
+    Raises a `ValueError` if type, unit or range do not fit; the message names the variable, the value and the rule.
     """
     if info.type == "Boolean":
         if isinstance(value, bool):

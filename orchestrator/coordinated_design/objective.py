@@ -63,12 +63,8 @@ _SWINGING = band_of(2j * np.pi)
 def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
     """The damping ratio, by band, that other modes may not fall below.
 
-    Parameters
-    ----------
-    values
-        The other modes without the controllers [rad/s], one of each pair.
-    least
-        The bound; a band that has a mode below it keeps what it has, less `ALLOWED`.
+    ``values``: the other modes without the controllers [rad/s], one of each pair.
+    ``least``: the bound; a band that has a mode below it keeps what it has, less `ALLOWED`.
     """
     floors = dict.fromkeys(range(len(BANDS_HZ) + 1), least)
     for value in values:
@@ -80,14 +76,9 @@ def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
 def split(values: Complex, targets: Iterable[int] | None, floors: Mapping[int, float]) -> list[Watched]:
     """All oscillations of a spectrum, with what is asked of each.
 
-    Parameters
-    ----------
-    values
-        All eigenvalues [rad/s].
-    targets
-        Places of the modes that the design damps; None for all electromechanical ones.
-    floors
-        As `floors_of` gives them.
+    ``values``: all eigenvalues [rad/s].
+    ``targets``: places of the modes that the design damps; None for all electromechanical ones.
+    ``floors``: as `floors_of` gives them.
     """
     chosen = None if targets is None else set(targets)
     found = []
@@ -126,10 +117,7 @@ _ROUNDING = 1e-7
 def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
     """The worth of a spectrum.
 
-    Parameters
-    ----------
-    growing, growing_before
-        As `growth` gives them, with the setting and without it [1/s].
+    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s].
     """
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
@@ -142,11 +130,8 @@ def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, 
 class RatedPoint:
     """One operating point of the search: its loops, and what its modes may not fall below.
 
-    Parameters
-    ----------
-    largest
-        The largest gain of every loop that may be closed [pu]; None where all modes count, also those that no loop
-        moves.
+    ``largest``: the largest gain of every loop that may be closed [pu]; None where all modes count, also those that no
+    loop moves.
     """
 
     def __init__(self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None) -> None:

@@ -88,12 +88,8 @@ class OpenLoops:
     ) -> "OpenLoops":
         """The system of full matrices, reduced where it is large.
 
-        Parameters
-        ----------
-        A, U, V
-            Shapes (n, n), (n, m), (m, n).
-        D
-            Shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
+        ``A`` and ``U`` and ``V``: shapes (n, n), (n, m), (m, n).
+        ``D``: shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
         """
         whole = cls(A, U, V, np.zeros((len(places), len(places))) if D is None else D, tuple(places), tuple(names))
         return (_reduced(whole) if len(A) > REDUCED else None) or whole
@@ -152,10 +148,7 @@ class OpenLoops:
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
         """An eigenvector of a closed loop in all n states and the stages.
 
-        Parameters
-        ----------
-        vector
-            As `solve` gives it, shape (r + k,).
+        ``vector``: as `solve` gives it, shape (r + k,).
         """
         if self.right is None or self.left is None:
             return vector
@@ -208,12 +201,8 @@ def _seen_by(A: Matrix, V: Matrix) -> NDArray[np.bool_]:
 def _real_form(values: Complex, rows: Complex, columns: Complex) -> tuple[Matrix, Matrix, Matrix]:
     """The real matrix of some modes, with blocks for pairs, and the way from its states to all and back.
 
-    Parameters
-    ----------
-    values
-        λ [rad/s], shape (r,), both of every pair.
-    rows, columns
-        Left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r).
+    ``values``: λ [rad/s], shape (r,), both of every pair.
+    ``rows`` and ``columns``: left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r).
     """
     real, upper = np.flatnonzero(values.imag == 0), np.flatnonzero(values.imag > 0)
     blocks = [np.array([[value]]) for value in values[real].real]

@@ -37,16 +37,10 @@ def ranked(
 ) -> tuple[RankedConverter, ...]:
     """The controllers by the size of their residues; for the first a controller alone is designed.
 
-    Parameters
-    ----------
-    stages
-        N_S of each.
-    largest
-        The largest gain [pu].
-    frequency
-        ω that the centres relate to [rad/s].
-    known
-        A controller that was designed alone already, with its setting.
+    ``stages``: N_S of each.
+    ``largest``: the largest gain [pu].
+    ``frequency``: ω that the centres relate to [rad/s].
+    ``known``: A controller that was designed alone already, with its setting.
     """
     by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
     found = []

@@ -70,12 +70,8 @@ class SettingSearch:
     def best(self, starts: int | None = None, *, polish: bool = True) -> Tried:
         """The best vector that the search finds; it harms no other mode, unless every vector does.
 
-        Parameters
-        ----------
-        starts
-            Number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
-        polish
-            Whether the best is improved without sensitivities as well.
+        ``starts``: number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
+        ``polish``: whether the best is improved without sensitivities as well.
         """
         several = len(self._space.groups) > 1
         scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)

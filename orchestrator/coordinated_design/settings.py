@@ -41,12 +41,8 @@ class PodGroup:
 class SettingSpace:
     """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre.
 
-    Parameters
-    ----------
-    gain_bounds
-        Of every gain [pu].
-    frequency
-        ω of the modes to be damped [rad/s], to which the centres relate.
+    ``gain_bounds``: of every gain [pu].
+    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate.
     """
 
     def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:

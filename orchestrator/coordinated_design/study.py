@@ -100,12 +100,8 @@ def plan_points_design(
 ) -> PointsDesignPlan:
     """Check a design over operating points, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    points
-        CSV file with the operating points, as `gfor screen` takes it.
-    outages
-        As `orchestrator.screening.outages.read_outages` takes them.
+    ``points``: CSV file with the operating points, as `gfor screen` takes it.
+    ``outages``: as `orchestrator.screening.outages.read_outages` takes them.
     """
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -214,12 +210,8 @@ def design_over_points(
 ) -> PointsDesign:
     """Find the settings, and compute all modes anew with them.
 
-    Parameters
-    ----------
-    plan
-        As `plan_points_design` gives it.
-    report
-        Called with the numbers of points done and in all, first without and then with the controllers.
+    ``plan``: as `plan_points_design` gives it.
+    ``report``: called with the numbers of points done and in all, first without and then with the controllers.
     """
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))
@@ -322,14 +314,9 @@ def modes_at(
 ) -> list[PointModes]:
     """The modes of all operating points and outages with some values, from the power flow on.
 
-    Parameters
-    ----------
-    values
-        By ``component.variable``; they go before all layers.
-    places
-        Loops that are measured as well.
-    executor, store
-        Where the points are computed, and what keeps them.
+    ``values``: by ``component.variable``; they go before all layers.
+    ``places``: loops that are measured as well.
+    ``executor`` and ``store``: where the points are computed, and what keeps them.
     """
     layers = (*plan.layers, OptionValues.of(values))
     content = {

@@ -159,14 +159,9 @@ def _placed(mode: Watched, point: PointModes) -> PlacedMode:
 class PointsVerdict:
     """What a design comes to over all points.
 
-    Parameters
-    ----------
-    wanted
-        Damping ratio that is wanted everywhere; None for the best that there is.
-    largest
-        The largest gain that the search was allowed [pu].
-    compared
-        Number of settings of an exhaustive grid none of which was better; 0 without one.
+    ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
+    ``largest``: the largest gain that the search was allowed [pu].
+    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
     """
 
     def __init__(

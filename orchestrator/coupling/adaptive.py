@@ -49,16 +49,10 @@ class AdaptiveLoop:
     A step ends at every communication point at which the caller stops: at events, and where something is recorded.
     Between them it has the length of that stretch, halved as often as is needed.
 
-    Parameters
-    ----------
-    groups
-        Components that step together, in the order of the schedule.
-    y
-        All coupled outputs; the loops write them.
-    tracks
-        Where each output went; the loops write them.
-    step_size
-        The communication step [s].
+    ``groups``: components that step together, in the order of the schedule.
+    ``y``: all coupled outputs; the loops write them.
+    ``tracks``: where each output went; the loops write them.
+    ``step_size``: the communication step [s].
     """
 
     def __init__(

@@ -102,13 +102,9 @@ class CompiledLoop:
     The first communication steps are done by one thread; by what each call took then, the calls of a group are shared
     out. Who does a call changes no value.
 
-    Parameters
-    ----------
-    library
-        `loop_library`.
-    threads
-        How many step; None for as many as make a step shortest, up to one for each core, and only while they are seen
-        to be faster than one.
+    ``library``: `loop_library`.
+    ``threads``: how many step; None for as many as make a step shortest, up to one for each core, and only while they
+    are seen to be faster than one.
     """
 
     def __init__(
@@ -205,10 +201,7 @@ class CompiledLoop:
     def _note(self, steps: int, seconds: float, team: Team | None) -> None:
         """Note what calls took, and share them out when it is time.
 
-        Parameters
-        ----------
-        steps, seconds
-            Communication steps that were done just now, and the wall-clock time they took [s].
+        ``steps`` and ``seconds``: communication steps that were done just now, and the wall-clock time they took [s].
         """
         self._done += steps
         self._together += steps if team is not None else 0

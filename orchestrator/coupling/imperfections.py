@@ -25,14 +25,10 @@ class Bias:
 class Noise:
     """Normally distributed noise is added: in every communication step a new value.
 
-    Parameters
-    ----------
-    deviation
-        Standard deviation, in the signal's unit, with a bandwidth as without.
-    seed
-        Together with the connection's name it determines every value.
-    bandwidth
-        Cut-off frequency of a first-order low-pass [Hz]; None for noise that is white at the communication step.
+    ``deviation``: standard deviation, in the signal's unit, with a bandwidth as without.
+    ``seed``: together with the connection's name it determines every value.
+    ``bandwidth``: cut-off frequency of a first-order low-pass [Hz]; None for noise that is white at the communication
+    step.
     """
 
     deviation: float

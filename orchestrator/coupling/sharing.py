@@ -23,12 +23,8 @@ class Shares:
 def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
     """Share out the calls of a group, the costly ones first, each to who has least.
 
-    Parameters
-    ----------
-    bound
-        Of every call, whether the calling thread alone may do it.
-    costs
-        Of every call [s].
+    ``bound``: of every call, whether the calling thread alone may do it.
+    ``costs``: of every call [s].
     """
     own = tuple(call for call in calls if bound[call])
     loads = [0.0] * threads

@@ -24,12 +24,8 @@ class Trial:
     def took(self, steps: int, seconds: float) -> None:
         """Note what communication steps took.
 
-        Parameters
-        ----------
-        steps
-            How many were done, at most `most`.
-        seconds
-            Wall-clock time [s].
+        ``steps``: how many were done, at most `most`.
+        ``seconds``: wall-clock time [s].
         """
         self._left -= steps
         if self._block is not None:

@@ -114,12 +114,8 @@ class Loop(Protocol):
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
 
-        Raises
-        ------
-        ComponentError
-            If a call fails; ``completed`` tells how many steps were done before.
-        NotFiniteError
-            If a step gives an output that is no finite number.
+        Raises a `ComponentError` if a call fails; ``completed`` tells how many steps were done before.
+        Raises a `NotFiniteError` if a step gives an output that is no finite number.
         """
 
     completed: int  # communication steps that the last call did
@@ -139,9 +135,6 @@ class Loop(Protocol):
 def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
     """The error of an output that is no finite number.
 
-    Parameters
-    ----------
-    time
-        At which it was read [s].
+    ``time``: at which it was read [s].
     """
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)

@@ -72,21 +72,12 @@ class WireValues:
 class WireBank:
     """The connections of a system into one group that do more than carry a value.
 
-    Parameters
-    ----------
-    step_size
-        Communication step [s].
-    sources
-        Index of each connection's output in the system's vector y.
-    outputs
-        Where what arrives is written, shape (number of connections,).
-    window
-        Where that is in the vector that the loop reads.
-
-    Raises
-    ------
-    InputError
-        If a delay is no multiple of the communication step, or a noise's bandwidth is beyond what the step shows.
+    ``step_size``: communication step [s].
+    ``sources``: index of each connection's output in the system's vector y.
+    ``outputs``: where what arrives is written, shape (number of connections,).
+    ``window``: where that is in the vector that the loop reads.
+    Raises an `InputError` if a delay is no multiple of the communication step, or a noise's bandwidth is beyond what
+    the step shows.
     """
 
     name, one_thread = "connections", "no FMU"

@@ -38,14 +38,9 @@ class Exchanges(Protocol):
 class FederatedComponent(Derived):
     """One component of a federation.
 
-    Parameters
-    ----------
-    description
-        Of the FMU; of a foreign federate only what it publishes and takes.
-    inner
-        The FMU in this process until `hand_over`; None of a foreign federate.
-    published
-        Outputs that the federate publishes, in this order.
+    ``description``: of the FMU; of a foreign federate only what it publishes and takes.
+    ``inner``: the FMU in this process until `hand_over`; None of a foreign federate.
+    ``published``: outputs that the federate publishes, in this order.
     """
 
     def __init__(

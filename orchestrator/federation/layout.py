@@ -44,10 +44,8 @@ class Layout:
 def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]) -> Layout:
     """The exchanges of a scenario some of whose components are federates.
 
-    Raises
-    ------
-    InputError
-        If there is no such component, or the schedule or the communication step cannot be kept over HELICS.
+    Raises an `InputError` if there is no such component, or the schedule or the communication step cannot be kept over
+    HELICS.
     """
     system, known = prepared.system, prepared.system.components
     for option, given in (("--federate", names), ("--external", external)):

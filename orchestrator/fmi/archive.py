@@ -97,16 +97,9 @@ def listed_twice(path: Path) -> tuple[str, ...]:
 def extract(path: Path, folder: Path | None = None) -> Path:
     """Unpack an FMU into a folder of its own.
 
-    Parameters
-    ----------
-    folder
-        Where to; by default a new temporary folder.
-
-    Raises
-    ------
-    FmuFileError
-        If the archive is damaged, would write outside of the folder, or is larger than `MOST_BYTES`. Nothing is left
-        behind then.
+    ``folder``: where to; by default a new temporary folder.
+    Raises a `FmuFileError` if the archive is damaged, would write outside of the folder, or is larger than
+    `MOST_BYTES`. Nothing is left behind then.
     """
     with _opened(path) as archive:
         target = own_folder("fmu") if folder is None else folder

@@ -62,18 +62,11 @@ def confine(
 ) -> None:
     """Close this process off; ``means`` is completed.
 
-    Parameters
-    ----------
-    means
-        What is in force already.
-    layers
-        Which of `LAYERS` may be used.
-    work
-        The folder in which it may write.
-    readable
-        What it may read beside the system's libraries and Python's own folders.
-    windows
-        Whether the FMU is for Windows: Wine's server (`wine`) is started here, with what is in force by then.
+    ``means``: what is in force already.
+    ``layers``: which of `LAYERS` may be used.
+    ``work``: the folder in which it may write.
+    ``readable``: what it may read beside the system's libraries and Python's own folders.
+    ``windows``: whether the FMU is for Windows: Wine's server (`wine`) is started here, with what is in force by then.
     """
     if sys.platform != "linux":
         means.landlock = means.seccomp = f"{sys.platform} has none"

@@ -64,10 +64,7 @@ class _Calls:
     def terminable(self, ending: bool = False) -> Iterator[None]:
         """Inside, the first SIGTERM does what Ctrl-C does; a second one ends the process at once.
 
-        Parameters
-        ----------
-        ending
-            Whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
+        ``ending``: whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
         """
         self.taken = self.terminated = self.over = False
         if threading.current_thread() is not threading.main_thread():

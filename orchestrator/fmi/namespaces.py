@@ -44,14 +44,9 @@ def enter_namespaces() -> None:
 def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[str]:
     """Have a view of all files of one's own, where only a folder in memory can be changed.
 
-    Parameters
-    ----------
-    folder
-        Where that folder is put, empty.
-    size
-        What it may hold [bytes].
-    more
-        Folders in whose place there is an empty one in memory as well.
+    ``folder``: where that folder is put, empty.
+    ``size``: what it may hold [bytes].
+    ``more``: folders in whose place there is an empty one in memory as well.
     """
     unshare(NEW_MOUNTS)
     mount(None, "/", None, _PRIVATE | _ALL_BELOW)

@@ -118,17 +118,12 @@ def _program(own_process: int | None, *, signals: bool, attributes: bool, ipc: b
 def filter_calls(*, attributes: bool, ipc: bool, own_process: int | None, signals: bool) -> None:
     """Refuse system calls in every thread of this process and in what they start, for good.
 
-    Parameters
-    ----------
-    attributes
-        Whether the mode, the owner, the times and the extended attributes of files are kept from it as well, also in
-        its own folder: where no read-only mount protects those of other files.
-    ipc
-        Whether semaphores of System V and queues by name are refused: where they are not its own.
-    own_process
-        Number of the only process whose limits and priority it may change: its own; None where it sees no other.
-    signals
-        Whether it may send signals to that process only: where they would reach others.
+    ``attributes``: whether the mode, the owner, the times and the extended attributes of files are kept from it as
+    well, also in its own folder: where no read-only mount protects those of other files.
+    ``ipc``: whether semaphores of System V and queues by name are refused: where they are not its own.
+    ``own_process``: number of the only process whose limits and priority it may change: its own; None where it sees no
+    other.
+    ``signals``: whether it may send signals to that process only: where they would reach others.
     """
     program = _program(own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc)
     buffer = ctypes.create_string_buffer(program, len(program))

@@ -34,10 +34,7 @@ READER = "orchestrator.fmi.dll_reading"
 def foreign_platforms(library: Path) -> tuple[str, ...]:
     """Platforms other than this machine's whose DLLs run here.
 
-    Raises
-    ------
-    InputError
-        If a DLL for Windows needs Wine, which is not there, or its program cannot be compiled.
+    Raises an `InputError` if a DLL for Windows needs Wine, which is not there, or its program cannot be compiled.
     """
     try:
         with library.open("rb") as file:

@@ -162,12 +162,8 @@ def _end_with_parent() -> None:
 class Server:
     """Wine's server for one prefix, with a connection that one program can use.
 
-    Parameters
-    ----------
-    folder
-        Where `prepare` made the prefix.
-    tied
-        Whether the kernel ends it, and its programs, with the thread that started them.
+    ``folder``: where `prepare` made the prefix.
+    ``tied``: whether the kernel ends it, and its programs, with the thread that started them.
     """
 
     def __init__(self, folder: Path, *, tied: bool, programs: int = 1) -> None:

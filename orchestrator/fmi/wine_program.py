@@ -85,10 +85,7 @@ def proxy() -> Any:
 class WineProgram:
     """The program under Wine, with one library loaded.
 
-    Parameters
-    ----------
-    patience
-        Time for one answer [s].
+    ``patience``: time for one answer [s].
     """
 
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
@@ -138,10 +135,7 @@ class WineProgram:
     def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
         """One question to the program.
 
-        Parameters
-        ----------
-        command
-            One of those of `wine_talk.c`.
+        ``command``: one of those of `wine_talk.c`.
         """
         for k, value in enumerate(arguments):
             self._talk.a[k] = value

@@ -89,10 +89,7 @@ def groups_of(
 def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str, float]:
     """The participation of every group in a mode, largest first; it sums to 1 as the components' does.
 
-    Parameters
-    ----------
-    groups
-        Of every component; one that is not there counts to `OTHERS`.
+    ``groups``: of every component; one that is not there counts to `OTHERS`.
     """
     found: dict[str, float] = {}
     for name, share in shares.items():

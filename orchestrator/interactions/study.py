@@ -92,22 +92,12 @@ def plan_interactions(
 ) -> InteractionsPlan:
     """Check a study, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    scenario
-        Name of the scenario; None for the only one.
-    overrides
-        Values by ``component.variable``; they go before the parameter files.
-    step_size
-        Communication step [s]; the case's where None.
-    parameters
-        Parameter files; a later one goes before an earlier one.
-
-    Raises
-    ------
-    InputError
-        If the scenario, a place or a device is unknown, there are too many systems, or another device gives another
-        power flow.
+    ``scenario``: name of the scenario; None for the only one.
+    ``overrides``: values by ``component.variable``; they go before the parameter files.
+    ``step_size``: communication step [s]; the case's where None.
+    ``parameters``: parameter files; a later one goes before an earlier one.
+    Raises an `InputError` if the scenario, a place or a device is unknown, there are too many systems, or another
+    device gives another power flow.
     """
     name = _scenario(case, scenario)
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
@@ -140,10 +130,7 @@ def run_interactions(
 ) -> InteractionsResult:
     """Compute the systems that are not stored yet; systems of the same devices are computed once.
 
-    Parameters
-    ----------
-    plan
-        A plan that `plan_interactions` has checked.
+    ``plan``: A plan that `plan_interactions` has checked.
     """
     result = InteractionsResult(plan)
     tasks: dict[str, SystemTask] = {}

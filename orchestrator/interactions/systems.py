@@ -54,10 +54,7 @@ Exchanged = dict[str, ComponentTable]
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
     """The case as it is, without any vendor, with each alone and with each pair.
 
-    Raises
-    ------
-    InputError
-        If there are more than `MOST_VENDORS`.
+    Raises an `InputError` if there are more than `MOST_VENDORS`.
     """
     vendors = vendors_of(places)
     if len(vendors) > MOST_VENDORS:
@@ -80,10 +77,8 @@ def assignments(
 ) -> dict[SystemName, Exchanged]:
     """Each device at each of some places, in all ways.
 
-    Raises
-    ------
-    InputError
-        If there is nothing to swap, two devices have one name, or there are more than `MOST_ASSIGNMENTS`.
+    Raises an `InputError` if there is nothing to swap, two devices have one name, or there are more than
+    `MOST_ASSIGNMENTS`.
     """
     templates = first_of({name: places[name] for name in at})
     vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well

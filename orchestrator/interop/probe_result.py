@@ -29,17 +29,10 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
     """Read a CSV file. The end of a heading says which signal the column holds (``a.y``, ``probe_a::y``, ``system/a/y
     [1]``).
 
-    Parameters
-    ----------
-    path
-        Separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
-    named
-        Heading of the column for ``time`` or a signal, where the end of the heading does not show it.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is not a number.
+    ``path``: separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
+    ``named``: heading of the column for ``time`` or a signal, where the end of the heading does not show it.
+    Raises an `InputError` if the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is
+    not a number.
     """
     heads, lines = _table(path)
     columns = _columns(path, heads, dict(named or {}))

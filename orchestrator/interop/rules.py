@@ -43,18 +43,10 @@ class MasterRules:
     def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
         """The schedule for a system.
 
-        Parameters
-        ----------
-        components
-            Names of all components, in the order in which the master was given them.
-        order
-            Order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
-
-        Raises
-        ------
-        InputError
-            If the master steps all components side by side and an order is given, or the order does not list every
-            component once.
+        ``components``: names of all components, in the order in which the master was given them.
+        ``order``: order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
+        Raises an `InputError` if the master steps all components side by side and an order is given, or the order does
+        not list every component once.
         """
         if self.steps == "side by side":
             if order is not None:

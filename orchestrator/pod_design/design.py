@@ -197,12 +197,8 @@ def design_pod(
 ) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
-    Parameters
-    ----------
-    store
-        Keeps figures on the way as soon as they are there; those that are there already are not computed again.
-    search
-        Gives a refinement settings to try; by default it surveys all itself.
+    ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
+    ``search``: gives a refinement settings to try; by default it surveys all itself.
     """
     report("preparing the case")
     target = find_target(

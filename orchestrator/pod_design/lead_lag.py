@@ -81,19 +81,10 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     φ = (π ∓ φ_NC)/N_S; a = (1 − sin φ)/(1 + sin φ) for lead, its inverse for lag;
     T_S1 = 1/(ω_0·√a), T_S2 = a·T_S1.
 
-    Parameters
-    ----------
-    phase_deg
-        Angle of the non-compensated sensitivity [°], in (−180, 180].
-    centre
-        ω_0 [rad/s].
-    stages
-        N_S; with 0 there is no compensation.
-
-    Raises
-    ------
-    AnalysisError
-        If a stage would have to turn by 90° or more, which is impossible.
+    ``phase_deg``: angle of the non-compensated sensitivity [°], in (−180, 180].
+    ``centre``: ω_0 [rad/s].
+    ``stages``: N_S; with 0 there is no compensation.
+    Raises an `AnalysisError` if a stage would have to turn by 90° or more, which is impossible.
     """
     if stages == 0:
         return NO_COMPENSATION

@@ -104,18 +104,12 @@ def refine(
 ) -> Refinement:
     """Search gain and lead/lag on the closed loop.
 
-    Parameters
-    ----------
-    required
-        Damping ratio of the target.
-    bounds
-        Of the gain [pu].
-    others
-        The other modes without the controller [rad/s].
-    search
-        Gives settings where nothing near the design meets the requirement; by default a survey does.
-    evenly
-        Whether, where no setting meets the requirement, that with the best least damping of all modes is chosen.
+    ``required``: damping ratio of the target.
+    ``bounds``: of the gain [pu].
+    ``others``: the other modes without the controller [rad/s].
+    ``search``: gives settings where nothing near the design meets the requirement; by default a survey does.
+    ``evenly``: whether, where no setting meets the requirement, that with the best least damping of all modes is
+    chosen.
     """
     result = Refinement()
     even = -1.0
@@ -165,18 +159,11 @@ def sweep(
 ) -> GainSweep:
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
 
-    Parameters
-    ----------
-    off
-        The target with the controller off; following begins there.
-    required
-        Damping ratio of the target.
-    bounds
-        Of the gain [pu of the converter's rating].
-    why
-        Where the lead/lag comes from, for people.
-    special
-        A gain within the bounds that the sweep always includes [pu].
+    ``off``: the target with the controller off; following begins there.
+    ``required``: damping ratio of the target.
+    ``bounds``: of the gain [pu of the converter's rating].
+    ``why``: where the lead/lag comes from, for people.
+    ``special``: A gain within the bounds that the sweep always includes [pu].
     """
     points: list[Placed] = []
     here = off

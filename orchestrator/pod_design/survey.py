@@ -47,14 +47,9 @@ def survey(
 ) -> Survey:
     """Rate settings over the whole range of gain, angle and centre.
 
-    Parameters
-    ----------
-    initial, others
-        The target and the other modes without the controller [rad/s].
-    stages
-        N_S of the lead/lag, at least 1.
-    bounds
-        Of the gain [pu].
+    ``initial`` and ``others``: the target and the other modes without the controller [rad/s].
+    ``stages``: N_S of the lead/lag, at least 1.
+    ``bounds``: of the gain [pu].
     """
     ground = _Ground(loop, initial, np.array(others, dtype=complex), stages, bounds)
     turns = np.linspace(-0.95, 0.95, _TURNS).tolist()

@@ -34,14 +34,10 @@ _PATIENCE = 30
 class DaskCluster:
     """Runs tasks on the workers of a Dask scheduler.
 
-    Parameters
-    ----------
-    address
-        Of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in the
-        same version.
-    tls
-        Folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration says
-        where they are.
+    ``address``: of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in
+    the same version.
+    ``tls``: folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration
+    says where they are.
     """
 
     def __init__(self, address: str, tls: Path | None = None) -> None:

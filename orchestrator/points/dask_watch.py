@@ -18,12 +18,8 @@ _FINDS = "__import__('importlib.util').util.find_spec('orchestrator') is not Non
 class ClusterWatch:
     """The workers of one run.
 
-    Parameters
-    ----------
-    client
-        Of `distributed`.
-    patience
-        Seconds without any worker after which the run ends.
+    ``client``: of `distributed`.
+    ``patience``: seconds without any worker after which the run ends.
     """
 
     def __init__(self, client: Any, address: str, patience: float) -> None:
@@ -44,10 +40,7 @@ class ClusterWatch:
     def look(self) -> None:
         """Tell which workers are lost.
 
-        Raises
-        ------
-        CosimError
-            If no usable worker was there for so long as the patience lasts, or the scheduler is gone.
+        Raises a `CosimError` if no usable worker was there for so long as the patience lasts, or the scheduler is gone.
         """
         now = time.monotonic()
         if now - self._looked < INTERVAL:

@@ -38,10 +38,7 @@ class Manifest:
     def check(self, names: Iterable[str]) -> None:
         """Compare files with what was written.
 
-        Parameters
-        ----------
-        names
-            Of the files; those that are not listed, and were written by nobody, are not looked at.
+        ``names``: of the files; those that are not listed, and were written by nobody, are not looked at.
         """
         for name in names:
             if name in self.files:
@@ -78,14 +75,9 @@ def write_manifest(
 ) -> None:
     """Write a folder's manifest, after its files.
 
-    Parameters
-    ----------
-    scenarios
-        Folders beside them that are of the same run.
-    before
-        What an earlier command said of the files' place: its files that are not written anew stay listed.
-    about
-        Of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
+    ``scenarios``: folders beside them that are of the same run.
+    ``before``: what an earlier command said of the files' place: its files that are not written anew stay listed.
+    ``about``: of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
     """
     paths = {name: folder / name for name in sorted(names)}
     files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}

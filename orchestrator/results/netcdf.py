@@ -47,14 +47,9 @@ def netcdf_image(
 ) -> bytes:
     """A NetCDF-4 file as bytes.
 
-    Parameters
-    ----------
-    times
-        [s], shape (n,).
-    values
-        Shape (n, number of names).
-    units
-        Attributes of columns, by name; those of ``time`` as well.
+    ``times``: [s], shape (n,).
+    ``values``: shape (n, number of names).
+    ``units``: attributes of columns, by name; those of ``time`` as well.
     """
     import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
 

@@ -85,15 +85,9 @@ class RecordingFolder:
     def join(self, path: Path, further: Attributes | None = None) -> None:
         """Write all as one file, and remove the parts.
 
-        Parameters
-        ----------
-        further
-            More attributes of it, such as `ENDED_EARLY`.
-
-        Raises
-        ------
-        ResultsError
-            If it cannot be written, or the parts are not those that the run has written; the parts stay.
+        ``further``: more attributes of it, such as `ENDED_EARLY`.
+        Raises a `ResultsError` if it cannot be written, or the parts are not those that the run has written; the parts
+        stay.
         """
         parts = parts_of(self.folder)
         found = rows_in(parts)

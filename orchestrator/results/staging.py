@@ -51,10 +51,7 @@ class ScenarioFolder:
     def publish(self, ended_early: str | None = None) -> Path:
         """Put the folder in its place, whole; results of an earlier run that are there go.
 
-        Parameters
-        ----------
-        ended_early
-            Why the run ended before its stop time; None where it reached that.
+        ``ended_early``: why the run ended before its stop time; None where it reached that.
         """
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})

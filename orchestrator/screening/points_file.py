@@ -28,11 +28,8 @@ class OperatingCase:
 def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> list[OperatingCase]:
     """The operating points of a file, for one scenario.
 
-    Raises
-    ------
-    InputError
-        With file and line: if a column or a cell has no meaning, a name is missing or repeated, two columns set one
-        value or switch one element, or there is no row.
+    Raises an `InputError` with file and line: if a column or a cell has no meaning, a name is missing or repeated, two
+    columns set one value or switch one element, or there is no row.
     """
     rows = rows_of(path, ())
     if not rows:

@@ -87,24 +87,15 @@ def plan_screening(
 ) -> ScreeningPlan:
     """Check a screening, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    points
-        CSV file with the operating points; None for the case's own.
-    outages
-        As `read_outages` takes them.
-    scenario
-        Its name; the first one where None.
-    overrides
-        Values by ``component.variable`` that hold at every point.
-    step_size
-        Communication step [s]; the case's where None.
-    wanted
-        Which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
-    whole
-        Whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of stretches.
-    sharing
-        How units share an outage; as the case says where None.
+    ``points``: CSV file with the operating points; None for the case's own.
+    ``outages``: as `read_outages` takes them.
+    ``scenario``: its name; the first one where None.
+    ``overrides``: values by ``component.variable`` that hold at every point.
+    ``step_size``: communication step [s]; the case's where None.
+    ``wanted``: which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
+    ``whole``: whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of
+    stretches.
+    ``sharing``: how units share an outage; as the case says where None.
     """
     name = scenario or next(iter(case.scenarios))
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
@@ -202,12 +193,8 @@ def run_screening(
 ) -> ScreeningResult:
     """Compute the stretches that are not stored yet, and follow the modes over all of them.
 
-    Parameters
-    ----------
-    plan
-        As `plan_screening` gives it.
-    shard
-        The part to compute; all where None.
+    ``plan``: as `plan_screening` gives it.
+    ``shard``: the part to compute; all where None.
     """
     part = shard or Shard()
     places = [k for k in range(len(plan.tasks)) if part.has(k)]

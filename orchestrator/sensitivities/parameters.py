@@ -46,13 +46,9 @@ class Parameter:
 def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool = False) -> list[Parameter]:
     """The Real parameters of all components that are asked for.
 
-    Parameters
-    ----------
-    patterns
-        Names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without patterns all
-        tunable ones are taken.
-    fixed
-        Without patterns, take the fixed ones as well.
+    ``patterns``: names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without
+    patterns all tunable ones are taken.
+    ``fixed``: without patterns, take the fixed ones as well.
     """
     descriptions = {name: running.description for name, running in master.components.items()}
     return parameters_in(
@@ -69,10 +65,7 @@ def parameters_in(
 ) -> list[Parameter]:
     """As `parameters_of`, of components that need not run.
 
-    Parameters
-    ----------
-    value_of
-        Value of a component's variable, in its unit; asked for the chosen ones only.
+    ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only.
     """
     everything = {
         f"{component}.{info.name}": (component, info)

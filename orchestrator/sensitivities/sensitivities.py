@@ -134,17 +134,11 @@ def find_sensitivities(
 ) -> SensitivityResult:
     """Differentiate one mode by parameters.
 
-    Parameters
-    ----------
-    mode
-        Name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the first
-        named one, else the critical one.
-    held
-        Hold the operating point, which leaves the tunable parameters alone.
-    directional
-        Linearise with the FMUs' own directional derivatives instead of by perturbation.
-    frequency_range
-        In which the mode is [Hz].
+    ``mode``: name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the
+    first named one, else the critical one.
+    ``held``: hold the operating point, which leaves the tunable parameters alone.
+    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
+    ``frequency_range``: in which the mode is [Hz].
     """
     with running(prepared) as master:
         point = find_operating_point(master)

@@ -55,10 +55,7 @@ def as_json(result: SensitivityResult) -> dict[str, Any]:
 def sensitivity_table(result: SensitivityResult, shown: int | None = None) -> Table:
     """The table for a terminal.
 
-    Parameters
-    ----------
-    shown
-        Number of rows; all where None.
+    ``shown``: number of rows; all where None.
     """
     mode = result.mode
     name = result.modes.name_of(mode) or "critical"

@@ -35,11 +35,8 @@ register_namespace("fmi-ls", _LS)
 def reference_members(path: Path) -> dict[str, bytes]:
     """Run a smoke test of an FMU for this machine, and return its files by their path in the archive.
 
-    Parameters
-    ----------
-    path
-        The FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at least)
-        higher.
+    ``path``: the FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at
+    least) higher.
     """
     description = read_description(path)
     stimuli, references, state = _run(description)

@@ -52,14 +52,9 @@ def not_kept(prepared: PreparedScenario) -> dict[str, str]:
 class Checkpoints:
     """Keeps the run of one scenario; given to `Master.run` as its keeper.
 
-    Parameters
-    ----------
-    every
-        Wall-clock time between two of them [s].
-    resume
-        Go on from the newest that is there, instead of beginning anew.
-    say
-        Told, in one line each, what a user should know.
+    ``every``: wall-clock time between two of them [s].
+    ``resume``: go on from the newest that is there, instead of beginning anew.
+    ``say``: told, in one line each, what a user should know.
     """
 
     def __init__(

@@ -23,12 +23,8 @@ class CommonTimes:
     def values(self, run: int, signal: Numbers) -> Numbers:
         """Values at the common times, shape (n,).
 
-        Parameters
-        ----------
-        run
-            0 for the first run, 1 for the second.
-        signal
-            All values that this run has recorded, shape (times of the run,).
+        ``run``: 0 for the first run, 1 for the second.
+        ``signal``: all values that this run has recorded, shape (times of the run,).
         """
         rows = self._rows[run]
         found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)

@@ -164,14 +164,9 @@ def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode
 def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:
     """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on.
 
-    Parameters
-    ----------
-    expression
-        The signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    start
-        Oscillations are looked for from this time on [s].
-    labels
-        Names of the two runs for tables and errors.
+    ``expression``: the signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
+    ``start``: oscillations are looked for from this time on [s].
+    ``labels``: names of the two runs for tables and errors.
     """
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
     for curve, label in zip((first, second), labels, strict=True):
@@ -202,10 +197,7 @@ def most_different(
 ) -> list[str]:
     """Signals that both runs have, those first whose difference is largest beside their own deviation.
 
-    Parameters
-    ----------
-    a, b
-        Trajectories of the two runs, compared at the times of `common_times`.
+    ``a`` and ``b``: trajectories of the two runs, compared at the times of `common_times`.
     """
     times = common_times(a["time"].values, b["time"].values, labels)
 

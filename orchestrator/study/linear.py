@@ -58,12 +58,8 @@ def linear_model(
 
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
-    Parameters
-    ----------
-    inputs, outputs
-        Names ``component.variable``.
-    as_continuous
-        A model in continuous time instead of the map over one communication step.
+    ``inputs`` and ``outputs``: names ``component.variable``.
+    ``as_continuous``: A model in continuous time instead of the map over one communication step.
     """
     with running(prepared) as master:
         point = find_operating_point(master)

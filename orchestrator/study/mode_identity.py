@@ -78,14 +78,9 @@ def settled(
 ) -> NamedSystem:
     """A scenario's names, where shapes do not tell by following the mode that it was.
 
-    Parameters
-    ----------
-    known
-        Scenarios that are settled already, by name, with the values that hold for all.
-    undamped
-        Gives it with other gains, where it still runs.
-    far
-        Whether to look beyond earlier scenarios where no mode would get a name.
+    ``known``: scenarios that are settled already, by name, with the values that hold for all.
+    ``undamped``: gives it with other gains, where it still runs.
+    ``far``: whether to look beyond earlier scenarios where no mode would get a name.
     """
     others = _Others(system, computed, known, undamped)
     for name in dict.fromkeys((*system.naming.contested, *system.naming.named)):

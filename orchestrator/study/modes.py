@@ -118,13 +118,9 @@ def compute_modes(
 ) -> ModesResult:
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
-    Parameters
-    ----------
-    critical
-        Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
-        knows too little to give modes their names.
-    directional
-        Linearise with the FMUs' own directional derivatives instead of by perturbation.
+    ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
+    search knows too little to give modes their names.
+    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
     """
     with running(prepared) as master:
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
@@ -319,14 +315,9 @@ def identified(
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
-    Parameters
-    ----------
-    at_gains
-        The linear model with other gains of damping controllers, where the scenario still runs.
-    directional
-        As `modes_of`, for scenarios that have to be computed.
-    black_boxes
-        Identifies components of such a scenario that hide their states.
+    ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
+    ``directional``: as `modes_of`, for scenarios that have to be computed.
+    ``black_boxes``: identifies components of such a scenario that hide their states.
     """
     first, last = _named_range(frequency_range)
 

@@ -118,18 +118,11 @@ def run_scenario(
     A component that fails in the middle ends the run, and so do Ctrl-C and SIGTERM; what was recorded until then is in
     the result.
 
-    Parameters
-    ----------
-    frequency_range
-        Modes of these frequencies are shown [Hz].
-    observers
-        What else looks on at every step, such as a recorder.
-    linear
-        Compute the linear model's response as well.
-    recording
-        Where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
-    checkpoints
-        Keep the run while it goes on, and go on from the newest where one was left; not with federates.
+    ``frequency_range``: modes of these frequencies are shown [Hz].
+    ``observers``: what else looks on at every step, such as a recorder.
+    ``linear``: compute the linear model's response as well.
+    ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
+    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
     """
     if federates is not None:
         if federates.announce is not None:

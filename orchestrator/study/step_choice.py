@@ -119,22 +119,12 @@ def choose_step(
 ) -> StepChoice:
     """What schedules do to a scenario's critical modes at several steps, against the continuous system.
 
-    Parameters
-    ----------
-    steps
-        Communication steps [s]; by default `MULTIPLES` of the case's own.
-    schedules
-        By default `TRIED`.
-    frequency_range
-        Of the critical modes [Hz].
-
-    Raises
-    ------
-    AnalysisError
-        If a component gives no derivatives, so that there is no continuous system to compare with; if no mode is in
-        range; or if the system is too large for all its eigenvalues.
-    InputError
-        If no step fits the case's events.
+    ``steps``: communication steps [s]; by default `MULTIPLES` of the case's own.
+    ``schedules``: by default `TRIED`.
+    ``frequency_range``: of the critical modes [Hz].
+    Raises an `AnalysisError` if a component gives no derivatives, so that there is no continuous system to compare
+    with; if no mode is in range; or if the system is too large for all its eigenvalues.
+    Raises an `InputError` if no step fits the case's events.
     """
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
@@ -256,12 +246,9 @@ def _trial(
 def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]) -> bool:
     """Whether a step makes nothing grow by itself, and leaves each critical mode on its side of the imaginary axis.
 
-    Parameters
-    ----------
-    rate, growth
-        Largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing grows.
-    seen, critical
-        The critical modes in both [rad/s].
+    ``rate`` and ``growth``: largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing
+    grows.
+    ``seen`` and ``critical``: the critical modes in both [rad/s].
     """
     grown = rate > (_COUPLING_FACTOR * growth + _COUPLING_RATE if growth else 0.0)
     crossed = bool(np.any((seen.real > 0) != (critical.real > 0)))

@@ -96,18 +96,11 @@ def make_task(
 ) -> SweepPointTask:
     """The task of one point.
 
-    Parameters
-    ----------
-    prepared
-        The scenario without what is varied: its FMUs and values go into the key.
-    layers
-        Parameter files and values of the command line that hold at every point, weakest first.
-    varied
-        Values by ``component.variable``. They have priority over every layer.
-    step_size
-        Communication step [s]; the case's where None.
-    frequency_range
-        Modes of these frequencies are kept [Hz].
+    ``prepared``: the scenario without what is varied: its FMUs and values go into the key.
+    ``layers``: parameter files and values of the command line that hold at every point, weakest first.
+    ``varied``: values by ``component.variable``. They have priority over every layer.
+    ``step_size``: communication step [s]; the case's where None.
+    ``frequency_range``: modes of these frequencies are kept [Hz].
     """
     content = {
         "case": prepared.case.text,

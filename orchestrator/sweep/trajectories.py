@@ -52,14 +52,9 @@ def find_trajectories(
     The first point of a row is linked to the first point of the previous row. A mode without predecessor in its own row
     is linked to the previous row as well.
 
-    Parameters
-    ----------
-    points
-        Points by place; failed points are skipped.
-    names
-        Names of the modes that the case looks for, most important first.
-    frequency_range
-        [Hz]
+    ``points``: points by place; failed points are skipped.
+    ``names``: names of the modes that the case looks for, most important first.
+    ``frequency_range``: [Hz]
     """
     modes = {place: record.modes for place, record in points.items() if record.modes is not None}
     route = list(_route(modes))

@@ -123,10 +123,8 @@ def run_away(
 ) -> Iterator[Finding]:
     """At most one speed outside of its band or drifting, and one drifting voltage: those that go farthest.
 
-    Parameters
-    ----------
-    slipped
-        Whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be reported.
+    ``slipped``: whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be
+    reported.
     """
     speeds = list(_speeds(seen, system, settings))
     yield from _farthest(seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE)
@@ -199,10 +197,7 @@ def still_moving_away(
     Nothing is remarked if its last rates lead to a near rest inside of `ALLOWED`, or, where governors of `HELD` of the
     ratings are at their limits, within `LEAST_AWAY`.
 
-    Parameters
-    ----------
-    limits
-        The findings on limits; those of governors that act at the end count.
+    ``limits``: the findings on limits; those of governors that act at the end count.
     """
     speeds = list(_speeds(seen, system, settings))
     if not speeds or last.end - last.begin < SHORTEST:

@@ -42,10 +42,7 @@ class Stretch:
 def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]) -> list[Stretch]:
     """The stretch after each noticed event.
 
-    Parameters
-    ----------
-    times
-        Of the events [s].
+    ``times``: of the events [s].
     """
     if not times:
         return []

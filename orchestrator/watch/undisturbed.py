@@ -34,10 +34,7 @@ _AGREE = 0.2
 def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Finding]:
     """How the state moves before the first event, if it does.
 
-    Parameters
-    ----------
-    until
-        Time of the first event, or the end [s].
+    ``until``: time of the first event, or the end [s].
     """
     count = int(np.searchsorted(seen.times, until * (1 + 1e-12), side="right"))
     motions = _motions(seen, system, count) if count >= FEWEST_LOOKS else {}

@@ -102,12 +102,8 @@ def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResu
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found a fault of the FMU.
 
-    Parameters
-    ----------
-    fault
-        A key of `REMEDIES`, which has the remedy for it.
-    figures
-        What was measured, for the report: plain values by name.
+    ``fault``: A key of `REMEDIES`, which has the remedy for it.
+    ``figures``: what was measured, for the report: plain values by name.
     """
     return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 

@@ -64,14 +64,9 @@ def rows(
 ) -> Numbers:
     """Deviations of the inputs, one row a step, with small random steps of every input beside the events.
 
-    Parameters
-    ----------
-    segments
-        What the voltage is multiplied by, one after another.
-    purpose
-        For what; each purpose has other random steps.
-    point
-        Where it starts; the subject's own point where None.
+    ``segments``: what the voltage is multiplied by, one after another.
+    ``purpose``: for what; each purpose has other random steps.
+    ``point``: where it starts; the subject's own point where None.
     """
     counts = [max(1, round(times * lasts / subject.step_size)) for _, lasts in segments]
     total, wide = sum(counts), len(subject.inputs)

@@ -47,10 +47,8 @@ def independence(subject: Subject) -> CheckResult:
 def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
     """The first fault that is found with some parameters set, or else the result with the parameters as they are.
 
-    Raises
-    ------
-    ComponentError
-        With the parameters as they are; a setting with which the FMU does not work is passed over.
+    Raises a `ComponentError` with the parameters as they are; a setting with which the FMU does not work is passed
+    over.
     """
     results = []
     for found, said in with_each_setting(subject, lambda setting: look(subject, setting)):

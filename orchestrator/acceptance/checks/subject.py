@@ -129,10 +129,7 @@ class Subject:
     ) -> None:
         """Give a new instance what it is given before initialisation.
 
-        Parameters
-        ----------
-        point
-            Operating point that it starts from; the one of use where None.
+        ``point``: operating point that it starts from; the one of use where None.
         """
         component.setup(0.0, None)
         if self.starts:
@@ -213,12 +210,8 @@ class Subject:
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs).
 
-        Parameters
-        ----------
-        step_size
-            Their length [s].
-        stimulus
-            Gives the deviations of the inputs from where they start, at a time [s].
+        ``step_size``: their length [s].
+        ``stimulus``: gives the deviations of the inputs from where they start, at a time [s].
         """
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
@@ -274,10 +267,7 @@ class Running:
     def hold(self, deviations: Numbers, steps: int, step_size: float) -> Numbers:
         """Step many times at once, shape (steps, n): what was read after each.
 
-        Parameters
-        ----------
-        deviations
-            Of the inputs before the first steps, one row each; after the last row they stay.
+        ``deviations``: of the inputs before the first steps, one row each; after the last row they stay.
         """
         begin = self.time
         if not steps:

@@ -172,10 +172,7 @@ def _rms(values: Numbers) -> float:
 def _stale(subject: Subject, *, declared: bool) -> str | None:
     """Outputs that follow an input at once, but not when they are read: they jump in the next step, however short.
 
-    Parameters
-    ----------
-    declared
-        Look at the inputs that the file says they depend on at once; else at those of which it says nothing.
+    ``declared``: look at the inputs that the file says they depend on at once; else at those of which it says nothing.
     """
     seen, h = subject.memory.get("feedthrough"), subject.step_size
     known = subject.description.output_dependencies

@@ -34,16 +34,10 @@ def branch(
 ) -> Branch:  # fmt: skip
     """A branch in pu.
 
-    Parameters
-    ----------
-    name, ends
-        Its name, and the buses' ids.
-    nominal
-        Nominal voltages of the buses [kV].
-    z, to_earth
-        Behind the ratio [ohm, S].
-    rho, alpha
-        The ratio V'/V [kV/kV], and its angle [degrees].
+    ``name`` and ``ends``: its name, and the buses' ids.
+    ``nominal``: nominal voltages of the buses [kV].
+    ``z`` and ``to_earth``: behind the ratio [ohm, S].
+    ``rho`` and ``alpha``: the ratio V'/V [kV/kV], and its angle [degrees].
     """
     first, second = nominal
     base = second**2 / BASE_MVA
@@ -55,12 +49,8 @@ def branch(
 def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
     """Lines that are closed at both ends.
 
-    Parameters
-    ----------
-    network
-        pypowsybl's.
-    nominal
-        Bus → nominal voltage [kV]; a branch that ends at another bus is out of service.
+    ``network``: pypowsybl's.
+    ``nominal``: bus → nominal voltage [kV]; a branch that ends at another bus is out of service.
     """
     for row in network.get_lines(all_attributes=True).itertuples():
         ends = row.bus1_id, row.bus2_id

@@ -49,10 +49,7 @@ class CgmesNetwork:
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     """Read the network of a CGMES model.
 
-    Parameters
-    ----------
-    leaving_out
-        Kinds of `LEFT_OUT` that the user lets go.
+    ``leaving_out``: kinds of `LEFT_OUT` that the user lets go.
     """
     unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
     if unknown:
@@ -70,12 +67,8 @@ def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[
 def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     """Tables of a network that pypowsybl holds.
 
-    Parameters
-    ----------
-    place
-        Path of its source, for messages.
-    leaving_out
-        Kinds of `LEFT_OUT` that may go.
+    ``place``: path of its source, for messages.
+    ``leaving_out``: kinds of `LEFT_OUT` that may go.
     """
     return _Reading(place, source).network(leaving_out)
 

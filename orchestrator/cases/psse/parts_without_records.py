@@ -56,10 +56,7 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
     """Ask about machines without an exciter or a governor where others have one.
 
-    Parameters
-    ----------
-    rows
-        Machines, with the choices of ``[units]``.
+    ``rows``: machines, with the choices of ``[units]``.
     """
     for kind, quantity in _CONSTANT.items():
         able = [row for row in rows if _can_have(kind, row)]
@@ -83,12 +80,8 @@ def _can_have(kind: str, row: UnitRow) -> bool:
 def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
     """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open.
 
-    Parameters
-    ----------
-    rows
-        With the choices of ``[units]``.
-    replaced
-        Labels of units that are converters of the case alone.
+    ``rows``: with the choices of ``[units]``.
+    ``replaced``: labels of units that are converters of the case alone.
     """
     return [
         row if row.converter or row.partial or row.label in replaced else replace(row, parts={**_WITHOUT, **row.parts})

@@ -41,10 +41,7 @@ class Transformer:
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
     """The transformers of a file.
 
-    Parameters
-    ----------
-    voltages
-        Bus → base voltage [kV]; 0 where the file leaves it open.
+    ``voltages``: bus → base voltage [kV]; 0 where the file leaves it open.
     """
     lines = iter(raw.of("transformer"))
     for first in lines:

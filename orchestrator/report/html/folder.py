@@ -38,11 +38,8 @@ class Results:
 def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
     """Read a run's folder, and sweeps and designs from it and from further folders.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no run, its files are of different runs or not as they were written, or a file in it cannot
-        be read.
+    Raises an `InputError` if the folder holds no run, its files are of different runs or not as they were written, or a
+    file in it cannot be read.
     """
     summary = folder / "summary.json"
     if not summary.is_file():

@@ -13,12 +13,8 @@ from orchestrator.safe_files import write_text
 def write_report(folder: Path, others: Sequence[Path] = (), path: Path | None = None) -> Path:
     """Write ``report.html``: one file that needs no network and no other file.
 
-    Parameters
-    ----------
-    others
-        Folders or files with sweeps and designs that belong to it.
-    path
-        By default ``report.html`` in the folder.
+    ``others``: folders or files with sweeps and designs that belong to it.
+    ``path``: by default ``report.html`` in the folder.
     """
     results = read_results(folder, others)
     target = path or folder / "report.html"

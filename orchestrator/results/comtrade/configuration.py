@@ -100,10 +100,8 @@ class _Lines:
 def read_configuration(text: str, place: str) -> Configuration:
     """Read the text of a ``.cfg``.
 
-    Raises
-    ------
-    InputError
-        If a line is missing or holds something else than the standard says; file, line and field are named.
+    Raises an `InputError` if a line is missing or holds something else than the standard says; file, line and field are
+    named.
     """
     lines = _Lines(text, place)
     station, device, revision = (*lines.next("the station's name"), "", "", "")[:3]

@@ -33,16 +33,10 @@ def write_comtrade(
     span: 1.2e-10 with ``BINARY32``, 7.6e-6 with ``BINARY``, 2.5e-6 with ``ASCII``; with ``FLOAT32`` it is 6e-8 of the
     largest distance from the middle of the span.
 
-    Parameters
-    ----------
-    dataset
-        Evenly recorded signals over the time [s].
-    path
-        Of the ``.cfg``; the ``.dat`` gets the same stem.
-    form
-        One of `FORMS`.
-    frequency
-        Rated frequency [Hz].
+    ``dataset``: evenly recorded signals over the time [s].
+    ``path``: of the ``.cfg``; the ``.dat`` gets the same stem.
+    ``form``: one of `FORMS`.
+    ``frequency``: rated frequency [Hz].
     """
     if form not in FORMS:
         raise InputError(f"the form {form!r} is unknown; choose one of {', '.join(FORMS)}")
