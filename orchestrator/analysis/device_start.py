@@ -2,11 +2,13 @@
 
 from cmath import rect
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.binding.misfits import SHOWN, Misfit, of_current, of_frequency, of_power
+from orchestrator.binding.misfits import OF_RATING, SHOWN, Misfit, of_current, of_frequency, of_power
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError
+from orchestrator.fmi.component import Component
 from orchestrator.fmi.port import BoundDescription
 
 _AT = 0.01
@@ -18,7 +20,7 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
     found = {}
     for name in master.components:
         try:
-            found[name] = list(_of(master, name))
+            found[name] = [_with_cause(misfit, master.components[name]) for misfit in _of(master, name)]
         except CosimError:
             continue
     return {name: misfits for name, misfits in found.items() if misfits}
@@ -26,6 +28,12 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
 
 def sentences(found: Mapping[str, list[Misfit]]) -> tuple[str, ...]:
     return tuple(misfit.sentence(name) for name, misfits in found.items() for misfit in misfits)
+
+
+def _with_cause(misfit: Misfit, component: Component) -> Misfit:
+    described = component.description
+    cause = described.likely_cause() if isinstance(described, BoundDescription) else ""
+    return replace(misfit, evidence=f"{misfit.evidence}; {cause}") if cause and misfit.fault in OF_RATING else misfit
 
 
 def _of(master: Master, name: str) -> Iterator[Misfit]:

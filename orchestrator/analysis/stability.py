@@ -4,6 +4,7 @@ The step map is what a simulation runs, the continuous model is the system itsel
 destabilise a stable system, and a long communication step may damp a mode that grows in the system.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -149,6 +150,11 @@ class Stability:
     def largest_growth_rate(self) -> float | None:
         """Largest real part [1/s] of the whole spectrum, zeros left out."""
         return None if self.mode is None else self.mode.eigenvalue.real
+
+    def doubted(self, misfits: Iterable[str]) -> "Stability":
+        """Not known to be stable where something does not fit between devices and bindings; growth stays growth."""
+        what = "; ".join(misfits)
+        return replace(self, stable=None, reason=what) if what and self.stable else self
 
     @property
     def verdict(self) -> str:

@@ -85,7 +85,15 @@ class _Reader:
             start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
             if voltage is not None and current is not None:
                 port = PortMap(
-                    bases.rating, bases.frequency, voltage, current, start, signals, settings, self._current_limit()
+                    bases.rating,
+                    bases.frequency,
+                    voltage,
+                    current,
+                    start,
+                    signals,
+                    settings,
+                    self._current_limit(),
+                    bases.voltage,
                 )
                 self._check_once(port)
         if self._problems or port is None:

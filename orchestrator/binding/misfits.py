@@ -28,6 +28,10 @@ REMEDIES = {
 }
 
 
+OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
+"""Faults that a wrong rating of the binding brings."""
+
+
 @dataclass(frozen=True)
 class Misfit:
     """A fault, by its name among `REMEDIES`, and what shows it."""

@@ -46,6 +46,8 @@ class BoxedSystem:
         its start to its rest at the ideal bus.
     warnings
         Reasons in the other components for doubts about the modes from 0.1 to 2 Hz.
+    misfits
+        What does not fit between devices and their bindings; among the warnings too.
     """
 
     component: str
@@ -54,6 +56,7 @@ class BoxedSystem:
     model: LinearModel
     residual: float
     warnings: tuple[str, ...] = ()
+    misfits: tuple[str, ...] = ()
 
     def modes(
         self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
@@ -112,7 +115,8 @@ def linearize_with_box(
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
     doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
-    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)))
+    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)),
+                       misfits)  # fmt: skip
 
 
 def modes_with_boxes(

@@ -1,5 +1,6 @@
 """How far a certificate's criteria are from their limits: the same figure for the norm and for every code."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -84,7 +85,13 @@ def _of_response(time: TimeVerdict) -> float | None:
     return max((margin for accepted, margin in ways if margin is not None and accepted == time.accepted), default=None)
 
 
-def margin_text(margin: float | None, limit: float | None = None, value: float | None = None) -> str:
+def margin_of(finding: RowFinding) -> str:
+    """A criterion's margin in words; its text begins with the value and the unit of both."""
+    unit = re.match(r"[-+.\de]+ (pu|Hz|s)\b", finding.text)
+    return margin_text(finding.margin, finding.limit, finding.value, unit[1] if unit else "")
+
+
+def margin_text(margin: float | None, limit: float | None = None, value: float | None = None, unit: str = "") -> str:
     """A margin in percent of its limit; a dash where there is none.
 
     Beyond `MOST` the limit is next to nothing, and the distance from it says more: in the quantity's own unit where
@@ -95,5 +102,6 @@ def margin_text(margin: float | None, limit: float | None = None, value: float |
     if abs(margin) > MOST:
         known = limit is not None and value is not None
         good = "+" if margin > 0 else "−"
-        return f"{good}{abs((value or 0.0) - (limit or 0.0)):.3g} in its unit" if known else f"{good}> {MOST:.0f} times"
+        away = f"{abs((value or 0.0) - (limit or 0.0)):.3g} {unit or 'in its unit'}"
+        return good + (away if known else f"> {MOST:.0f} times")
     return f"{100 * margin:+.3g} %".replace("-", "−")

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
             )
             box = is_black_box(master.components[options.component])
             white = [] if box else modes_of(prepared, master, ELECTROMECHANICAL_HZ).modes
-        verdicts[prepared.title] = judge(system.model)
+        verdicts[prepared.title] = judge(system.model).doubted(system.misfits)
         passive = passivity(system.response)
         with staged(folder / prepared.name, run_id) as staging:
             save_identification(system.response, system.identified, passive, staging)

@@ -15,7 +15,7 @@ from orchestrator.certification.codes.certificate import CodeCertificate, certif
 from orchestrator.certification.codes.record import figures_of, save_certificate
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.devices import Device
-from orchestrator.certification.margins import margin_text, narrowest
+from orchestrator.certification.margins import margin_of, narrowest
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.certificate import certified
@@ -111,7 +111,7 @@ def verdict_table(found: CodeCertificate) -> PlainTable:
         least = narrowest(known)
         word = NOT_JUDGED if v in unknown else NO_VERDICT if not v.judged else "fails" if v in bad else "accepted"
         remark = v.unknown or "; ".join(f.criterion for f in v.failed) or (least.criterion if least else "")
-        margin = "–" if least is None else margin_text(least.margin, least.limit, least.value)
+        margin = "–" if least is None else margin_of(least)
         met = f"{sum(f.accepted is True for f in known)} of {len(v.findings)}"
         table.add_row(v.row.name, word, met, margin, remark if len(remark) <= _LONGEST else f"{remark[:_LONGEST]} …")
     return table
@@ -134,6 +134,5 @@ def _criteria(found: CodeCertificate) -> PlainTable:
     table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "", left=99)
     for v in found.verdicts:
         for f in v.findings:
-            margin = margin_text(f.margin, f.limit, f.value)
-            table.add_row(v.row.name, f.criterion, f.text[:160], margin, v.word(f))
+            table.add_row(v.row.name, f.criterion, f.text[:160], margin_of(f), v.word(f))
     return table

@@ -18,6 +18,7 @@ from orchestrator.certification.codes.frequency_domain import (
 from orchestrator.certification.devices import Device
 from orchestrator.cli.certify_codes import GB, bench_request, check_code_options
 from orchestrator.cli.terminal import make_console, said_stages
+from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
@@ -29,6 +30,9 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     -------
     0
     """
+    asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
+    if other := [name for name, value in asked.items() if value]:
+        raise InputError(f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out")
     checked((), dict(options.declare), GB)
     check_code_options(options, [device])
     folder = made_folder(options.out or Path("results") / f"certify_{device.name}_{GB}", "--out")

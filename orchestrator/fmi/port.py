@@ -5,7 +5,9 @@ network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] 
 [pu, S_n], ``v_0`` [pu], ``theta_0`` [rad].
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from math import pi
@@ -14,6 +16,7 @@ from typing import Any, Self
 from fmus.toolchain.port_variables import INPUTS, OUTPUTS, S_N, START_VALUES
 from fmus.toolchain.variables import Variable
 from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.units import to_unit
 
 PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 """Variables of the port; their places are their value references."""
@@ -21,8 +24,15 @@ PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 START = tuple(variable.name for variable in START_VALUES)
 """Its parameters: the rating and the power flow's start values."""
 
-_SAME, _OTHER = 0.01, 2.0
-"""How far the rating of a binding may be from the FMU's own, and the factor from which on its start is another's."""
+_SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
+"""How far the rating of a binding may be from the FMU's own, and the factors from which on its start is another's: in
+volts, and in general.
+"""
+
+_NAMED = {
+    "S_n": re.compile(r"(?:^|\.)s_?(?:n|nom|rated)$", re.I),
+    "V_n": re.compile(r"(?:^|\.)[vu]_?(?:n|nom|rated)$", re.I),
+}
 
 Matrix2 = tuple[float, float, float, float]
 """A real 2×2 matrix, by rows."""
@@ -93,6 +103,8 @@ class PortMap:
         Values of the FMU's own parameters and inputs.
     current_limit
         Largest current that it gives, as somebody declares it [pu, rating].
+    V_n
+        The voltage of one of them, line to line [kV]; None where nothing needs it.
     """
 
     rating: float
@@ -103,6 +115,7 @@ class PortMap:
     signals: Mapping[str, SignalMap]
     settings: Mapping[str, float | bool]
     current_limit: float | None = None
+    V_n: float | None = None
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -151,7 +164,7 @@ class BoundDescription(FmuDescription):
 
     def unlike_delivered(self) -> dict[str, str]:
         """Ratings of the binding, by name, that do not fit to what the FMU starts with by itself, and why."""
-        found, port = {}, self.port
+        found, port = dict(self._unlike_named()), self.port
         for name in ("S_n", "v_0", "P_0"):
             for target in port.start.get(name, ()):
                 info = self.inner.variables[target.variable]
@@ -161,11 +174,34 @@ class BoundDescription(FmuDescription):
                 itself = f"{info.name} is {info.start:g} {info.unit or 'pu'} by itself, {value:.3g} times"
                 if name == "S_n" and info.name not in port.settings and abs(value / port.rating - 1) > _SAME:
                     found["S_n"] = f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
-                if name == "v_0" and not 1 / _OTHER < value < _OTHER:
-                    found["V_n"] = f"another V_n than the FMU starts with: its {itself} what is bound"
+                most = _OTHER if port.V_n is None or info.unit in ("pu", "p.u.", "1", "") else _NEAR
+                if name == "v_0" and not 1 / most < value < most:
+                    found.setdefault("V_n", f"another V_n than the FMU starts with: its {itself} what is bound")
+                    if most == _NEAR:
+                        found["V_n"] += f" ({port.V_n:g} kV, and {value * (port.V_n or 0):.3g} kV by itself)"
                 if name == "P_0" and value > _OTHER:
                     found.setdefault("S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much")
         return found
+
+    def _unlike_named(self) -> Iterator[tuple[str, str]]:
+        """By the FMU's own parameters that are called as a rating is, and say something else."""
+        for name, unit, bound in (("S_n", "MVA", self.port.rating), ("V_n", "kV", self.port.V_n)):
+            for info in self.inner.variables.values():
+                named = info.causality == "parameter" and info.type == "Real" and _NAMED[name].search(info.name)
+                if bound is None or not named or not info.unit or not info.start or info.name in self.port.taken:
+                    continue
+                with suppress(ValueError):
+                    value = to_unit(f"{info.start_number} {info.unit}", unit)
+                    if abs(value / bound - 1) > _SAME:
+                        yield (
+                            name,
+                            f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself",
+                        )
+
+    def likely_cause(self) -> str:
+        """What of the ratings does not fit, as the end of a sentence on something that went wrong; "" for nothing."""
+        unlike = self.unlike_delivered()
+        return f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]" if unlike else ""
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:

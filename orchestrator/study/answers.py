@@ -59,7 +59,7 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
     swing = "" if mode is None else _swing(result, mode)
     remark = swing
     if verdict.stable is None:
-        remark = verdict.reason
+        remark = swing if result.misfits else verdict.reason
     elif verdict.stable is False and verdict.mode is not None:
         low, high = (0.0, 0.0) if result.hidden is None else result.hidden.frequency_range
         hertz = verdict.mode.frequency_hz

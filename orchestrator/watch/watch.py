@@ -16,6 +16,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
+from orchestrator.watch.declared_limit import ABOVE, above_declared
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
@@ -73,8 +74,12 @@ class Watch:
         """
         seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
-        told = judged(seen, self._prepared.system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
-        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
+        system = self._prepared.system
+        told = judged(seen, system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
+        above = [
+            f for f in above_declared(seen, system) if not any(m.fault == ABOVE for m in misfits.get(f.component, ()))
+        ]
+        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), above, told)
         return sorted(found, key=lambda finding: finding.time)
 
 

@@ -109,7 +109,11 @@ def _rated(subject: Subject) -> float:
     return float(subject.use.values.get("f_n", known))
 
 
-@check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
+@check(
+    "signs",
+    "Do P and Q answer voltage and frequency with the right signs?",
+    needs=(*SAME, "rated_frequency", "power_balance"),
+)
 def signs(subject: Subject) -> CheckResult:
     """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:

@@ -16,7 +16,7 @@ from orchestrator.certification.codes.row_pictures import row_pictures
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON, PDF, RESPONSES, figures_hash, write_sealed
-from orchestrator.certification.margins import margin_text
+from orchestrator.certification.margins import margin_of
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, table
 from orchestrator.report.pdf import print_pdf
@@ -84,7 +84,7 @@ def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
     """The page of a certificate; ``mark`` is the hash of its figures."""
     rows = [
         [escape(v.row.name), escape(v.row.clause), escape(v.row.title), escape(f.criterion), escape(f.rule),
-         "the code's" if f.origin == "code" else "reading", escape(f.text), _margin(f), _word(v, f)]
+         "the code's" if f.origin == "code" else "reading", escape(f.text), margin_of(f), _word(v, f)]
         for v in c.verdicts for f in v.findings
     ]  # fmt: skip
     rows += [[escape(v.row.name), escape(v.row.clause), escape(v.row.title), "", "", "", escape(v.unknown), "–",
@@ -119,10 +119,6 @@ def _pictures(c: CodeCertificate) -> str:
 def _list(heading: str, texts: Any) -> str:
     items = "".join(f"<li>{escape(text)}</li>" for text in texts)
     return (f"<p>{escape(heading)}</p>" if heading and items else "") + (f"<ul>{items}</ul>" if items else "")
-
-
-def _margin(finding: RowFinding) -> str:
-    return margin_text(finding.margin, finding.limit, finding.value)
 
 
 def _word(verdict: RowVerdict, finding: RowFinding) -> str:
