@@ -36,6 +36,7 @@ def checked(path, binding=None, only=()):
     ("name", "only"),
     [
         ("state_of_dip_timer", "state"),
+        ("clock_of_single_precision", "later_times"),
         ("gain_of_dips", "after_dips"),
         ("nan_without_power", "operating_points"),
         ("clips_its_start", "operating_points"),
@@ -69,6 +70,24 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
     clean = check_fmu(*gallery("lag" if name.endswith("lag") else "converter"), LIMITS, (only,), run_for=0.3)
     assert clean.trusted
     assert clean.results[-1].verdict == "pass"
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "words"),
+    [("shows_kw_as_mw", "wrong units", "P_meas is declared in MW and shows 1000 times the P that flows"),
+     ("shows_pu_as_mw", "wrong units", "shows 0.0006667 times the P that flows (1/S_n)"),
+     ("converter_shows_mw", "", "no wrong unit is seen"), ("converter_shows_pu", "", "no wrong unit is seen")],
+)  # fmt: skip
+def test_power_in_another_unit_than_declared_is_told(name, fault, words, gallery):
+    """An honest one shows it before its filter's losses."""
+    found = check_fmu(*gallery(name), LIMITS, ("shown_power",), run_for=0.3)
+    assert found.faults == ([fault] if fault else [])
+    assert words in found.results[-1].evidence
+
+
+def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
+    found = check_fmu(*gallery("sum_of_single_precision"), LIMITS, ("steady_state", "later_times"), run_for=1.0)
+    assert found.faults == ["counts time"]
 
 
 @pytest.mark.parametrize(

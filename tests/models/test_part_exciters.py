@@ -218,6 +218,7 @@ def test_the_field_currents_limiter_of_st1a_lowers_the_field_voltage():
     ("points", "fine"),
     [
         ({"s_10": 0.03, "s_12": 0.2}, True),
+        ({"s_10": 0.05, "s_12": 0.15}, True),
         ({"s_10": 0.0, "s_12": 0.0}, True),
         ({"s_10": 0.03, "s_12": 0.024}, False),  # 1.2 times it is less than the first
         ({"s_10": 0.1, "s_12": 0.05}, False),

@@ -26,9 +26,9 @@ def typed(fmu, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(*words, **bound):
-        f_n = bound.get("f_n", 50.0)
+        f_n, depth = bound.get("f_n", 50.0), bound.pop("depth", 0.2)
         vendor.binding(tmp_path, **bound)
-        vendor.case(tmp_path, f_n)
+        vendor.case(tmp_path, f_n, depth=depth)
         code = main([*map(str, words)])
         out, err = capfd.readouterr()
         return code, out, re.sub(r"\s+", " ", err)
@@ -89,6 +89,58 @@ def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
             component.check(3, "fmi2DoStep", 0.1)
     finally:
         component.close()
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"),
+    [
+        ({"v_n": 22.0}, "V_n"),
+        ({"v_n": 18.0}, "V_n"),
+        ({"rating": 1400.0}, "S_n = 1400 MVA, and the FMU's S_n is 1500 MVA"),
+    ],
+)
+def test_a_rating_a_little_off_is_named_and_is_the_likely_cause(typed, fmu, bound, said, tmp_path):
+    """10 per cent beside what the FMU has by itself: a limit of the declared size is then exceeded, or not reached."""
+    told = checked(typed, "binding", **bound)["binding"]
+    assert told["verdict"] == "remark"
+    assert said in told["evidence"]
+    if "v_n" in bound:
+        assert f"({bound['v_n']:g} kV, and 20 kV by itself)" in told["evidence"]
+    found = typed("run", "case.toml", "--out", "r", **bound, i_max=0.4)[2]
+    assert "above its current limit" in found
+    assert f"likely cause: the binding has {told['evidence'].removeprefix('the binding has ')}" in found
+
+
+@pytest.mark.parametrize(("i_max", "found"), [(1.05, True), (1.5, False)])
+def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max, found):
+    _, out, _ = typed("run", "case.toml", "--out", "r", "--json", i_max=i_max, depth=0.7)
+    told = [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
+    assert bool(told) is found
+    for finding in told:
+        assert finding["time"] > 0.5
+        assert 1.2 < finding["current"] < 1.6
+        assert "above its current limit" in finding["message"]
+        assert "; 1.05 pu is declared; " in finding["message"]
+
+
+def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed):
+    _, shown, _ = typed("modes", "case.toml", "--black-box", i_max=0.4)
+    first = shown.split("└")[0]
+    assert "not known" in first
+    assert "above its current limit" in first
+    code, out, _ = typed("modes", "case.toml", "--black-box", "--json", "--fail-unstable", i_max=0.4)
+    assert code == 1
+    stability = json.loads(out)["scenarios"][0]["stability"]
+    assert stability["stable"] is None
+    assert stability["reason"] == "gfor does not fit its binding: above its current limit"
+    assert "stable" in typed("modes", "case.toml", "--black-box")[1].split("└")[0]
+
+
+@pytest.mark.slow
+def test_another_frequency_is_one_accusation(typed):
+    found = checked(typed, "rated_frequency", "power_balance", "signs", **WRONG)
+    assert [name for name, check in found.items() if check["fault"]] == ["rated_frequency"]
+    assert "because it failed in 'rated_frequency'" in found["signs"]["evidence"]
 
 
 def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):

@@ -30,6 +30,9 @@ IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0
 DRIFT = 1e-3
 """Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
 
+ANSWER = 400
+"""Steps of the answer that is compared at several times."""
+
 _PART = 0.75
 """Wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run."""
 
@@ -127,6 +130,7 @@ def steady_state(subject: Subject) -> CheckResult:
                 worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
                 if rest is None and worst <= DRIFT:
                     rest = _rest(subject, running, begin, steps)
+                    subject.memory["rested"] = _answer_after(subject, running, point, rest)
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:
@@ -159,6 +163,18 @@ class _Rest:
     moved: float
     time: float
     goes_on: bool
+
+
+def _answer_after(
+    subject: Subject, running: Running, point: OperatingAt, rest: _Rest
+) -> tuple[OperatingAt, _Rest, Numbers] | None:
+    """What a small step brings after the rest, for `later_times`; None where it goes on no longer."""
+    if rest.moved > DRIFT:
+        return None
+    try:
+        return point, rest, running.record(affordable(subject, ANSWER), subject.step_size, subject.one_step())
+    except (ComponentError, EndedError):
+        return None
 
 
 def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Rest:

@@ -79,13 +79,15 @@ class Subject:
         Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
     memory
         Results that several checks share.
+    start_time
+        At which its instances begin [s].
     """
 
     process: Callable[[], FmuProcess]
 
     def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1) -> None:
         self.description, self.directory, self.doing, self.seed = description, directory, "", seed
-        self.use = use or Use()
+        self.use, self.start_time = use or Use(), 0.0
         self.memory: dict[str, Any] = {}
         variables = description.variables
         self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
@@ -107,6 +109,15 @@ class Subject:
         if self.port:
             return PORT_STEP
         return min(1e-3, described.stop_time / 1000) if described.stop_time else 1e-3
+
+    @contextmanager
+    def beginning(self, time: float) -> Iterator[None]:
+        """Inside, instances begin at a time [s]."""
+        self.start_time = time
+        try:
+            yield
+        finally:
+            self.start_time = 0.0
 
     # -- instances -------------------------------------------------------------------------------
 
@@ -145,7 +156,7 @@ class Subject:
         point
             Operating point that it starts from; the one of use where None.
         """
-        component.setup(0.0, None)
+        component.setup(self.start_time, None)
         if self.starts:
             at = point or self.point
             start = {"P_0": at.P, "Q_0": at.Q, "v_0": at.v, "theta_0": at.theta}
@@ -252,7 +263,7 @@ class Running:
     def begin(self) -> None:
         """Initialise the instance, new or reset."""
         subject, component = self.subject, self.component
-        self.time = 0.0
+        self.time = subject.start_time
         subject.prepare(component, self.point, self.parameters)
         component.enter_initialization_mode()
         self.rest = subject.start_inputs(self.point)
