@@ -337,3 +337,13 @@ def test_json_lists_the_cells_of_all_devices(monkeypatch, gfor, tmp_path):
     code, text, said = gfor("certify", *files, "--code", "miso", "--out", tmp_path, "--json")
     assert code == 0, said
     assert [(cell["device"], cell["code"]) for cell in json.loads(text)["cells"]] == [("x", "miso"), ("y", "miso")]
+
+
+@pytest.mark.parametrize("words", [("--pdf",), ("--check", "report.json"), ("--details", "mine.toml", "--pdf")])
+def test_figures_without_a_certificate_refuse_what_a_certificate_has(words, gfor, tmp_path):
+    code, _, said = gfor("certify", tmp_path / "x.fmu", "--code", "gb", *words)
+    assert code == 2
+    assert ", ".join(sorted(w for w in words if w.startswith("--"))) in said.replace(
+        "--pdf, --details", "--details, --pdf"
+    )
+    assert "--code gb gives figures and no certificate; leave it out" in " ".join(said.split())
