@@ -184,6 +184,14 @@ def test_a_mean_over_a_period_takes_away_what_swings_with_it():
     assert np.abs(over_a_period(swing, TIMES, 50.0)[20:]).max() < 1e-9
 
 
+@pytest.mark.parametrize("f_n", [50.0, 60.0])
+def test_a_mean_over_a_period_is_that_of_the_samples_until_each_instant(f_n):
+    values, times = np.random.default_rng(1).standard_normal(200), 1e-3 * np.arange(200)
+    count = round(1e3 / f_n)
+    wanted = [values[max(0, k + 1 - count) : k + 1].mean() for k in range(200)]
+    assert over_a_period(values, times, f_n) == pytest.approx(wanted, abs=1e-12)
+
+
 def test_the_impedance_of_the_bench_has_the_ratios_that_are_asked():
     Z = jumps(3.0, 0.5, (-10.0,)).impedance
     assert abs(Z) == pytest.approx(1 / 3)
