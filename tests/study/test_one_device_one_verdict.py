@@ -123,6 +123,7 @@ def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max,
         assert "; 1.05 pu is declared; " in finding["message"]
 
 
+@pytest.mark.slow
 def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed):
     _, shown, _ = typed("modes", "case.toml", "--black-box", i_max=0.4)
     first = shown.split("└")[0]
