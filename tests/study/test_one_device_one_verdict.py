@@ -138,6 +138,15 @@ def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed):
 
 
 @pytest.mark.slow
+def test_check_names_the_rating_beside_the_limit_that_is_exceeded(typed):
+    found = checked(typed, "limits", v_n=22.0, i_max=1.5)["limits"]
+    assert found["fault"] == "above its current limit"
+    assert "likely cause: the binding has another V_n" in found["evidence"]
+    assert "(22 kV, and 20 kV by itself)" in found["evidence"]
+    assert "likely cause" not in checked(typed, "limits", i_max=1.5)["limits"]["evidence"]
+
+
+@pytest.mark.slow
 def test_another_frequency_is_one_accusation(typed):
     found = checked(typed, "rated_frequency", "power_balance", "signs", **WRONG)
     assert [name for name, check in found.items() if check["fault"]] == ["rated_frequency"]
