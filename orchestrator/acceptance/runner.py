@@ -29,7 +29,7 @@ from orchestrator.acceptance.checks.running import RUN_FOR
 from orchestrator.acceptance.checks.subject import Subject, Use
 from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.binding.binding import bind, read_table
-from orchestrator.binding.misfits import OF_RATING
+from orchestrator.binding.misfits import likely_cause
 from orchestrator.errors import (
     BindingError,
     ComponentError,
@@ -271,17 +271,13 @@ class _Runner:
         for place, name in enumerate(names):
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
-            if result.fault in OF_RATING and (cause := self._likely_cause()):
+            if cause := likely_cause(self._subject.description, result.fault):
                 result = replace(result, evidence=f"{result.evidence}; {cause}")
             results.append(self._with_whom(result))
             self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):
                 results += [not_applicable(later, because) for later in names[place + 1 :]]
                 return
-
-    def _likely_cause(self) -> str:
-        described = self._subject.description
-        return described.likely_cause() if isinstance(described, BoundDescription) else ""
 
     def _with_whom(self, result: CheckResult) -> CheckResult:
         """A crash, with the checks before it where it does not come without them.

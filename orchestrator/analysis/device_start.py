@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.binding.misfits import OF_RATING, SHOWN, Misfit, of_current, of_frequency, of_power
+from orchestrator.binding.misfits import SHOWN, Misfit, likely_cause, of_current, of_frequency, of_power
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError
 from orchestrator.fmi.component import Component
@@ -31,9 +31,8 @@ def sentences(found: Mapping[str, list[Misfit]]) -> tuple[str, ...]:
 
 
 def _with_cause(misfit: Misfit, component: Component) -> Misfit:
-    described = component.description
-    cause = described.likely_cause() if isinstance(described, BoundDescription) else ""
-    return replace(misfit, evidence=f"{misfit.evidence}; {cause}") if cause and misfit.fault in OF_RATING else misfit
+    cause = likely_cause(component.description, misfit.fault)
+    return replace(misfit, evidence=f"{misfit.evidence}; {cause}") if cause else misfit
 
 
 def _of(master: Master, name: str) -> Iterator[Misfit]:

@@ -84,17 +84,8 @@ class _Reader:
             voltage, current = self._voltage(bases), self._current(bases, own_rating)
             start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
             if voltage is not None and current is not None:
-                port = PortMap(
-                    bases.rating,
-                    bases.frequency,
-                    voltage,
-                    current,
-                    start,
-                    signals,
-                    settings,
-                    self._current_limit(),
-                    bases.voltage,
-                )
+                port = PortMap(bases.rating, bases.frequency, voltage, current, start, signals, settings,
+                               self._current_limit(), bases.voltage)  # fmt: skip
                 self._check_once(port)
         if self._problems or port is None:
             raise BindingError(self._source, self._problems)

@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi, sqrt
 
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.port import BoundDescription
+
 BALANCE = 0.02
 """Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
 
@@ -28,8 +31,7 @@ REMEDIES = {
 }
 
 
-OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
-"""Faults that a wrong rating of the binding brings."""
+_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,11 @@ class Misfit:
     def sentence(self, name: str) -> str:
         """The whole finding on the component of a name."""
         return f"{name}: {self.fault}: {self.evidence}; {REMEDIES[self.fault]}"
+
+
+def likely_cause(described: FmuDescription, fault: str) -> str:
+    """What of the binding's ratings brings a fault; "" where nothing does."""
+    return described.likely_cause() if fault in _OF_RATING and isinstance(described, BoundDescription) else ""
 
 
 def omega_seen(omega: float) -> str:

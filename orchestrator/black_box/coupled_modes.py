@@ -46,8 +46,6 @@ class BoxedSystem:
         its start to its rest at the ideal bus.
     warnings
         Reasons in the other components for doubts about the modes from 0.1 to 2 Hz.
-    misfits
-        What does not fit between devices and their bindings; among the warnings too.
     """
 
     component: str

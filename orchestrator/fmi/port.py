@@ -29,10 +29,7 @@ _SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
 volts, and in general.
 """
 
-_NAMED = {
-    "S_n": re.compile(r"(?:^|\.)s_?(?:n|nom|rated)$", re.I),
-    "V_n": re.compile(r"(?:^|\.)[vu]_?(?:n|nom|rated)$", re.I),
-}
+_NAMED = {name: re.compile(rf"(?:^|\.){of}_?(?:n|nom|rated)$", re.I) for name, of in (("S_n", "s"), ("V_n", "[vu]"))}
 
 Matrix2 = tuple[float, float, float, float]
 """A real 2×2 matrix, by rows."""
@@ -174,24 +171,24 @@ class BoundDescription(FmuDescription):
                 itself = f"{info.name} is {info.start:g} {info.unit or 'pu'} by itself, {value:.3g} times"
                 if name == "S_n" and info.name not in port.settings and abs(value / port.rating - 1) > _SAME:
                     found["S_n"] = f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
-                most = _OTHER if port.V_n is None or info.unit in ("pu", "p.u.", "1", "") else _NEAR
+                V_n = None if info.unit in ("pu", "p.u.", "1", "") else port.V_n
+                most = _NEAR if V_n else _OTHER
                 if name == "v_0" and not 1 / most < value < most:
-                    found.setdefault("V_n", f"another V_n than the FMU starts with: its {itself} what is bound")
-                    if most == _NEAR:
-                        found["V_n"] += f" ({port.V_n:g} kV, and {value * (port.V_n or 0):.3g} kV by itself)"
+                    kV = f" ({V_n:g} kV, and {value * V_n:.3g} kV by itself)" if V_n else ""
+                    found.setdefault("V_n", f"another V_n than the FMU starts with: its {itself} what is bound{kV}")
                 if name == "P_0" and value > _OTHER:
                     found.setdefault("S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much")
         return found
 
     def _unlike_named(self) -> Iterator[tuple[str, str]]:
         """By the FMU's own parameters that are called as a rating is, and say something else."""
+        own = [v for v in self.inner.variables.values() if v.causality == "parameter" and v.type == "Real"]
         for name, unit, bound in (("S_n", "MVA", self.port.rating), ("V_n", "kV", self.port.V_n)):
-            for info in self.inner.variables.values():
-                named = info.causality == "parameter" and info.type == "Real" and _NAMED[name].search(info.name)
-                if bound is None or not named or not info.unit or not info.start or info.name in self.port.taken:
-                    continue
+            for info in (v for v in own if bound and v.unit and v.start and v.name not in self.port.taken):
                 with suppress(ValueError):
-                    value = to_unit(f"{info.start_number} {info.unit}", unit)
+                    value = (
+                        to_unit(f"{info.start_number} {info.unit}", unit) if _NAMED[name].search(info.name) else bound
+                    )
                     if abs(value / bound - 1) > _SAME:
                         yield (
                             name,

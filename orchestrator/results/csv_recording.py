@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,16 +27,13 @@ _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 
 
 def read_csv(path: Path) -> xr.Dataset:
-    """Read signals; headings such as ``f north [Hz]`` give a name and a unit. Columns without numbers are left out.
-
-    The time is a number, or a date or time of day as ISO 8601 has it.
-    """
+    """Read signals; headings such as ``f north [Hz]`` give a name and a unit. Columns without numbers are left out."""
     table = _table(path)
     first = str(table.columns[0]) if table.shape[1] else ""
     name, unit = _parts(first)
-    stamps = _seconds_of_dates(table[first]) if first and table[first].dtype.kind not in "if" else None
-    known = stamps is not None or (len(table) > 0 and table[first].dtype.kind in "if")
-    if name.lower() not in _TIMES or unit not in _SECONDS or not known:
+    kind = table[first].dtype.kind if len(table) else ""
+    stamps = _seconds_of_dates(table[first]) if kind and kind not in "if" else None
+    if name.lower() not in _TIMES or unit not in _SECONDS or (stamps is None and kind not in ("i", "f")):
         raise InputError(
             f"{path}: its first column is {first!r}; it must be the time, as numbers below 'time', 't' or 'time [ms]', "
             "or as dates such as 2025-03-01 12:00:00.020, and a first line names the columns"
@@ -46,7 +44,7 @@ def read_csv(path: Path) -> xr.Dataset:
             f"{path}: the time of its {len(times)} rows does not rise from each row to the next; sort them"
         )
     apart = float(np.median(np.diff(times)))
-    if stamps is None and not unit and (apart > 1 or table[first].dtype.kind == "i"):
+    if stamps is None and not unit and (apart > 1 or kind == "i"):
         raise InputError(
             f"{path}: its times are {apart:g} apart, perhaps in ms, and {first!r} says no unit; "
             f"write '{first} [s]' or '{first} [ms]'"
@@ -72,12 +70,11 @@ def _table(path: Path) -> pd.DataFrame:
     table = max(tables, key=lambda one: one.select_dtypes("number").shape[1])
     if not isinstance(table.index, pd.RangeIndex):  # what pandas makes of columns without a name
         more = table.shape[1] + table.index.nlevels
-        cause = "the comma both parts the columns and stands in the numbers: write the file with ';' between columns"
-        both = mark == "," and more == 2 * table.shape[1]
-        raise InputError(
-            f"{path}: its first line names {table.shape[1]} columns, and the others have {more}; "
-            + (f"{cause}, or with decimal points" if both else "name them all")
+        both = (
+            "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between columns"
         )
+        remedy = both if mark == "," and more == 2 * table.shape[1] else "name them all"
+        raise InputError(f"{path}: its first line names {table.shape[1]} columns, and the others have {more}; {remedy}")
     return table
 
 
@@ -85,30 +82,24 @@ def _seconds_of_dates(column: pd.Series[Any]) -> Numbers | None:
     """Seconds from the first of some dates or times of day; None where they are none."""
     texts = column.astype(str).str.replace(",", ".")
     for day in ("", "2000-01-01T"):
-        try:
+        with suppress(ValueError, TypeError):
             stamps = pd.to_datetime(day + texts, format="ISO8601")
-        except (ValueError, TypeError):
-            continue
-        seconds: Numbers = (stamps - stamps.iloc[0]).dt.total_seconds().to_numpy(float)
-        return seconds
+            return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=float)
     return None
 
 
 def _check_numbers(path: Path, table: pd.DataFrame) -> None:
     """Numbers that are taken for text would be missing without a word."""
-    for name in table.columns[1:]:
-        if table[name].dtype.kind in "if":
-            continue
+    for name in (n for n in table.columns[1:] if table[n].dtype.kind not in "if"):
         texts = table[name].dropna().astype(str).str.strip()
-        marked = texts[texts.str.fullmatch(_THOUSANDS)]
-        numbers = pd.to_numeric(texts, errors="coerce")
+        marked, other = texts[texts.str.fullmatch(_THOUSANDS)], texts[pd.to_numeric(texts, errors="coerce").isna()]
         if len(marked):
-            says, remedy = f"{marked.iloc[0]!r}", "write its numbers without marks between thousands"
-        elif numbers.notna().any() and numbers.isna().any():
-            says, remedy = f"{texts[numbers.isna()].iloc[0]!r} among numbers", "leave such cells empty"
+            said = f"{marked.iloc[0]!r}; write its numbers without marks between thousands"
+        elif 0 < len(other) < len(texts):
+            said = f"{other.iloc[0]!r} among numbers; leave such cells empty"
         else:
             continue
-        raise InputError(f"{path}: column {name!r} has {says}; {remedy}")
+        raise InputError(f"{path}: column {name!r} has {said}")
 
 
 def _parts(heading: str) -> tuple[str, str]:

@@ -1,6 +1,7 @@
 """Whether a converter at its port does what a power flow expects of it."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isinf
 from time import perf_counter
@@ -130,7 +131,9 @@ def steady_state(subject: Subject) -> CheckResult:
                 worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
                 if rest is None and worst <= DRIFT:
                     rest = _rest(subject, running, begin, steps)
-                    subject.memory["rested"] = _answer_after(subject, running, point, rest)
+                    with suppress(ComponentError, EndedError):
+                        late = running.record(affordable(subject, ANSWER), subject.step_size, subject.one_step())
+                        subject.memory["rested"] = point, rest, late
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:
@@ -163,18 +166,6 @@ class _Rest:
     moved: float
     time: float
     goes_on: bool
-
-
-def _answer_after(
-    subject: Subject, running: Running, point: OperatingAt, rest: _Rest
-) -> tuple[OperatingAt, _Rest, Numbers] | None:
-    """What a small step brings after the rest, for `later_times`; None where it goes on no longer."""
-    if rest.moved > DRIFT:
-        return None
-    try:
-        return point, rest, running.record(affordable(subject, ANSWER), subject.step_size, subject.one_step())
-    except (ComponentError, EndedError):
-        return None
 
 
 def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Rest:

@@ -71,6 +71,7 @@ _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
 """Of the changes of voltage and frequency."""
 
 _OMEGA = 1e-3
+_NEEDS = (*SAME, "rated_frequency", "power_balance")
 _PLAIN = ("pu", "p.u.", "1")
 
 
@@ -109,11 +110,7 @@ def _rated(subject: Subject) -> float:
     return float(subject.use.values.get("f_n", known))
 
 
-@check(
-    "signs",
-    "Do P and Q answer voltage and frequency with the right signs?",
-    needs=(*SAME, "rated_frequency", "power_balance"),
-)
+@check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=_NEEDS)
 def signs(subject: Subject) -> CheckResult:
     """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:

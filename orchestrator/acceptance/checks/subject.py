@@ -110,15 +110,6 @@ class Subject:
             return PORT_STEP
         return min(1e-3, described.stop_time / 1000) if described.stop_time else 1e-3
 
-    @contextmanager
-    def beginning(self, time: float) -> Iterator[None]:
-        """Inside, instances begin at a time [s]."""
-        self.start_time = time
-        try:
-            yield
-        finally:
-            self.start_time = 0.0
-
     # -- instances -------------------------------------------------------------------------------
 
     def open(self, name: str = "fmu") -> HostedComponent:
