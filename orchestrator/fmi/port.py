@@ -184,16 +184,16 @@ class BoundDescription(FmuDescription):
         """By the FMU's own parameters that are called as a rating is, and say something else."""
         own = [v for v in self.inner.variables.values() if v.causality == "parameter" and v.type == "Real"]
         for name, unit, bound in (("S_n", "MVA", self.port.rating), ("V_n", "kV", self.port.V_n)):
-            for info in (v for v in own if bound and v.unit and v.start and v.name not in self.port.taken):
+            if bound is None:
+                continue
+            for info in (v for v in own if v.unit and v.start and v.name not in self.port.taken):
                 with suppress(ValueError):
                     value = (
                         to_unit(f"{info.start_number} {info.unit}", unit) if _NAMED[name].search(info.name) else bound
                     )
                     if abs(value / bound - 1) > _SAME:
-                        yield (
-                            name,
-                            f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself",
-                        )
+                        said = f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself"
+                        yield name, said
 
     def likely_cause(self) -> str:
         """What of the ratings does not fit, as the end of a sentence on something that went wrong; "" for nothing."""
