@@ -16,6 +16,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
+from orchestrator.watch.declared_current import above_declared
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
@@ -96,6 +97,7 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
         *undisturbed,
+        *above_declared(seen, system),
         *active_limits(seen, system, settings),
         *lost,
         *run_away(seen, system, settings, parts, slipped=bool(lost)),

@@ -77,6 +77,19 @@ def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
     assert REMEDIES[fault] in said
 
 
+@pytest.mark.parametrize(("i_max", "above"), [(0.65, True), (1.5, False)])
+def test_a_run_finds_a_limit_that_a_dip_exceeds(typed, i_max, above):
+    """It gives 0.6 pu at rest, and its limit is at 1.5 pu."""
+    _, out, _ = typed("run", "case.toml", "--scenario", "dip", "--stop", "1.2", "--out", "r", "--json", i_max=i_max)
+    found = [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
+    assert len(found) == above
+    for finding in found:
+        assert "gfor: above its current limit: " in finding["message"]
+        assert f"{i_max:g} pu is declared" in finding["message"]
+        assert 1 <= finding["time"] < 1.02
+        assert 0.7 < finding["mean"] < 0.9
+
+
 @pytest.mark.parametrize("bound", [{"v_n": 230.0}, {"rating": 4.0}])
 def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
     told = checked(typed, "binding", **bound)["binding"]
@@ -104,6 +117,26 @@ def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
         assert "the binding has" not in str(caught.value)
     finally:
         component.close()
+
+
+@pytest.mark.parametrize(
+    ("begins", "f_n"),
+    [(0.0, 50.0), (0.0, 60.0), *(pytest.param(b, 50.0, marks=pytest.mark.slow) for b in (0.9, 50.0))],
+)
+def test_a_meter_that_settles_is_judged_where_it_has(typed, begins, f_n, tmp_path):
+    """It is honest however it begins, 0 or its frequency in place of 1; one for another frequency is found anyway."""
+    shown = vendor.device(tmp_path, METER_BEGINS=begins, FAULT_OMEGA_LAGS=0.03)
+    (tmp_path / "vendor.fmu").write_bytes(shown.read_bytes())
+    found = checked(typed, "rated_frequency", f_n=f_n)["rated_frequency"]
+    _, out, _ = typed("run", "case.toml", "--stop", "0.3", "--out", "r", "--json", f_n=f_n)
+    kinds = {finding["kind"]: finding["message"] for finding in json.loads(out)[0]["findings"]}
+    assert "loss_of_synchronism" not in kinds
+    if f_n == 50:
+        assert found["verdict"] == "pass"
+        assert "misfit" not in kinds
+    else:
+        assert found["fault"] == "wrong rated frequency"
+        assert found["evidence"] in kinds["misfit"]
 
 
 def test_units_that_a_binding_converts_are_not_accused(tmp_path):

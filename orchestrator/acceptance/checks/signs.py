@@ -24,7 +24,7 @@ from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
-from orchestrator.binding.misfits import of_frequency, omega_seen
+from orchestrator.binding.misfits import SLIGHT, at_rest, of_frequency, omega_seen
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -70,7 +70,6 @@ _DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
 """Of the changes of voltage and frequency."""
 
-_OMEGA = 1e-3
 _PLAIN = ("pu", "p.u.", "1")
 
 
@@ -83,14 +82,12 @@ def rated_frequency(subject: Subject) -> CheckResult:
         )
     steps = affordable(subject, 2000)
     with subject.running() as running:
-        omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[
-            :, subject.outputs.index("omega")
-        ]
-    rest = float(np.median(omega[-max(1, steps // 10) :]))
+        still, shown = np.zeros((1, len(running.rest))), subject.outputs.index("omega")
+        rest, settled = at_rest(lambda: running.hold(still, steps, subject.step_size)[:, shown])
     seen = omega_seen(rest)
-    if found := of_frequency(rest, _rated(subject)):
+    if settled and (found := of_frequency(rest, _rated(subject))):
         return failed("rated_frequency", found.fault, found.evidence, **found.figures)
-    if abs(rest - 1) > _OMEGA:
+    if abs(rest - 1) > SLIGHT:
         return remarked("rated_frequency", seen, "let it settle, or ask what omega is", omega=rest)
     return passed("rated_frequency", seen, omega=rest)
 

@@ -133,7 +133,11 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
+#ifdef METER_BEGINS
+    m[LAGGED] = METER_BEGINS - 1.0;
+#else
     m[LAGGED] = 0;
+#endif
 }
 
 /* The voltage behind its impedance, by its droop. */
@@ -431,7 +435,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #else
     z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
 #endif
-#ifdef FAULT_OMEGA_LAGS
+#ifdef METER_BEGINS /* what the meter shows at the start [pu]; it settles with its lag [s] */
+    z[OMEGA] = (1 + m[LAGGED]) * OMEGA_UNIT;
+#elif defined FAULT_OMEGA_LAGS
     z[OMEGA] = (1 + m[LAGGED]) * OMEGA_UNIT;
 #else
     z[OMEGA] = (1 + OMEGA_FACTOR * slip(z, m, m[P_F])) * OMEGA_UNIT;
