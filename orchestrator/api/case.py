@@ -134,6 +134,7 @@ class Case:
         parameters: Paths = (),
         schedule: ScheduleName | None = None,
         tolerance: float | None = None,
+        sharing: str | None = None,
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
@@ -155,6 +156,10 @@ class Case:
         tolerance
             Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
             0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
+        sharing
+            How the other units feed what units fed that ``values`` take out of service, such as ``sg5.connected``:
+            ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop. Where ``values``
+            give powers (``P_0``) as well, nothing is shared.
 
         Raises
         ------
@@ -175,8 +180,9 @@ class Case:
             )
         names = [name] if name else []
         (chosen,) = choose(
-            self.file, names, values, step=step, parameters=parameters, schedule=schedule, tolerance=tolerance
-        )
+            self.file, names, values, step=step, parameters=parameters, schedule=schedule, tolerance=tolerance,
+            sharing=sharing,
+        )  # fmt: skip
         question([chosen.prepared])
         return chosen
 
@@ -190,6 +196,7 @@ class Case:
         parameters: Paths = (),
         schedule: ScheduleName | None = None,
         tolerance: float | None = None,
+        sharing: str | None = None,
     ) -> list[Scenario]:
         """Several scenarios, or all; the mistakes of all are reported together.
 
@@ -197,7 +204,7 @@ class Case:
         ----------
         names
             Of the scenarios; all of them where empty.
-        values, step, parameters, schedule, tolerance
+        values, step, parameters, schedule, tolerance, sharing
             As for `scenario`.
         stop
             Time at which runs end [s]; the case's by default.
@@ -215,7 +222,7 @@ class Case:
         """
         chosen = choose(
             self.file, names, values, step=step, stop=stop, parameters=parameters, schedule=schedule,
-            tolerance=tolerance,
+            tolerance=tolerance, sharing=sharing,
         )  # fmt: skip
         question(scenario.prepared for scenario in chosen)
         return chosen

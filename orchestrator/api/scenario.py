@@ -34,6 +34,7 @@ from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
@@ -492,6 +493,7 @@ def choose(
     parameters: Paths = (),
     schedule: ScheduleName | None = None,
     tolerance: float | None = None,
+    sharing: str | None = None,
 ) -> list[Scenario]:
     """Scenarios of a case, as `Case.choose` offers them.
 
@@ -511,6 +513,8 @@ def choose(
         In which order components step, and what inputs do meanwhile; the case's where None.
     tolerance
         Largest error of a coupled output in a pair of steps, of 1 or of its value; None for fixed steps, or the case's.
+    sharing
+        How units share what ``values`` take out of service; as the case says where None.
 
     Raises
     ------
@@ -519,7 +523,9 @@ def choose(
     """
     if schedule is not None and schedule not in SCHEDULES:
         raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
-    files = parameter_files(parameters)
+    if sharing is not None and sharing not in list(SharingRule):
+        raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
+    file, files = replace(file, sharing=SharingRule(sharing) if sharing else None), parameter_files(parameters)
     chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
     prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
     prepared = [_as_asked(one, schedule, tolerance) for one in prepared]

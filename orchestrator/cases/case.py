@@ -3,8 +3,9 @@
 import difflib
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
-from orchestrator.cases.sharing import Dispatch
+from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
@@ -93,8 +94,9 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [], Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
-            preparer.draft.dispatch = dispatch
-            prepared.append(preparer.prepare(step_size, stop_time))
+            lost, shared = self._switched_off(name, overrides or {}, parameters) if dispatch is None else ((), dispatch)
+            preparer.draft.dispatch = shared
+            prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.questions if q not in questions]
@@ -124,6 +126,30 @@ class Case(CaseDefinition):
         if not plain:
             return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, None, parameters)[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
+
+    def _switched_off(
+        self, name: str, overrides: Mapping[str, Value], parameters: Sequence[ParameterFile]
+    ) -> tuple[Collection[str], Dispatch | None]:
+        """Units that values take out of service, and how others share their power; none where powers are given too."""
+        table = self.table.power_flow
+        on = {key: value for key, value in overrides.items() if value or not key.endswith(".connected")}
+        given = any(key.endswith(".P_0") for key in overrides)
+        if table is None or given or len(on) == len(overrides):
+            return (), None
+        before = self._preparer(name, on, parameters).prepare(None, None)
+        if before is None or before.power_flow is None:
+            return (), None
+        powers, plans = before.power_flow.powers, before.system.components
+        off = [key for key in overrides if key not in on]
+        lost = [
+            unit
+            for unit, power in powers.items()
+            if power
+            and any(fnmatchcase(f"{head}{unit}.connected", key) for key in off for head in ("", f"{table.grid}."))
+        ]
+        fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
+        rule = self.sharing or SharingRule(table.sharing)
+        return lost, Dispatch(rule, powers, fed) if lost else None
 
     @cached_property
     def _mentions(self) -> list[Problem]:
@@ -163,6 +189,17 @@ class Case(CaseDefinition):
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
         return Preparer(self, name, dict(overrides or {}), parameters)
+
+
+def _told(
+    prepared: PreparedScenario | None, lost: Collection[str], dispatch: Dispatch | None
+) -> PreparedScenario | None:
+    """The scenario, which says of units that values took out of service who feeds their power."""
+    if prepared is None or prepared.power_flow is None or dispatch is None or not lost:
+        return prepared
+    shared = in_words(dispatch, prepared.power_flow.powers, prepared.system.components, lost)
+    text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(SharingRule)}"
+    return replace(prepared, questions=(*prepared.questions, Problem("[power_flow] sharing", text)))
 
 
 def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:

@@ -7,6 +7,7 @@ from pathlib import Path
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import Problem
 
 
@@ -32,6 +33,9 @@ class CaseDefinition:
     exchanged
         Devices that take the place of the file's own, by component. Of parameter files, scenarios and the command line
         no value reaches them: those were meant for the device that was there.
+    sharing
+        How units share what given values take out of service, such as ``sg5.connected = false``; as the file says
+        where None.
     """
 
     table: CaseTable
@@ -44,6 +48,7 @@ class CaseDefinition:
     home: Path = field(default_factory=Path.cwd)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     exchanged: Mapping[str, ComponentTable] = field(default_factory=dict)
+    sharing: SharingRule | None = None
 
     @property
     def name(self) -> str:

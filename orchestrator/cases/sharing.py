@@ -1,7 +1,7 @@
 """Who feeds what an outage takes away: units by their governors or by their ratings, or the slack alone."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -15,6 +15,9 @@ _CLOSE = 1e-6
 _ROUNDS = 30
 _ROOM = 1e-3
 """So much of its rating stays between a unit and its limit: at the limit itself no model starts."""
+
+_LEAST_SHARE, _SHOWN = 0.01, 4
+"""Shares below this [MW] are not told; so many are."""
 
 _ISOCHRONOUS = 1e6
 """Gain of a droop of 0 [pu]: such a unit feeds all that it can."""
@@ -46,6 +49,22 @@ class Reserve:
     gain: float
     least: float
     most: float
+
+
+def in_words(
+    dispatch: Dispatch,
+    after: Mapping[str, complex],
+    plans: Mapping[str, ComponentPlan],
+    lost: Collection[str],
+    also: Sequence[str] = (),
+) -> str:
+    """What the lost units fed, what else was lost, and who feeds it now, by the units' powers afterwards [pu, S_n]."""
+    rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
+    fed = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(lost)]
+    more = {n: (after[n] - dispatch.powers[n]).real * rating[n] for n in rating if n not in lost}
+    most = sorted(more, key=lambda name: -abs(more[name]))[:_SHOWN]
+    shared = ", ".join(f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE)
+    return "; ".join([*fed, *also, *([f"shared: {shared}"] if shared else [])])
 
 
 def _number(plan: ComponentPlan, name: str) -> float | None:

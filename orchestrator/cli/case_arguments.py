@@ -8,6 +8,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.cli.arguments import assignment, seconds
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
@@ -44,6 +45,12 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
     parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
     if schedule:
         add_schedule_argument(parser)
+        parser.add_argument(
+            "--sharing",
+            choices=[str(rule) for rule in SharingRule],
+            help="how the other units feed what units fed that --set takes out of service (default: as the case says, "
+            "which is by droop)",
+        )
     parser.add_argument(
         "--native",
         dest="set",
@@ -78,6 +85,7 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
     scenarios = choose(
         file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
         schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
+        sharing=getattr(options, "sharing", None),
     )  # fmt: skip
     print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
