@@ -98,6 +98,7 @@ class Draft:
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
+    not_reached: list[float] = field(default_factory=list)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     misfits: dict[str, str] = field(default_factory=dict)
     exchanged: frozenset[str] = frozenset()

@@ -67,6 +67,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             continue
         if table.time >= stop:
             _note_late(draft, table.time, stop, where)
+            draft.not_reached.append(table.time)
         else:
             draft.questions += [Problem(where, text) for text in _endless(table, stop)]
         for event in _all_events_of(draft, table, clock, stop, where):

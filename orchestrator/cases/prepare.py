@@ -79,6 +79,8 @@ class PreparedScenario:
         for; None where nothing but the file gave values.
     given
         What the scenario, parameter files and the command line give, as it is written; a later source goes first.
+    not_reached
+        Times of events for which the run stops too early [s].
     idle
         What came from outside of the file, and where that cannot act; see `idle_everywhere`.
     """
@@ -107,6 +109,7 @@ class PreparedScenario:
     beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
     given: Mapping[str, Value] = field(default_factory=dict, repr=False)
     idle: Idle = field(default_factory=dict, repr=False)
+    not_reached: tuple[float, ...] = ()
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""
@@ -203,6 +206,7 @@ class Preparer:
             record_every=every,
             record_filtered=draft.case.solver.record_filter == "low-pass",
             events=events,
+            not_reached=tuple(sorted(draft.not_reached)),
             power_flow=flow,
             values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()}
             | imperfections,

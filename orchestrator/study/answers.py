@@ -102,12 +102,17 @@ def of_run(result: RunResult) -> ScenarioAnswer:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
         return ScenarioAnswer(title, None, "not known", mode, _short(remark))
+    end = result.modes.prepared.stop_time
+    later = ", ".join(f"{time:g} s" for time in result.modes.prepared.not_reached)
+    if result.before_its_events:
+        remark = f"the run ends at {end:g} s, before its events (t = {later}): without --stop it reaches them"
+        return ScenarioAnswer(title, None, "not known", mode, _short(remark))
     if result.stable_in_simulation is None:
         return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
     if by_modes.good is None or not result.modes.prepared.events:
         return by_modes
-    rest = f"; {by_modes.remark}" if by_modes.remark else ""
-    end = result.modes.prepared.stop_time
+    rest = f", before the events at {later}" if later else ""
+    rest += f"; {by_modes.remark}" if by_modes.remark else ""
     return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
 
 

@@ -102,10 +102,19 @@ class RunResult:
         return [finding for finding in self.findings if not finding.represented]
 
     @property
+    def before_its_events(self) -> bool:
+        """Whether it ended before the first of its events."""
+        return bool(self.modes.prepared.not_reached) and not self.modes.prepared.events
+
+    @property
     def stable_in_simulation(self) -> bool | None:
-        """None where a part was not judged or a limit would act that the model lacks, and nothing else was wrong."""
+        """None where a part was not judged or not reached, or a limit would act that the model lacks, and nothing else
+        was wrong.
+        """
         if self.went_unstable:
             return False
+        if self.before_its_events:
+            return None
         return None if any(finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings) else True
 
 
