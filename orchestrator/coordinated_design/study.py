@@ -16,6 +16,7 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
@@ -270,6 +271,7 @@ def design_over_points(
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
     after = modes_at(plan, values_of(plan.groups, settings), (), executor, store, lambda n, of: report(of + n, 2 * of))
+    after = with_followed_names(plan.aim.names, before, after, space.setting(found.x))
     stage("ranking")
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
@@ -278,7 +280,7 @@ def design_over_points(
     alone = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed)
     ranking = best_first(
         [
-            _confirmed(plan, one, after if designed and one.place == designed[0] else None, executor, store)
+            _confirmed(plan, one, before, after if designed and one.place == designed[0] else None, executor, store)
             for one in alone
         ]
     )
@@ -291,6 +293,7 @@ def design_over_points(
 def _confirmed(
     plan: PointsDesignPlan,
     one: RankedConverter,
+    before: Sequence[PointModes],
     known: Sequence[PointModes] | None,
     executor: Executor,
     store: PointStore,
@@ -300,7 +303,9 @@ def _confirmed(
         return one
     group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
     values = {**plan.off, **values_of([group], [one.setting])}
-    points = known or modes_at(plan, values, (), executor, store)
+    points = known or with_followed_names(
+        plan.aim.names, before, modes_at(plan, values, (), executor, store), {one.place: one.setting}
+    )
     return replace(one, worst=least_of(points, plan.aim))
 
 

@@ -172,7 +172,7 @@ def remarks(verdict: PointsVerdict) -> list[str]:
     if unnamed:
         texts.append(
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
-            "so all modes from 0.1 to 2 Hz count there"
+            "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"
         )
     warned = [(text, point) for point in verdict.known for text in point.after.warnings]
     kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))
