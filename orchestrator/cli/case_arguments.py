@@ -14,8 +14,16 @@ from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 
 
-def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False) -> None:
-    """The case, which may be left out where ``optional``, and what is changed of it; its schedule where asked for."""
+def add_case_arguments(
+    parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False, several: bool = True
+) -> None:
+    """The case, which may be left out where ``optional``, and what is changed of it; its schedule where asked for.
+
+    Parameters
+    ----------
+    several
+        Whether more than one scenario is taken.
+    """
     parser.add_argument(
         "case",
         metavar="CASE",
@@ -23,7 +31,11 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
         help="a built-in case (two_area), or the path of a case file or an .ssp",
     )
     parser.add_argument(
-        "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
+        "--scenario",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help=f"only this scenario{' (repeatable)' if several else ''}",
     )
     parser.add_argument(
         "--set",

@@ -26,7 +26,7 @@ from orchestrator.points.store import PointStore, any_kept
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_case_arguments(parser)
+    add_case_arguments(parser, several=False)
     defaults = DesignRequest(controller="")
     parser.add_argument(
         "--controller",

@@ -28,7 +28,7 @@ from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_case_arguments(parser)
+    add_case_arguments(parser, several=False)
     parser.add_argument(
         "--threshold",
         type=_share,

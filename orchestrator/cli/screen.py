@@ -31,7 +31,7 @@ from orchestrator.screening.study import Shard, plan_screening
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_case_arguments(parser)
+    add_case_arguments(parser, several=False)
     parser.add_argument(
         "--points", type=Path, metavar="FILE",
         help="operating points: a CSV file, a row each (default: the case as it is)",

@@ -373,6 +373,10 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, 
     arguments = ("--scenario", "one", "--workers", 1, "--out", out, "--vary")
     _, text, err = gfor(case, *arguments, "a1.gain=1,2,3,4")
     assert re.search(r"UNSTABLE: .*: at 1 of 4 points \(1 stable, 2 not known\); worst at a1.gain = 3", text)
+    turns = (
+        "stable at a1.gain = 1 .*, not known at a1.gain = 2 .*; not known at a1.gain = 2 .*, unstable at a1.gain = 3 "
+    )
+    assert re.search(turns, text.splitlines()[0])
     assert err.count("the step hides") == 1
     assert re.search(r"^at 3 of \d+ points: the step hides 2 %$", err, re.MULTILINE)
     _, text, _ = gfor(case, *arguments, "a1.gain=1,2", "--json")
