@@ -17,12 +17,8 @@ from orchestrator.coupling.schedule import SCHEDULES
 def add_case_arguments(
     parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False, several: bool = True
 ) -> None:
-    """The case, which may be left out where ``optional``, and what is changed of it; its schedule where asked for.
-
-    Parameters
-    ----------
-    several
-        Whether more than one scenario is taken.
+    """The case, which may be left out where ``optional``, ``several`` scenarios or one, what is changed; its schedule
+    where asked for.
     """
     parser.add_argument(
         "case",

@@ -73,7 +73,7 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
     A device that slips from the start stays as it is: its current moves, and at rest it does not.
     """
     values = dict(seen.values)
-    for name in (name for name, _, variable in map(_parts, seen.values) if variable == "omega"):
+    for name in (signal.removesuffix(".omega") for signal in seen.values if signal.endswith(".omega")):
         rest = next((m.figures["omega"] for m in misfits.get(name, ()) if "omega" in m.figures), 1.0)
         current = seen.last.get(f"{name}.i_re")
         signal: Numbers = values[f"{name}.omega"] / rest
@@ -88,10 +88,6 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
                 signal = np.where(moved | np.logical_or.accumulate(apart <= _SETTLED), signal, 1.0)
             values[f"{name}.omega"] = signal
     return replace(seen, values=values)
-
-
-def _parts(name: str) -> tuple[str, str, str]:
-    return name.partition(".")
 
 
 def is_derivative(name: str) -> bool:
