@@ -271,12 +271,13 @@ def test_a_mode_that_is_pushed_down_is_harm(planned, store):
     assert all(not one.worth(strong).allowed for one, grows in zip(rated, harmed, strict=True) if grows)
 
 
-def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, store, gain=250.0):
+def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, store):
     """By hand: tiny steps of the gain, and at each the nearest eigenvalue. What shapes say with the setting counts for
     nothing."""
     points.write_text("name,grid.X_L,load\nshort,0.05,1\nlonger,0.3,1\n")
     plan = planned("pod_p", modes=("electromechanical",))
     before = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    gain = 250.0
     setting = {P: PodSetting(gain, lead_lag_turning(40.0, 4.5, 2))}
     values = values_of(plan.groups, list(setting.values()))
     after = modes_at(plan, values, (), Serial(), store)
