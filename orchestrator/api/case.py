@@ -229,6 +229,7 @@ class Case:
         step: Time | None = None,
         parameters: Paths = (),
         frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        until: str | float | None = None,
         workers: int | None = 1,
         scheduler: str | None = None,
         tls: str | Path | None = None,
@@ -248,6 +249,9 @@ class Case:
             As for `scenario`.
         frequencies
             Modes from the first to the second are followed [Hz].
+        until
+            ``"unstable"``, or a damping such as ``"5 %"``: bisect how far the only range that is varied may go, such as
+            ``"grid.X_L=0.1:2"``. The result is in ``limits``.
         workers
             Processes to compute in; one for each core where None.
         scheduler
@@ -276,7 +280,8 @@ class Case:
         1       0.2          0.43            18.01
         """
         executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
-        planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
+        planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies,
+                       until=until)  # fmt: skip
         question(planned.scenarios)
         return _computed(compute, planned, executor, folder, "Points", shown=progress)
 

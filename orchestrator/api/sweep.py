@@ -29,6 +29,7 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
+from orchestrator.sweep.limit import Until
 from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
 
 WORKERS_IMPORT = ("orchestrator.sweep.worker",)
@@ -44,11 +45,14 @@ class ParameterSweep:
         All points, and the modes followed over them.
     samples
         The modes' figures at every point, for tables and plots.
+    limits
+        How far the parameter may go in each scenario, where ``until`` asks for it.
     """
 
     def __init__(self, result: SweepResult) -> None:
         self.result = result
         self.samples = Samples(result)
+        self.limits = tuple(result.limits)
 
     @property
     def remarks(self) -> list[str]:
@@ -151,9 +155,9 @@ class ParameterSweep:
 
         place = made_folder(Path(folder))
         with staged(place, new_run_id()) as staging:
-            save_sweep(self.samples, staging)
+            tables = save_sweep(self.samples, staging)
             plots = save_sweep_plots(self.samples, staging)
-        return [place / name for name in ("sweep.nc", "sweep.csv", *(path.name for path in plots))]
+        return [place / name for name in (*tables, *(path.name for path in plots))]
 
     def plot(self, ax: Axes = None) -> Axes:
         """The modes in the complex plane; a circle where each begins.
@@ -198,6 +202,7 @@ def plan(
     step: Time | None = None,
     parameters: Paths = (),
     frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    until: str | float | None = None,
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs, as `Case.sweep` does first.
 
@@ -217,6 +222,8 @@ def plan(
         Paths of parameter files.
     frequencies
         Modes from the first to the second are followed [Hz].
+    until
+        ``"unstable"``, or a damping such as ``"5 %"``: search for the limit.
 
     Raises
     ------
@@ -225,7 +232,22 @@ def plan(
     """
     files, fixed = parameter_files(parameters), case_values(values)
     chosen, seen = names(scenarios, "scenarios"), frequency_range(frequencies)
-    return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)
+    return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files, _until(until))
+
+
+def _until(given: str | float | None) -> Until | None:
+    """What must not be given up: ``unstable``, or a damping [%]."""
+    if given is None:
+        return None
+    if isinstance(given, str) and given.strip().lower() == "unstable":
+        return Until()
+    try:
+        damping = float(given.strip().removesuffix("%") if isinstance(given, str) else given)
+    except (TypeError, ValueError):
+        damping = -1.0
+    if isinstance(given, bool) or not 0 < damping < 100:
+        raise InputError(f"until = {given!r}; give 'unstable', or a damping from 0 to 100 % such as '5 %'")
+    return Until(damping)
 
 
 compute = computing(run_sweep, ParameterSweep)

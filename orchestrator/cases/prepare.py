@@ -108,6 +108,11 @@ class PreparedScenario:
     given: Mapping[str, Value] = field(default_factory=dict, repr=False)
     idle: Idle = field(default_factory=dict, repr=False)
 
+    @property
+    def grid(self) -> str:
+        """The component that is the network; "" without one."""
+        return self.case.table.power_flow.grid if self.case.table.power_flow else ""
+
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""
         schedule = schedule_in(self.case, self.name, self.system, name)

@@ -22,6 +22,7 @@ from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
+from orchestrator.sweep.limit import Kind
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_vary,
         metavar="COMPONENT.PARAMETER=START:STOP:COUNT",
         help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
-        "last one)",
+        "last one); several together: 'grid.X_a,grid.X_b=…', 'grid.X_line_7_*=…', 'line_7_9,line_8_9: length=1:4:7'",
+    )
+    parser.add_argument(
+        "--until",
+        metavar="unstable|PERCENT",
+        help="how far the range START:STOP may go before the system is unstable, or a mode of --range is damped less "
+        "than so many percent: coarse grid (COUNT, 9), then bisection",
     )
     parser.add_argument(
         "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
@@ -69,6 +76,7 @@ def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, 
         step=options.step,
         parameters=options.parameters,
         frequencies=options.range,
+        until=options.until,
     )
     print_questions(planned.scenarios, as_json=options.json)
     made_folder(folder, "--out")
@@ -76,7 +84,8 @@ def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, 
     with held(folder):
         sweep = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
         failed = _present(sweep, folder, console, as_json=options.json)
-    return failed or int(options.fail_unstable and not all(s.stable for s in sweep.result.scenarios))
+    held_up = all(x.kind is Kind.HOLDS for x in sweep.limits) and all(s.stable for s in sweep.result.scenarios)
+    return failed or int(options.fail_unstable and not held_up)
 
 
 def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: bool) -> int:
@@ -85,7 +94,7 @@ def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: 
     if as_json:
         print(json.dumps(sweep.as_json(), indent=1, ensure_ascii=False))
     else:
-        for line in tables.stability(sweep.samples):
+        for line in tables.limits(sweep.samples) or tables.stability(sweep.samples):
             console.print(line, soft_wrap=True, highlight=False)
         console.print("", tables.trajectories(sweep.samples), "")
     for text in sweep.remarks:

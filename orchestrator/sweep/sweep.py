@@ -15,11 +15,12 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import CaseError, Problem
+from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
+from orchestrator.sweep.limit import COARSE, Kind, Limit, Until, least_damping, mode_behind, search
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
@@ -45,6 +46,8 @@ class SweepPlan:
         [Hz]
     idle
         Questions about values that act in no scenario.
+    until
+        What is searched for along the only axis; None for a sweep alone.
     """
 
     case: Case
@@ -54,6 +57,7 @@ class SweepPlan:
     step_size: float | None
     frequency_range: tuple[float, float]
     idle: tuple[Problem, ...] = ()
+    until: Until | None = None
 
     @property
     def overrides(self) -> dict[str, Value]:
@@ -67,7 +71,8 @@ class SweepPlan:
 
     def values(self, place: GridPlace) -> dict[str, Value]:
         """The varied values at a place. A place between two grid points of the last axis has an interpolated value."""
-        return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
+        given = [axis.sets(_value_at(axis, position)) for axis, position in zip(self.axes, place, strict=True)]
+        return {key: value for one in given for key, value in one.items()}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
         varied = self.values(place)
@@ -127,6 +132,8 @@ class SweepResult:
         Number of points computed now, and number of points read from an earlier start.
     refined
         Number of refining points between grid points; both numbers above include them.
+    limits
+        Of each scenario, where they are searched for.
     """
 
     plan: SweepPlan
@@ -134,6 +141,7 @@ class SweepResult:
     computed: int = 0
     stored: int = 0
     refined: int = 0
+    limits: list[Limit] = field(default_factory=list)
 
     def failures(self) -> Iterator[tuple[ScenarioSweep, GridPlace, str]]:
         """Points of the grid that have no modes, and why."""
@@ -152,6 +160,7 @@ def plan_sweep(
     step_size: float | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     parameters: Sequence[ParameterFile] = (),
+    until: Until | None = None,
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs.
 
@@ -169,15 +178,30 @@ def plan_sweep(
         Modes of these frequencies are followed [Hz].
     parameters
         Parameter files whose values hold at every point; a later one goes before an earlier one.
+    until
+        Search for the limit along the range of the only parameter.
     """
+    vary = vary if until is None else [_searched(vary)]
     prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range)
+    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range, until=until)
     refuse_doubles(axes, prepared)
-    ends = [{axis.key: axis.values[end] for axis in axes} for end in (0, -1)]
+    ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
     idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]
     return replace(plan, idle=tuple(idle[0]))
+
+
+def _searched(vary: Sequence[Vary]) -> Vary:
+    """The one range along which a limit is searched for."""
+    if len(vary) != 1:
+        raise InputError(
+            f"--until searches along one range, and {len(vary)} are varied; give one --vary (several parameters that "
+            "move together stand in it with commas)"
+        )
+    if vary[0].limits is None:
+        raise InputError(f"--vary {vary[0].key}: --until needs a range such as {vary[0].key}=0.1:1.0, not a list")
+    return vary[0] if vary[0].count else replace(vary[0], count=COARSE)
 
 
 def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
@@ -223,6 +247,8 @@ def run_sweep(
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
     _fill(result, wanted, executor, store, report)
+    if plan.until is not None:
+        result.limits = [_limit(result, sweep, executor, store, report) for sweep in result.scenarios]
     for depth in range(1, REFINEMENTS + 1):
         gaps = [(s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))]
         if not gaps:
@@ -253,6 +279,52 @@ def _fill(
         sweep.points[place] = record
         result.stored += stored
         result.computed += not stored
+
+
+def _limit(
+    result: SweepResult, sweep: ScenarioSweep, executor: Executor, store: PointStore, report: CountReport
+) -> Limit:
+    """The limit of one scenario, whose grid is computed."""
+    plan, (axis,) = result.plan, result.plan.axes
+    until = plan.until or Until()
+    count = len(axis.values)
+
+    def kind_at(place: float) -> Kind:
+        if (place,) not in sweep.points:
+            _fill(result, [(sweep, (place,))], executor, store, report)
+            result.refined += 1
+        return until.kind(sweep.points[(place,)])
+
+    def between(low: float, high: float) -> bool:
+        return _value_at(axis, (low + high) / 2) not in (_value_at(axis, low), _value_at(axis, high))
+
+    kinds = [kind_at(float(k)) for k in range(count)]
+    found = search(kinds, kind_at, between)
+    end = Kind.HOLDS if found.beyond is None else kind_at(found.beyond)
+    worst = min(range(count), key=lambda k: _margin(sweep.points[(k,)]))
+    shown = sweep.points[(float(worst) if found.beyond is None else found.beyond,)]
+    mode, who = mode_behind(shown, until, plan.case.table.analysis.swing)
+    value = {place: float(_value_at(axis, place)) for place in (found.holds, found.beyond) if place is not None}
+    tried = [
+        {"value": float(axis.values[k]), "kind": str(kinds[k]), "damping_percent": least_damping(sweep.points[(k,)]),
+         "largest_growth_rate": sweep.points[(k,)].stability.get("largest_growth_rate"),
+         "error": sweep.points[(k,)].error}
+        for k in range(count)
+    ]  # fmt: skip
+    return Limit(
+        axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end,
+        None if found.holds is None else value[found.holds], None if found.beyond is None else value[found.beyond],
+        mode, who, tuple(tried), tuple(float(axis.values[k]) for k in found.again),
+        shown.error or (str(shown.stability.get("reason", "")) if end is Kind.NOT_KNOWN else ""),
+        (float(axis.values[0]), float(axis.values[-1])), float(axis.values[worst]),
+    )  # fmt: skip
+
+
+def _margin(record: PointRecord) -> float:
+    """How far a point that holds is from failing, to find the worst of them."""
+    rate = record.stability.get("largest_growth_rate")
+    least = least_damping(record)
+    return least if least is not None else np.inf if rate is None else -rate
 
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:

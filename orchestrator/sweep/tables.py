@@ -8,6 +8,7 @@ from rich.table import Table
 
 from orchestrator.report.tables import PlainTable
 from orchestrator.sweep.dataset import Samples
+from orchestrator.sweep.limit import Kind
 from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.trajectories import GridPlace
 
@@ -73,9 +74,19 @@ def stability(samples: Samples) -> list[str]:
     return lines
 
 
+def limits(samples: Samples) -> list[str]:
+    """How far the parameter may go, a line each scenario, as rich markup."""
+    colours = {Kind.HOLDS: "green", Kind.FAILS: "red"}
+    return [
+        f"[bold {colours.get(limit.kind, 'yellow')}]{escape(limit.title)}[/]: {escape(limit.sentence)}"
+        for limit in samples.result.limits
+    ]
+
+
 def remarks(samples: Samples) -> list[str]:
     """Sentences on points that failed, on trajectories that break, and on refining points."""
     result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
+    texts += [text for limit in result.limits for text in limit.remarks]
     failures = list(result.failures())
     if failures:
         texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")
@@ -99,7 +110,7 @@ def remarks(samples: Samples) -> list[str]:
         )
     more = len(breaks) - _FAILURES_SHOWN
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
-    if result.refined:
+    if result.refined and not result.limits:
         texts.append(
             f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
             "(where, is marked 'refined' in sweep.csv)"

@@ -1,0 +1,273 @@
+"""How far a parameter may go: the first value at which a scenario is unstable, or damped less than wanted.
+
+The range is tried on a coarse grid first; between the last value that holds and the next one, the limit is bisected.
+Every value is one of the coupled FMUs, perturbed at their own operating point.
+"""
+
+import fnmatch
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.modes import Mode, damping_percent, make_mode
+from orchestrator.errors import ErrorKind
+from orchestrator.sweep.point import PointRecord
+
+COARSE = 9
+"""Values of the coarse grid where none are asked for."""
+
+HALVINGS = 8
+"""Of the stretch between two values of the grid."""
+
+_PARTS = 3
+"""Components that are named where nothing swings against something."""
+
+_SAME = 0.02
+"""The growing mode is one of those in the range where both differ by less than this part of its size."""
+
+_NO_POINT = {ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE, ErrorKind.ISLANDING}
+
+
+class Kind(StrEnum):
+    """What a value comes to."""
+
+    HOLDS = "holds"
+    FAILS = "fails"
+    NO_POINT = "no operating point"
+    NOT_KNOWN = "not known"
+
+
+@dataclass(frozen=True)
+class Until:
+    """What must not be given up: stability, and at least this damping [%] of all modes in the range where it is > 0."""
+
+    damping: float = 0.0
+
+    @property
+    def holding(self) -> str:
+        return f"damped by {self.damping:g} % or more" if self.damping else "stable"
+
+    @property
+    def failing(self) -> str:
+        return f"damped by less than {self.damping:g} %" if self.damping else "UNSTABLE"
+
+    def kind(self, record: PointRecord) -> Kind:
+        """What a point comes to."""
+        if record.failure is not None:
+            return Kind.NO_POINT if record.failure.kind in _NO_POINT else Kind.NOT_KNOWN
+        stable = record.stability.get("stable")
+        least = least_damping(record)
+        if stable is False or (self.damping and least is not None and least < self.damping):
+            return Kind.FAILS
+        return Kind.NOT_KNOWN if stable is None else Kind.HOLDS
+
+
+def least_damping(record: PointRecord) -> float | None:
+    """Of the modes in the range [%]."""
+    if record.modes is None or not len(record.modes.eigenvalues):
+        return None
+    return min(damping_percent(complex(value)) for value in record.modes.eigenvalues)
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """What the search came to, in places along the range: the last value that holds, the first that does not, and
+    the places of the coarse grid beyond that hold again.
+    """
+
+    holds: float | None
+    beyond: float | None
+    again: tuple[int, ...] = ()
+
+
+def search(kinds: Sequence[Kind], at: Callable[[float], Kind], between: Callable[[float, float], bool]) -> Bracket:
+    """The first change along the grid, bisected.
+
+    Parameters
+    ----------
+    kinds
+        At the places 0, 1, … of the coarse grid.
+    at
+        What another place comes to.
+    between
+        Whether there is a value between two places.
+    """
+    first = next((k for k, kind in enumerate(kinds) if kind is not Kind.HOLDS), None)
+    if first is None:
+        return Bracket(float(len(kinds) - 1), None)
+    again = tuple(k for k in range(first + 1, len(kinds)) if kinds[k] is Kind.HOLDS)
+    if first == 0:
+        return Bracket(None, 0.0, again)
+    low, high = float(first - 1), float(first)
+    for _ in range(HALVINGS):
+        if not between(low, high):
+            break
+        middle = (low + high) / 2
+        low, high = (middle, high) if at(middle) is Kind.HOLDS else (low, middle)
+    return Bracket(low, high, again)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How far a parameter may go in one scenario.
+
+    Attributes
+    ----------
+    key, unit, title
+        The parameter, and the scenario's title.
+    kind
+        What ends the range: `Kind.FAILS` is a limit, anything else is none; `Kind.HOLDS` where nothing does.
+    holds_at, beyond
+        The last value that holds and the first that does not; None where there is none.
+    mode, who
+        The mode behind it, and who takes part.
+    tried
+        Values of the coarse grid, each with its kind, its least damping [%] and its largest growth rate [1/s].
+    again
+        Values of it beyond the limit that hold again.
+    why
+        The failure's text, or what the verdict is not known for.
+    whole, worst_at
+        The range, and where in it, of the coarse grid, the least damped mode is.
+    """
+
+    key: str
+    unit: str
+    scenario: str
+    title: str
+    until: Until
+    kind: Kind
+    holds_at: float | None
+    beyond: float | None
+    mode: dict[str, Any] | None = None
+    who: str = ""
+    tried: tuple[dict[str, Any], ...] = ()
+    again: tuple[float, ...] = ()
+    why: str = ""
+    whole: tuple[float, float] = (0.0, 0.0)
+    worst_at: float | None = None
+
+    @property
+    def limit(self) -> float | None:
+        """The last value that holds before the first that fails; None where nothing fails, or nothing is known."""
+        return self.holds_at if self.kind is Kind.FAILS else None
+
+    @property
+    def sentence(self) -> str:
+        """The answer, with the figures of both sides."""
+        start, stop = (self._value(value) for value in self.whole)
+        mode = f": {self._mode()}" if self.mode else ""
+        if self.kind is Kind.HOLDS:
+            worst = f"; least damped at {self._value(self.worst_at)}{mode}"
+            return f"{self.until.holding} over the whole range, {self.key} from {start} to {stop}{worst}"
+        at = self._value(self.beyond)
+        if self.holds_at is None:
+            what = {Kind.FAILS: f"{self.until.failing} already at the start", Kind.NO_POINT: "no operating point at the"
+                    " start", Kind.NOT_KNOWN: "not known already at the start"}[self.kind]  # fmt: skip
+            return f"{what}, {self.key} = {at}{mode}{self._why}"
+        up_to = f"{self.until.holding} up to {self.key} = {self._value(self.holds_at)}"
+        if self.kind is Kind.FAILS:
+            return f"{up_to}, {self.until.failing} at {at}{mode}"
+        what = "no operating point" if self.kind is Kind.NO_POINT else "no verdict"
+        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{self._why}"
+
+    @property
+    def remarks(self) -> list[str]:
+        """What else is to be known."""
+        texts = []
+        if self.again:
+            shown = ", ".join(self._value(value) for value in self.again)
+            texts.append(f"{self.title}: {self.until.holding} again at {shown}: the range is not of one piece")
+        texts.append(
+            f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower piece between two of "
+            "them that does not hold would not be seen: COUNT in --vary tries more"
+        )
+        return texts
+
+    @property
+    def _why(self) -> str:
+        return f": {self.why}" if self.why else ""
+
+    def _value(self, value: float | None) -> str:
+        return f"{value:.5g} {self.unit}".rstrip() if value is not None else "–"
+
+    def _mode(self) -> str:
+        mode = self.mode or {}
+        hertz = mode["frequency_hz"]
+        named = f"{mode['name']!r}, " if mode["name"] else ""
+        where = f"{hertz:.3f} Hz, {mode['damping_percent']:.2f} %" if hertz else f"{mode['real']:+.3g} 1/s, no swing"
+        return f"{named}{where} ({self.who})"
+
+    def as_json(self) -> dict[str, Any]:
+        """The answer as JSON's types."""
+        return {
+            "scenario": self.scenario,
+            "parameter": self.key,
+            "unit": self.unit,
+            "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
+            "limit": self.limit,
+            "reason": None if self.limit is not None else self.sentence,
+            "holds_at": self.holds_at,
+            "beyond": self.beyond,
+            "ends_with": str(self.kind),
+            "mode": self.mode,
+            "holds_again_at": list(self.again),
+            "tried": list(self.tried),
+            "sentence": self.sentence,
+        }
+
+
+def mode_behind(record: PointRecord, until: Until, speeds: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
+    """The mode that decides on a point, and who takes part in it.
+
+    Of an unstable point this is the one that grows fastest, at any frequency; else the least damped one of the range.
+    """
+    modes, verdict = record.modes, record.stability
+    rate, hertz = verdict.get("largest_growth_rate"), verdict.get("frequency_hz")
+    if modes is None:
+        return None, ""
+    values = modes.eigenvalues
+    if verdict.get("stable") is False and rate is not None:
+        value = complex(rate, 2 * np.pi * (hertz or 0.0))  # of the system where the step map alone is stable
+        near = np.abs(values - value)
+        place = int(near.argmin()) if len(near) else 0
+        if not len(near) or near[place] > _SAME * abs(
+            value
+        ):  # outside of the range, where the verdict knows its states
+            shares: dict[str, float] = {}
+            for entry in verdict["participation"]:
+                component = entry["state"].partition(".")[0]
+                shares[component] = shares.get(component, 0.0) + entry["factor"]
+            who = ", ".join(e["state"] for e in verdict["participation"][:_PARTS])
+            return _mode_json("", value, shares), who
+    elif not len(values):
+        return None, ""
+    else:
+        place = min(range(len(values)), key=lambda k: damping_percent(complex(values[k])))
+        value = complex(values[place])
+    mode = make_mode(value, modes.left[place], modes.right[place], modes.names)
+    name = next((name for name, k in record.named.items() if k == place), "")
+    return _mode_json(name, value, mode.by_component), _who(mode, speeds)
+
+
+def _mode_json(name: str, value: complex, components: dict[str, float]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "frequency_hz": value.imag / (2 * np.pi),
+        "damping_percent": damping_percent(value),
+        "real": value.real,
+        "imag": value.imag,
+        "components": {component: share for component, share in components.items() if share >= 0.01},
+    }
+
+
+def _who(mode: Mode, speeds: Sequence[str]) -> str:
+    """``sg1, sg2 against sg3``, or the components that take part most."""
+    states = [name for name in mode.shape if any(fnmatch.fnmatchcase(name, pattern) for pattern in speeds)]
+    together, against = (", ".join(s.partition(".")[0] for s in side) for side in mode.swing(states))
+    if mode.participation_of(states) >= 0.1 and together:
+        return f"{together} against {against}" if against else together
+    return ", ".join(f"{name} {share:.0%}" for name, share in list(mode.by_component.items())[:_PARTS])
