@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.build_choices import ALPHA
+from orchestrator.cases.build_choices import ALPHA, MODELS
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import flatten, given_twice
@@ -67,7 +67,7 @@ def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> d
 
 def check_case_name(name: str, argument: str) -> None:
     """Refuse a name that is not of the form ``component.variable``."""
-    if not _CASE_VALUE.fullmatch(name) and name != ALPHA:
+    if not _CASE_VALUE.fullmatch(name) and name not in (ALPHA, MODELS):
         raise InputError(f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'")
 
 

@@ -14,6 +14,9 @@ from orchestrator.cases.schema import Value
 ALPHA = "units.alpha"
 """Key of the share that all converters have; ``units.alpha.<label>`` is that of one unit."""
 
+MODELS = "models"
+"""Key of the kind of all models, EMT or phasor; see `model_kinds`."""
+
 _NATIVE = "native"
 
 PARTS = ("machine", "exciter", "governor", "stabilizer")
@@ -131,6 +134,8 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
     shares: list[ShareChoice] = []
     for key, value in given.items():
         pattern, _, variable = key.partition(".")
+        if key == MODELS:
+            continue  # chosen before the components are known
         if has_units and (key == ALPHA or key.startswith(f"{ALPHA}.")):
             shares.append(ShareChoice(key.removeprefix(ALPHA).removeprefix("."), value, place(key)))
         elif variable == _NATIVE:

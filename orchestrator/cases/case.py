@@ -18,6 +18,7 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.event_tables import other_scenarios
 from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
+from orchestrator.cases.model_kinds import kind_wanted, of_kind
 from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
@@ -78,6 +79,8 @@ class Case(CaseDefinition):
         dispatch
             What the units fed before an outage that they share; None where each feeds its own ``P_0``.
         """
+        if (other := self._of_kind(overrides, parameters)) is not self:
+            return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
         problems += [
@@ -153,11 +156,18 @@ class Case(CaseDefinition):
     def placed(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
-        preparer = self._preparer(scenario, overrides, parameters)
+        preparer = self._of_kind(overrides, parameters)._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
         if problems := [*self.problems, *preparer.problems]:
             raise CaseError(str(self.path), problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
+
+    def _of_kind(self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> "Case":
+        """The case with the kind of models that is wanted; itself where that is the file's own."""
+        kind = kind_wanted(overrides, parameters)
+        if kind is None or kind == self.table.models:
+            return self
+        return replace(self, table=of_kind(self.table, kind))
 
     def _preparer(
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
@@ -194,7 +204,13 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
             f'{key} = "{path.name}", and give that'
         )
     text, raw = read_toml(path, "the case file", "make it readable for you")
+    return case_of_text(text, raw, path, trust_fmus=trust_fmus)
+
+
+def case_of_text(text: str, raw: dict[str, Any], path: Path, *, trust_fmus: bool = False) -> Case:
+    """The case of a text that is, or is to be, in a file; ``raw`` is what TOML makes of it."""
     table, problems = _validate(raw, text, path)
+    table = table if table.models is None or problems else of_kind(table, table.models)
     return _case(table, text, path, problems, path.parent, trust_fmus=trust_fmus)
 
 

@@ -95,9 +95,10 @@ def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
 def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
     entries += [
-        (place("plots", k, "panels", n, "signal"), panel.signal)
+        (place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(case.plots)
         for n, panel in enumerate(plot.panels)
+        for signal in (panel.signal, *panel.also)
     ]
     for where, expression in entries:
         yield from _signal(where, expression, named)

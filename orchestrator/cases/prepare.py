@@ -8,7 +8,7 @@ from fmus.toolchain.catalogue import model_names, parts_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
-from orchestrator.cases.build_choices import PARTS
+from orchestrator.cases.build_choices import MODELS, PARTS
 from orchestrator.cases.case_network import check_network_is_used, find_network, read_network, takes_network
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
@@ -143,7 +143,7 @@ class Preparer:
         self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
         draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
-        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters))
+        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)

@@ -47,9 +47,10 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     ring = draft.case.analysis.ring_down
     shown = [(draft.place("analysis", "ring_down"), ring.signal)] if ring else []
     shown += [
-        (draft.place("plots", k, "panels", n, "signal"), panel.signal)
+        (draft.place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(draft.case.plots)
         for n, panel in enumerate(plot.panels)
+        for signal in (panel.signal, *panel.also)
     ]
     for place, expression in shown:
         if missing := [name for name in _variables(expression) if name in outputs and name not in wanted]:

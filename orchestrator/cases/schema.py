@@ -516,9 +516,10 @@ class ReferenceTable(Table):
 
 
 class PanelTable(Table):
-    """One axis of a plot."""
+    """One axis of a plot; ``also`` are further signals on the same axis."""
 
     signal: str
+    also: list[str] = []
     label: str
     scale: Number = 1.0
 
@@ -531,6 +532,13 @@ class PlotTable(Table):
     panels: list[PanelTable]
 
 
+class KindTable(Table):
+    """What one kind of models takes in place of the case's own values."""
+
+    step_size: Seconds | None = Field(default=None, gt=0, le=LONGEST_STEP)
+    stray_B: PerUnit | None = None
+
+
 class CaseTable(Table):
     """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose."""
 
@@ -538,6 +546,9 @@ class CaseTable(Table):
     title: str = ""
     source: str = ""
     meant: list[str] = []
+    models: Literal["emt", "phasor"] | None = None
+    emt: KindTable = KindTable()
+    phasor: KindTable = KindTable()
     solver: SolverTable = SolverTable()
     components: dict[str, ComponentTable] = Field(min_length=1)
     network: NetworkTable | None = None

@@ -16,6 +16,7 @@ from orchestrator.fmi.interrupts import calls
 _ESCAPE = "gfor_escape"
 
 COMMANDS = {
+    "new": "write a case file from a network's files, such as RAW and DYR",
     "run": "steady state, modes and time response of a case's scenarios",
     "federate": "one component of a case as a federate at HELICS, for a run elsewhere",
     "modes": "steady state and eigenvalues of a case's scenarios",
@@ -46,6 +47,7 @@ COMMANDS = {
 
 EXAMPLES = """\
 examples:
+  gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml
   gfor run two_area                              the paper's first case study, into results/two_area
   gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
@@ -108,7 +110,7 @@ How do I take the models elsewhere?
   gfor export-dll gfor --dest dlls                    a DLL for EMT programs
   gfor linearize two_area --scenario gfor             A, B, C, D
 
-A case of your own: a file such as my_case.toml in the place of two_area; network data in RAW and DYR or CGMES.
+A case of your own: `gfor new own.raw own.dyr --out case.toml` writes one, for the place of two_area; also from CGMES.
 `gfor COMMAND --help` has a command's options, `gfor --help` all commands.
 """
 """What ``gfor`` alone prints."""

@@ -21,7 +21,7 @@ class Joined(argparse.Action):
 def assignment(text: str) -> tuple[str, bool | float | str]:
     """``component.parameter=value`` of a case."""
     key, equals, given = text.partition("=")
-    if not equals or "." not in key or not given:
+    if not equals or ("." not in key and key.strip() != "models") or not given:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
     return key.strip(), read_value(given.strip())
 

@@ -22,7 +22,7 @@ from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
-from orchestrator.sweep.limit import Kind
+from orchestrator.sweep.limit import Ending
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,7 +84,7 @@ def _sweep(case: Case, folder: Path, progress: Progressing, executor: Executor, 
     with held(folder):
         sweep = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
         failed = _present(sweep, folder, console, as_json=options.json)
-    held_up = all(x.kind is Kind.HOLDS for x in sweep.limits) and all(s.stable for s in sweep.result.scenarios)
+    held_up = all(x.kind is Ending.HOLDS for x in sweep.limits) and all(s.stable for s in sweep.result.scenarios)
     return failed or int(options.fail_unstable and not held_up)
 
 

@@ -31,7 +31,7 @@ _SAME = 0.02
 _NO_POINT = {ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE, ErrorKind.ISLANDING}
 
 
-class Kind(StrEnum):
+class Ending(StrEnum):
     """What a value comes to."""
 
     HOLDS = "holds"
@@ -54,15 +54,15 @@ class Until:
     def failing(self) -> str:
         return f"damped by less than {self.damping:g} %" if self.damping else "UNSTABLE"
 
-    def kind(self, record: PointRecord) -> Kind:
+    def kind(self, record: PointRecord) -> Ending:
         """What a point comes to."""
         if record.failure is not None:
-            return Kind.NO_POINT if record.failure.kind in _NO_POINT else Kind.NOT_KNOWN
+            return Ending.NO_POINT if record.failure.kind in _NO_POINT else Ending.NOT_KNOWN
         stable = record.stability.get("stable")
         least = least_damping(record)
         if stable is False or (self.damping and least is not None and least < self.damping):
-            return Kind.FAILS
-        return Kind.NOT_KNOWN if stable is None else Kind.HOLDS
+            return Ending.FAILS
+        return Ending.NOT_KNOWN if stable is None else Ending.HOLDS
 
 
 def least_damping(record: PointRecord) -> float | None:
@@ -83,7 +83,7 @@ class Bracket:
     again: tuple[int, ...] = ()
 
 
-def search(kinds: Sequence[Kind], at: Callable[[float], Kind], between: Callable[[float, float], bool]) -> Bracket:
+def search(kinds: Sequence[Ending], at: Callable[[float], Ending], between: Callable[[float, float], bool]) -> Bracket:
     """The first change along the grid, bisected.
 
     Parameters
@@ -95,10 +95,10 @@ def search(kinds: Sequence[Kind], at: Callable[[float], Kind], between: Callable
     between
         Whether there is a value between two places.
     """
-    first = next((k for k, kind in enumerate(kinds) if kind is not Kind.HOLDS), None)
+    first = next((k for k, kind in enumerate(kinds) if kind is not Ending.HOLDS), None)
     if first is None:
         return Bracket(float(len(kinds) - 1), None)
-    again = tuple(k for k in range(first + 1, len(kinds)) if kinds[k] is Kind.HOLDS)
+    again = tuple(k for k in range(first + 1, len(kinds)) if kinds[k] is Ending.HOLDS)
     if first == 0:
         return Bracket(None, 0.0, again)
     low, high = float(first - 1), float(first)
@@ -106,12 +106,12 @@ def search(kinds: Sequence[Kind], at: Callable[[float], Kind], between: Callable
         if not between(low, high):
             break
         middle = (low + high) / 2
-        low, high = (middle, high) if at(middle) is Kind.HOLDS else (low, middle)
+        low, high = (middle, high) if at(middle) is Ending.HOLDS else (low, middle)
     return Bracket(low, high, again)
 
 
 @dataclass(frozen=True)
-class Limit:
+class ParameterLimit:
     """How far a parameter may go in one scenario.
 
     Attributes
@@ -119,7 +119,7 @@ class Limit:
     key, unit, title
         The parameter, and the scenario's title.
     kind
-        What ends the range: `Kind.FAILS` is a limit, anything else is none; `Kind.HOLDS` where nothing does.
+        What ends the range: `Ending.FAILS` is a limit, anything else is none; `Ending.HOLDS` where nothing does.
     holds_at, beyond
         The last value that holds and the first that does not; None where there is none.
     mode, who
@@ -139,7 +139,7 @@ class Limit:
     scenario: str
     title: str
     until: Until
-    kind: Kind
+    kind: Ending
     holds_at: float | None
     beyond: float | None
     mode: dict[str, Any] | None = None
@@ -153,25 +153,25 @@ class Limit:
     @property
     def limit(self) -> float | None:
         """The last value that holds before the first that fails; None where nothing fails, or nothing is known."""
-        return self.holds_at if self.kind is Kind.FAILS else None
+        return self.holds_at if self.kind is Ending.FAILS else None
 
     @property
     def sentence(self) -> str:
         """The answer, with the figures of both sides."""
         start, stop = (self._value(value) for value in self.whole)
         mode = f": {self._mode()}" if self.mode else ""
-        if self.kind is Kind.HOLDS:
+        if self.kind is Ending.HOLDS:
             worst = f"; least damped at {self._value(self.worst_at)}{mode}"
             return f"{self.until.holding} over the whole range, {self.key} from {start} to {stop}{worst}"
         at = self._value(self.beyond)
         if self.holds_at is None:
-            what = {Kind.FAILS: f"{self.until.failing} already at the start", Kind.NO_POINT: "no operating point at the"
-                    " start", Kind.NOT_KNOWN: "not known already at the start"}[self.kind]  # fmt: skip
+            what = {Ending.FAILS: f"{self.until.failing} already at the start", Ending.NO_POINT: "no operating point at the"
+                    " start", Ending.NOT_KNOWN: "not known already at the start"}[self.kind]  # fmt: skip
             return f"{what}, {self.key} = {at}{mode}{self._why}"
         up_to = f"{self.until.holding} up to {self.key} = {self._value(self.holds_at)}"
-        if self.kind is Kind.FAILS:
+        if self.kind is Ending.FAILS:
             return f"{up_to}, {self.until.failing} at {at}{mode}"
-        what = "no operating point" if self.kind is Kind.NO_POINT else "no verdict"
+        what = "no operating point" if self.kind is Ending.NO_POINT else "no verdict"
         return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{self._why}"
 
     @property

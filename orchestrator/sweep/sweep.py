@@ -20,7 +20,7 @@ from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
-from orchestrator.sweep.limit import COARSE, Kind, Limit, Until, least_damping, mode_behind, search
+from orchestrator.sweep.limit import COARSE, Ending, ParameterLimit, Until, least_damping, mode_behind, search
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
@@ -141,7 +141,7 @@ class SweepResult:
     computed: int = 0
     stored: int = 0
     refined: int = 0
-    limits: list[Limit] = field(default_factory=list)
+    limits: list[ParameterLimit] = field(default_factory=list)
 
     def failures(self) -> Iterator[tuple[ScenarioSweep, GridPlace, str]]:
         """Points of the grid that have no modes, and why."""
@@ -283,13 +283,13 @@ def _fill(
 
 def _limit(
     result: SweepResult, sweep: ScenarioSweep, executor: Executor, store: PointStore, report: CountReport
-) -> Limit:
+) -> ParameterLimit:
     """The limit of one scenario, whose grid is computed."""
     plan, (axis,) = result.plan, result.plan.axes
     until = plan.until or Until()
     count = len(axis.values)
 
-    def kind_at(place: float) -> Kind:
+    def kind_at(place: float) -> Ending:
         if (place,) not in sweep.points:
             _fill(result, [(sweep, (place,))], executor, store, report)
             result.refined += 1
@@ -300,7 +300,7 @@ def _limit(
 
     kinds = [kind_at(float(k)) for k in range(count)]
     found = search(kinds, kind_at, between)
-    end = Kind.HOLDS if found.beyond is None else kind_at(found.beyond)
+    end = Ending.HOLDS if found.beyond is None else kind_at(found.beyond)
     worst = min(range(count), key=lambda k: _margin(sweep.points[(k,)]))
     shown = sweep.points[(float(worst) if found.beyond is None else found.beyond,)]
     mode, who = mode_behind(shown, until, plan.case.table.analysis.swing)
@@ -311,11 +311,11 @@ def _limit(
          "error": sweep.points[(k,)].error}
         for k in range(count)
     ]  # fmt: skip
-    return Limit(
+    return ParameterLimit(
         axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end,
         None if found.holds is None else value[found.holds], None if found.beyond is None else value[found.beyond],
         mode, who, tuple(tried), tuple(float(axis.values[k]) for k in found.again),
-        shown.error or (str(shown.stability.get("reason", "")) if end is Kind.NOT_KNOWN else ""),
+        shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else ""),
         (float(axis.values[0]), float(axis.values[-1])), float(axis.values[worst]),
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from orchestrator.report.tables import PlainTable
 from orchestrator.sweep.dataset import Samples
-from orchestrator.sweep.limit import Kind
+from orchestrator.sweep.limit import Ending
 from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.trajectories import GridPlace
 
@@ -76,7 +76,7 @@ def stability(samples: Samples) -> list[str]:
 
 def limits(samples: Samples) -> list[str]:
     """How far the parameter may go, a line each scenario, as rich markup."""
-    colours = {Kind.HOLDS: "green", Kind.FAILS: "red"}
+    colours = {Ending.HOLDS: "green", Ending.FAILS: "red"}
     return [
         f"[bold {colours.get(limit.kind, 'yellow')}]{escape(limit.title)}[/]: {escape(limit.sentence)}"
         for limit in samples.result.limits

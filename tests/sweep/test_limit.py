@@ -11,11 +11,11 @@ from orchestrator.errors import InputError
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.limit import HALVINGS, Kind, Until, search
+from orchestrator.sweep.limit import HALVINGS, Ending, Until, search
 from orchestrator.sweep.sweep import plan_sweep, run_sweep
 from tests.coupling.small_fmus import small_fmu
 
-H, F, N, U = Kind.HOLDS, Kind.FAILS, Kind.NO_POINT, Kind.NOT_KNOWN
+H, F, N, U = Ending.HOLDS, Ending.FAILS, Ending.NO_POINT, Ending.NOT_KNOWN
 LAG = 0.1
 
 
