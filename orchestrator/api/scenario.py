@@ -34,6 +34,7 @@ from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
@@ -406,6 +407,30 @@ class Scenario:
         if wrong_lengths := [length for length in lengths if not length > 0]:
             raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
         return choose_step(self.prepared, Allowed(*allowed), lengths, chosen, frequency_range(frequencies))
+
+    def strengths(self, converter_current: float = 0.0, rating: float | None = None) -> list[BusStrength]:
+        """Short-circuit power of every bus, with the short-circuit ratio of the converters there.
+
+        Parameters
+        ----------
+        converter_current
+            That a converter feeds into a short circuit [pu of its rating].
+        rating
+            Of a converter that every bus is judged for [MVA]; the converters' own at their buses by default.
+
+        Raises
+        ------
+        InputError
+            If the case has no power flow, or nothing feeds a short circuit.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> weakest = min(gfor.load("ieee39").scenario("base").strengths(), key=lambda bus: bus.s_sc_mva)
+        >>> weakest.bus, round(weakest.s_sc_mva)
+        ('bus_12', 2751)
+        """
+        return ShortCircuit.of(self.prepared).strengths(converter_current, rating)
 
     def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.

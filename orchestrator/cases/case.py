@@ -18,8 +18,8 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.event_tables import other_scenarios
 from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
-from orchestrator.cases.model_kinds import kind_wanted, of_kind
 from orchestrator.cases.mentions import Named, unmatched
+from orchestrator.cases.model_kinds import kind_wanted, of_kind
 from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer

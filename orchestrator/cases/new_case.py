@@ -3,10 +3,12 @@
 import math
 import os
 import re
+import textwrap
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.case import Case, case_of_text
@@ -18,11 +20,8 @@ from orchestrator.errors import InputError, Problem
 from orchestrator.units import to_unit
 
 _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
-_STEPS = {"emt": "100 us", "phasor": "2 ms"}
-_EMT_STEP = 1e-4
-_CURRENT = {"emt": "current_demand", "phasor": "current_limit"}
+_EMT, _PHASOR = "100 us", "2 ms"
 _MOST_CURVES = 12
-_LONGEST_COMMENT = 150
 
 
 @dataclass(frozen=True)
@@ -169,11 +168,10 @@ class _Place:
     rating_mva: float = 1.0
 
     @property
-    def changed(self) -> dict[str, float]:
+    def changed(self) -> dict[str, str]:
         """Values of every scenario with the converter."""
-        if self.less is None:
-            return {}
-        return {f"{self.less}.P_0": round((self.before_mw - self.wanted.p_mw) / self.rating_mva, 6)}
+        left = (self.before_mw - self.wanted.p_mw) / self.rating_mva
+        return {f"{self.less}.P_0": f"{left:.6f}"} if self.less else {}
 
 
 def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
@@ -199,8 +197,8 @@ def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
     power = flow.powers[wanted.less].real * rating
     if wanted.p_mw > power + 1e-6:
         raise InputError(
-            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; give the converter "
-            f"at most {power:.5g} MW, or leave the rest to the slack without 'less'"
+            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; give the "
+            f"converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
         )
     if wanted.less in at_slack:
         return found  # the slack feeds what is left, whatever it is given
@@ -218,227 +216,188 @@ class _Text:
         place: _Place | None = None,
     ) -> None:
         self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
-        self._kind = wanted.kind
+        self._suffix = "" if wanted.kind == "emt" else "_phasor"
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
+        self._network = base.network if base else None
+        self._changed = place.changed if place else {}
+        loads = self._network.loads if self._network else ()
+        largest = max(loads, key=lambda load: load.p_mw, default=None)
+        self._fault_bus = place.bus if place else largest.bus if largest else next(iter(self._buses), "")
+
+    @property
+    def _buses(self) -> tuple[str, ...]:
+        return self._network.buses if self._network else ()
 
     @property
     def text(self) -> str:
-        blocks = [self._head(), self._solver(), self._network(), self._units(), self._converter(), self._scenarios()]
-        blocks += [self._analysis()]
-        return "\n".join(line for block in blocks for line in [*block, ""] if block).rstrip() + "\n"
+        blocks = [self._head(), self._solver(), self._grid(), self._units(), self._converter(), *self._scenarios()]
+        return "\n".join("\n".join([*block, ""]) for block in [*blocks, *self._plots()] if block)
 
     def assumed(self, questions: int) -> list[str]:
-        """What was assumed, five lines at most."""
-        lines = ["loads: PL, QL of constant power, as the file's own power flow has them; [network] load_model changes it"]
+        """What was assumed, a line each."""
+        ours, lines = self._wanted.device is None, []
         if self._place is not None:
             p, w = self._place, self._place.wanted
             dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
             if p.less:
-                dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} MW before) and keeps rating and inertia"
-            what = self._wanted.device.name if self._wanted.device else "our converter with droop, a stiff DC side"
-            lines.append(f"converter: {what}, at {p.bus}, holds the {p.v_pu:g} pu of the base; {dispatch}")
-            if self._wanted.device is None:
-                lines.append("POD: gains of the paper's system; `gfor design` finds those of this one")
+                dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
+            what = "ours, with the POD gains of the paper's system (`gfor design` finds others)" if ours else (
+                self._wanted.device or Path()).name  # fmt: skip
+            lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
         if "dyr" not in self._sources:
-            lines.append("machines: no dynamics data, so all are a typical steam turbine's with ST1 exciter and governor")
-        lines.append(f"models: {self._kind}; for EMT stray_B = {self._stray:g} pu{self._stray_why}")
+            lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
+        lines.append("loads: constant power, as in the file's own power flow; [network] load_model changes it")
+        lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
-        if questions:
-            lines[-1] += f"; {questions} questions about the data stand at their lines in the file"
-        return lines
-
-    @property
-    def _other(self) -> str:
-        return "emt" if self._kind == "phasor" else "phasor"
-
-    @property
-    def _fault_bus(self) -> str:
-        if self._place is not None:
-            return self._place.bus
-        network = self._base.network if self._base else None
-        if network is None:
-            return ""
-        largest = max(network.loads, key=lambda load: load.p_mw, default=None)
-        return largest.bus if largest is not None else network.buses[0]
+        return [
+            *lines,
+            f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file",
+        ]
 
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""
         try:
-            shown = os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)
+            return _quoted(Path(os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)).as_posix())
         except ValueError:  # on another drive
-            shown = str(path.absolute())
-        return _quoted(Path(shown).as_posix())
+            return _quoted(path.absolute().as_posix())
 
     def _head(self) -> list[str]:
         network = next(path for key, path in self._sources.items() if key != "dyr")
-        name = re.sub(r"\W+", "_", self._wanted.out.stem).strip("_") or "case"
-        where = f" with a converter at {self._place.bus}" if self._place else ""
-        both = [] if self._wanted.device is not None else [
-            f"models = {_quoted(self._kind)}{' ' * 12}# the same with the others: --set models={self._other}"
-        ]  # fmt: skip
+        other = "phasor" if self._wanted.kind == "emt" else "emt"
+        both = f'models = "{self._wanted.kind}"              # the same with the others: --set models={other}'
         return [
             f"# Written by: {self._wanted.command}",
-            "# Change what you like. What each key means: orchestrator/cases/README.md",
-            f"name = {_quoted(name)}",
-            f"title = {_quoted(network.name + where)}",
+            "# Change what you like. What the keys mean: orchestrator/cases/README.md",
+            f"name = {_quoted(re.sub(r'[^0-9A-Za-z_]+', '_', self._wanted.out.stem).strip('_') or 'case')}",
+            f"title = {_quoted(network.name + (f' with a converter at {self._place.bus}' if self._place else ''))}",
             f"source = {_quoted(', '.join(path.name for path in self._sources.values()))}",
-            *both,
+            *([both] if self._wanted.device is None else []),
         ]
 
     def _solver(self) -> list[str]:
-        devices = ["gfor.*"] if self._place else []
-        record = ["*.omega", "grid.*.v", *(["grid.line_*.p"] if self._has_lines else []), *devices]
-        lines = [
-            "[solver]",
-            f"step_size = {_quoted(_STEPS[self._kind])}",
-            'stop_time = "10 s"',
-            'record_interval = "10 ms"',
-            f"record = [{', '.join(map(_quoted, record))}]",
-        ]
+        lines = any(x.name.startswith("line_") for x in self._network.lines) if self._network else False
+        record = ["*.omega", "grid.*.v", *(["grid.line_*.p"] if lines else []), *(["gfor.*"] if self._place else [])]
+        own, of_kind = ["[solver]"], {"emt": (_EMT, self._stray), "phasor": (_PHASOR, 0.0)}
+        own += [f'step_size = "{of_kind[self._wanted.kind][0]}"', 'stop_time = "10 s"', 'record_interval = "10 ms"',
+                f"record = [{', '.join(map(_quoted, record))}]"]  # fmt: skip
         if self._wanted.device is None:
-            lines += ["", f"[{self._other}]{' ' * 20}# what these models take instead",
-                      f"step_size = {_quoted(_STEPS[self._other])}"]  # fmt: skip
-            stray = self._stray if self._other == "emt" else 0.0
-            lines.append(f"stray_B = {stray:g}{' ' * 10}# {_why_stray(stray, self._stray_why)}")
-        return [*lines, "", "[power_flow]", 'grid = "grid"', "", "[components.grid]",
-                f'model = "{"grid" if self._kind == "emt" else "phasor_grid"}"']  # fmt: skip
+            for kind in {"emt", "phasor"} - {self._wanted.kind}:
+                step, stray = of_kind[kind]
+                own += ["", f"[{kind}]                       # what --set models={kind} takes instead",
+                        f'step_size = "{step}"', f"stray_B = {stray:g}{self._why_stray(kind)}"]  # fmt: skip
+        return own
 
-    @property
-    def _has_lines(self) -> bool:
-        network = self._base.network if self._base else None
-        return network is not None and any(line.name.startswith("line_") for line in network.lines)
+    def _why_stray(self, kind: str) -> str:
+        return f"             # pu on 100 MVA{self._stray_why}" if kind == "emt" else "             # no bus needs any"
 
-    def _network(self) -> list[str]:
+    def _grid(self) -> list[str]:
         (key,) = (key for key in self._sources if key != "dyr")
-        lines = ["[network]", f"{key} = {self._path(self._sources[key])}"]
-        if key == "raw":
-            lines.append("keep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances")
-        lines.append('load_model = { active = "power", reactive = "power" }    # or "current", "impedance"')
-        if self._wanted.frequency:
-            lines.append(f"frequency = {_quoted(self._wanted.frequency)}")
-        if self._kind == "emt":
-            lines.append(f"stray_B = {self._stray:g}{' ' * 10}# {_why_stray(self._stray, self._stray_why)}")
-        if self._wanted.leave_out:
-            lines.append(f"leave_out = [{', '.join(map(_quoted, self._wanted.leave_out))}]")
-        return lines
+        w, kept = (
+            self._wanted,
+            "keep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances",
+        )
+        return [
+            "[power_flow]", 'grid = "grid"', "", "[components.grid]",
+            f'model = "{"grid" if w.kind == "emt" else "phasor_grid"}"', "",
+            "[network]", f"{key} = {self._path(self._sources[key])}", *([kept] if key == "raw" else []),
+            'load_model = { active = "power", reactive = "power" }    # or "current", "impedance"',
+            *([f"frequency = {_quoted(w.frequency)}"] if w.frequency else []),
+            *([f"stray_B = {self._stray:g}{self._why_stray('emt')}"] if w.kind == "emt" else []),
+            *([f"leave_out = [{', '.join(map(_quoted, w.leave_out))}]"] if w.leave_out else []),
+        ]  # fmt: skip
 
     def _units(self) -> list[str]:
-        suffix = "" if self._kind == "emt" else "_phasor"
-        dyr = self._sources.get("dyr")
-        lines = ["[units]", *([f"dyr = {self._path(dyr)}"] if dyr else [])]
-        if self._wanted.dyr_leave_out:
-            lines.append(f"dyr_leave_out = [{', '.join(map(_quoted, self._wanted.dyr_leave_out))}]")
-        machine = "synchronous_generator" if dyr else "synchronous_generator_st1"
-        lines += [
-            f'generator = "{machine}{suffix}"',
-            f'converter = "gfor{suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share',
-        ]
-        if not dyr:
-            lines.append("generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has them")
-        return lines
+        dyr, left = self._sources.get("dyr"), ", ".join(map(_quoted, self._wanted.dyr_leave_out))
+        no_transformer = (
+            "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
+        )
+        return [
+            "[units]", *([f"dyr = {self._path(dyr)}"] if dyr else [no_transformer]),
+            *([f"dyr_leave_out = [{left}]"] if left else []),
+            f'generator = "synchronous_generator{"" if dyr else "_st1"}{self._suffix}"',
+            f'converter = "gfor{self._suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share',
+        ]  # fmt: skip
 
     def _converter(self) -> list[str]:
         if self._place is None:
             return []
-        p, wanted = self._place, self._place.wanted
-        device = self._wanted.device
-        if device is None:
-            what = [f'model = "gfor{"" if self._kind == "emt" else "_phasor"}"']
-        else:
+        w, device = self._place.wanted, self._wanted.device
+        what = [f'model = "gfor{self._suffix}"']
+        if device is not None:
             what = [f"{'dll' if self._wanted.is_dll else 'fmu'} = {self._path(device)}"]
             what += [f"binding = {self._path(self._wanted.binding)}"] if self._wanted.binding else []
-        power = round(wanted.p_mw / wanted.rating_mva, 6)
-        values = f"S_n = {_quoted(f'{wanted.rating_mva:g} MVA')}, P_0 = {power:g}, v_0 = {p.v_pu:g}"
-        return [
-            "[components.gfor]",
-            *what,
-            f'bus = "{p.bus}"',
-            f"parameters = {{ {values} }}    # P_0 in parts of S_n: {wanted.p_mw:g} MW",
-        ]
+        values = f'S_n = "{w.rating_mva:g} MVA", P_0 = {w.p_mw / w.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
+        return ["[components.gfor]", *what, f'bus = "{self._place.bus}"',
+                f"parameters = {{ {values} }}    # P_0 in parts of S_n: {w.p_mw:g} MW"]  # fmt: skip
 
-    def _scenarios(self) -> list[str]:
-        base = ["[scenarios.base]", 'title = "As in the files"', *(['remove = ["gfor"]'] if self._place else [])]
+    def _scenarios(self) -> list[list[str]]:
+        found = [["[scenarios.base]", 'title = "As in the files"', *(['remove = ["gfor"]'] if self._place else [])]]
         if self._base is None:
-            return base
-        lines = [*base, ""]
-        changed = self._place.changed if self._place else {}
+            return found
         if self._place is not None:
-            lines += [*self._scenario("converter", "Converter", changed), ""]
-            if self._wanted.device is None:
-                for pod, title in (("pod_p", "Converter with POD-P"), ("pod_q", "Converter with POD-Q")):
-                    lines += [*self._scenario(pod, title, {**changed, f"gfor.{pod}.enabled": True}), ""]
-        lines += self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", changed)
-        event = f'{{ type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms" }}'
-        return [*lines, f"events = [{event}]    # a line that opens with it: cleared_by = {_quoted(self._example_line)}"]
+            found.append(self._scenario("converter", "Converter"))
+        if self._place is not None and self._wanted.device is None:
+            found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", {f"gfor.pod_{x}.enabled": "true"}) for x in "pq"]
+        fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
+        lines = [x.name for x in self._network.lines if not x.has_ratio] if self._network else []
+        near = [x.name for x in self._network.lines if self._fault_bus in (x.from_bus, x.to_bus)] if lines else []
+        example = next((name for name in near if name in lines), next(iter(lines), "line_1_2"))
+        events = f'events = [{{ {fault} }}]    # cleared_by = "{example}" would open that line with it'
+        return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}"), events]]
 
-    @property
-    def _example_line(self) -> str:
-        network = self._base.network if self._base else None
-        lines = network.lines if network else ()
-        near = [line.name for line in lines if self._fault_bus in (line.from_bus, line.to_bus) and not line.has_ratio]
-        return near[0] if near else lines[0].name if lines else "line_1_2"
+    def _scenario(self, name: str, title: str, more: Mapping[str, str] = MappingProxyType({})) -> list[str]:
+        values = ", ".join(f'"{key}" = {value}' for key, value in {**self._changed, **more}.items())
+        p = self._place
+        less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.less else ""
+        return [f"[scenarios.{name}]", f'title = "{title}"', *([f"set = {{ {values} }}{less}"] if values else [])]
 
-    def _scenario(self, name: str, title: str, values: dict[str, float | bool]) -> list[str]:
-        shown = ", ".join(f'"{key}" = {str(v).lower() if isinstance(v, bool) else v}' for key, v in values.items())
-        less = ""
-        if self._place and self._place.less:
-            less = f"    # {self._place.before_mw - self._place.wanted.p_mw:.5g} MW in place of {self._place.before_mw:.5g} MW"
-        return [f"[scenarios.{name}]", f"title = {_quoted(title)}", *([f"set = {{ {shown} }}{less}"] if values else [])]
-
-    def _analysis(self) -> list[str]:
-        if self._base is None or self._base.network is None:
+    def _plots(self) -> list[list[str]]:
+        if self._base is None or self._network is None:
             return []
         plans = self._base.system.components
-        machines = [name for name, plan in plans.items() if "omega" in plan.description.outputs][:_MOST_CURVES]
-        speeds = [f"{name}.omega" for name in machines]
-        lines = _plot("speeds", "Speeds", [(speeds, "Speed [pu]")]) if speeds else []
-        units = [port.bus for port in self._base.network.ports]
-        buses = [bus for bus in self._base.network.buses if bus not in units] or list(self._base.network.buses)
-        first = [self._fault_bus, *(bus for bus in buses if bus != self._fault_bus)][:_MOST_CURVES]
-        lines += _plot("voltages", "Voltages", [([f"grid.{bus}.v" for bus in first], "v [pu]")])
+        speeds = [f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs]
+        with_units = {port.bus for port in self._network.ports}
+        buses = [self._fault_bus, *(bus for bus in self._buses if bus not in {*with_units, self._fault_bus})]
+        found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
+        found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
         if self._place is not None:
-            panels = [(["gfor.p"], "p [pu]"), (["gfor.q"], "q [pu]")]
-            if self._wanted.device is None:
-                panels.append(([f"gfor.{_CURRENT[self._kind]}"], "Current / limit"))
-            lines += _plot("converter", "Converter", panels)
-        return lines[:-1]
+            current = f"gfor.{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
+            panels = [(["gfor.p"], "p [pu]"), (["gfor.q"], "q [pu]"), ([current], "Current / limit")]
+            found.append(_plot("converter", panels[: 3 if self._wanted.device is None else 2]))
+        return found
 
 
-def _plot(name: str, title: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
+def _plot(name: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
     def panel(signals: Sequence[str], label: str) -> str:
-        also = f", also = [{', '.join(map(_quoted, signals[1:]))}]" if signals[1:] else ""
+        also = f", also = [{', '.join(map(_quoted, signals[1:_MOST_CURVES]))}]" if signals[1:] else ""
         return f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},"
 
-    return ["[[plots]]", f'name = "{name}"', f"title = {_quoted(title)}", "panels = [",
-            *(panel(signals, label) for signals, label in panels), "]", ""]  # fmt: skip
+    return ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = [",
+            *(panel(signals, label) for signals, label in panels), "]"]  # fmt: skip
 
 
 def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
     """Capacitance [pu, 100 MVA] that EMT models need at buses without one, and why.
 
-    Unit and bus swing at ω_b/√(X''·B); their values meet once in a step H, so H·ω_b/√(X''·B) is kept at 1 or below for
-    the largest unit at a bus without capacitance.
+    Unit and bus swing at ω_b/√(X''·B), and exchange values once in a step H: H·ω_b/√(X''·B) ≤ 1 for the largest unit at
+    a bus without capacitance.
     """
     network, plans = base.network, base.system.components
     if network is None:
         return 0.05, ""
     charged = {bus for line in network.lines if line.B > 0 for bus in (line.from_bus, line.to_bus)}
     charged |= {shunt.bus for shunt in network.shunts if shunt.b_mvar > 0}
-    worst, name = 0.0, ""
+    needed: dict[str, float] = {}
     for port in (port for port in network.ports if port.name in plans and port.bus not in charged):
-        z = source_impedance(plans[port.name])
-        X = abs(z) if z is not None else 0.15 * SYSTEM_BASE_MVA / plans[port.name].number("S_n")
-        f_n = plans[port.name].number("f_n") if "f_n" in plans[port.name].description.variables else 50.0
-        needed = (2 * math.pi * f_n * _EMT_STEP) ** 2 / X
-        worst, name = max((worst, name), (needed, port.name))
-    if not name:
-        return 0.0, ": every bus of a unit has a capacitance of its own"
-    digits = 10 ** (math.floor(math.log10(worst)) - 1)
-    return math.ceil(worst / digits) * digits, f", for {name} at a bus without capacitance: (ω_b·H)²/X'' at 100 us"
-
-
-def _why_stray(stray: float, why: str) -> str:
-    return f"pu on 100 MVA{why}" if stray else "no bus needs any"
+        plan, z = plans[port.name], source_impedance(plans[port.name])
+        X = abs(z) if z is not None else 0.15 * SYSTEM_BASE_MVA / plan.number("S_n")
+        f_n = plan.number("f_n") if "f_n" in plan.description.variables else 50.0
+        needed[port.name] = (2 * math.pi * f_n * to_unit(_EMT, "s")) ** 2 / X
+    if not needed:
+        return 0.0, ", as every bus of a unit has a capacitance of its own"
+    name = max(needed, key=needed.__getitem__)
+    digits = 10 ** (math.floor(math.log10(needed[name])) - 1)
+    return math.ceil(needed[name] / digits) * digits, f", (ω_b·H)²/X'' of {name} at a bus without capacitance"
 
 
 def _quoted(text: str) -> str:
@@ -451,9 +410,9 @@ def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]
     above: dict[int, list[str]] = {}
     for question in questions:
         place = _line_of(question, lines, sources)
-        said = str(question)
-        said = said if len(said) <= _LONGEST_COMMENT else f"{said[: _LONGEST_COMMENT - 2].rstrip()} …"
-        above.setdefault(place, []).append(f"# question: {' '.join(said.split())}")
+        where = "" if question.place.startswith("line ") else f"{question.place}: "
+        above.setdefault(place, []).extend(textwrap.wrap(f"question: {where}{question.text}", 116, initial_indent="# ",
+                                                         subsequent_indent="#   ", break_long_words=False))  # fmt: skip
     return "\n".join(part for k, line in enumerate(lines) for part in [*above.get(k, []), line]) + "\n"
 
 

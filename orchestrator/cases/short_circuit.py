@@ -22,8 +22,8 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 
 CONVENTION = (
-    "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external grids "
-    "as their impedance; loads, shunts and charging left out; converters feed {:g} pu of their rating"
+    "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external "
+    "grids as their impedance; loads, shunts and charging left out; converters feed {:g} pu of their rating"
 )
 _FARTHEST = 1e5
 """Largest factor on the impedances at a bus, and the inverse of the smallest."""
@@ -127,9 +127,7 @@ class ShortCircuit:
 
     def power_at(self, bus: str, factor: float = 1.0) -> float:
         """Short-circuit power of a bus [MVA] with the impedances of all branches that end there times a factor."""
-        lines = [
-            replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x for x in self.lines
-        ]
+        lines = [replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x for x in self.lines]
         unit = np.zeros(len(self.buses), dtype=complex)
         unit[self.buses.index(bus)] = 1.0
         v = np.linalg.solve(replace(self, lines=tuple(lines))._admittances(), unit)

@@ -25,6 +25,7 @@ COMMANDS = {
     "export-comtrade": "write a run's signals as a COMTRADE recording for other tools",
     "export-dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
     "steps": "the largest communication step within a given error, for each schedule",
+    "scr": "short-circuit power of every bus, and SCR of the converters",
     "sweep": "modes over a grid of parameters, followed from point to point",
     "sensitivities": "how each parameter of each FMU moves a mode",
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
@@ -55,6 +56,8 @@ examples:
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
+  gfor sweep two_area --vary grid.X_L=0.1:3 --until unstable   how far it may grow
+  gfor scr my_case.toml                          how weak the grid is at each bus
   gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
   gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
   gfor interactions my_case.toml                 which vendors' converters do not agree with each other

@@ -18,8 +18,7 @@ _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files", nargs="*", type=Path, metavar="FILE",
-        help="the network: .raw (with .dyr), .m, .mat, pandapower's .json, or a CGMES model; without any, questions are "
-        "asked",
+        help="the network: .raw (with .dyr), .m, .mat, pandapower's .json, a CGMES model; without any, gfor asks",
     )  # fmt: skip
     parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
     device = parser.add_mutually_exclusive_group()
@@ -59,13 +58,17 @@ def run(options: argparse.Namespace) -> int:
 def _wanted(options: argparse.Namespace) -> WantedCase:
     device = options.fmu or options.dll
     if (device or options.binding) and options.converter is None:
-        raise InputError("--fmu, --dll and --binding are for a converter; say where by --converter 'bus 9, 300 MVA, 200 MW'")
+        raise InputError(
+            "--fmu, --dll and --binding are for a converter; say where by --converter 'bus 9, 300 MVA, 200 MW'"
+        )
     if options.binding is not None and options.fmu is None:
         raise InputError("--binding says what an FMU's variables mean; give it with --fmu")
     for path in (path for path in (device, options.binding) if path is not None and not path.is_file()):
         raise InputError(f"{path}: there is no such file")
     if device is not None and options.models == "phasor":
-        raise InputError(f"{device}: a vendor's file meets the network by its currents, as EMT models do; leave out --models")
+        raise InputError(
+            f"{device}: a vendor's file meets the network by its currents, as EMT models do; leave out --models"
+        )
     out = options.out or Path(f"{options.files[0].stem}.toml")
     if out.suffix.lower() != ".toml":
         raise InputError(f"--out {out}: a case file ends in .toml")
@@ -108,4 +111,3 @@ def _ask(options: argparse.Namespace) -> None:
 
 def _with_unit(answer: str, unit: str) -> str:
     return f"{answer} {unit}" if answer.replace(".", "", 1).isdigit() else answer
-

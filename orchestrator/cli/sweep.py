@@ -17,6 +17,7 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
+from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -30,12 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vary",
         action="append",
-        required=True,
+        default=[],
         type=_vary,
         metavar="COMPONENT.PARAMETER=START:STOP:COUNT",
         help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
         "last one); several together: 'grid.X_a,grid.X_b=…', 'grid.X_line_7_*=…', 'line_7_9,line_8_9: length=1:4:7'",
     )
+    parser.add_argument("--scr", action="append", dest="vary", type=_scr, metavar="BUS=START:STOP:COUNT", help="SCR of "
+                        "the converters at a bus, or its short-circuit power ('bus_9=3000 MVA:800 MVA:5'): R and X of "
+                        "all branches that end there are multiplied")  # fmt: skip
     parser.add_argument(
         "--until",
         metavar="unstable|PERCENT",
@@ -58,6 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if no point has modes."""
+    if not options.vary:
+        raise InputError("nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5")
     executor = choose_executor(options, WORKERS_IMPORT)
     case = load_case(options.case, trust_fmus=options.trust_fmus)
     folder = options.out or Path("results") / f"{case.name}_sweep"
@@ -105,6 +111,11 @@ def _present(sweep: ParameterSweep, folder: Path, console: Console, *, as_json: 
         words = f"{result.computed} points computed{stored}. Results in {folder}: {files}"
         console.print(escape(words), soft_wrap=True)
     return 0 if any(s.trajectories for s in result.scenarios) else 1
+
+
+def _scr(text: str) -> Vary:
+    bus, equals, values = text.partition("=")
+    return _vary(f"{bus}: scr{equals}{values}")
 
 
 def _vary(text: str) -> Vary:

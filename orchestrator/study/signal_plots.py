@@ -26,7 +26,9 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
         for axis, panel in zip(axes, table.panels, strict=True):
             several = len(results) == 1 and bool(panel.also)
             for k, expression in enumerate((panel.signal, *panel.also)):
-                draw_signal(axis, results, expression, panel.scale, k if several else 0, expression if several else None)
+                draw_signal(
+                    axis, results, expression, panel.scale, k if several else 0, expression if several else None
+                )
             if several and axis.lines:
                 axis.legend(loc="best", fontsize="x-small")
             axis.set_ylabel(panel.label)
@@ -46,7 +48,12 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
 
 
 def draw_signal(
-    axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0, label: str | None = None
+    axis: Any,
+    results: Sequence[RunResult],
+    expression: str,
+    scale: float = 1.0,
+    first: int = 0,
+    label: str | None = None,
 ) -> None:
     """One signal of all runs that recorded it; dashed, the linear model's response where there is one.
 

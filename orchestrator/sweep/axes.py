@@ -4,8 +4,9 @@ import fnmatch
 import itertools
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from orchestrator.cases.imperfection_tables import number_info, sets_imperfectio
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.short_circuit import ShortCircuit
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import VariableInfo
@@ -22,7 +24,7 @@ from orchestrator.units import read_value, to_unit
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
 _KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
 """One name ``component.parameter`` or several; each may be a pattern."""
-_LENGTH = "length"
+_LENGTH, _SCR = "length", "scr"
 _MOST = 100_000
 _ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")
 
@@ -63,6 +65,8 @@ class Axis:
         Values between two of them are rounded to multiples of this; None where any value will do.
     members
         What is set together, each with the factor on the value; the key alone where empty.
+    scale
+        What a value comes to before that factor; itself where None.
     """
 
     key: str
@@ -72,12 +76,14 @@ class Axis:
     logarithmic: bool = False
     multiple_of: float | None = None
     members: tuple[tuple[str, float], ...] = ()
+    scale: Callable[[float], float] | None = None
 
     def sets(self, value: Value) -> dict[str, Value]:
         """What one of the values comes to, by ``component.variable``."""
         if not self.members:
             return {self.key: value}
-        return {key: value if factor == 1 else factor * float(value) for key, factor in self.members}
+        scaled = value if self.scale is None else self.scale(float(value))
+        return {key: scaled if factor == 1 else factor * float(scaled) for key, factor in self.members}
 
 
 def parse_vary(text: str) -> Vary:
@@ -173,8 +179,13 @@ def _joint_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
 def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     """The length of lines, as a factor on what each has: R, X and charging grow together."""
     names, _, quantity = (part.strip() for part in vary.key.rpartition(":"))
+    if quantity == _SCR:
+        return _scr_axis(vary, names, scenarios)
     if quantity != _LENGTH:
-        raise InputError(f"--vary {vary.key}: {quantity!r} is not known; of lines the {_LENGTH} can be multiplied")
+        raise InputError(
+            f"--vary {vary.key}: {quantity!r} is not known; of lines the {_LENGTH} can be multiplied, at a bus the "
+            f"{_SCR} be set"
+        )
     one = scenarios[0]
     lines = {x.name: x for x in one.network.lines if not x.has_ratio} if one.network else {}
     members: dict[str, float] = {}
@@ -190,6 +201,40 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     return replace(_axis(vary, info), members=tuple(members.items()))
 
 
+def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Axis:
+    """The short-circuit ratio at a bus, or its short-circuit power: R, X and X_C of all branches that end there are
+    multiplied.
+    """
+    one = scenarios[0]
+    try:
+        found = ShortCircuit.of(one)
+        bus = found.known(bus)
+        if one.network and any(bus in x.buses for x in one.network.transformers):
+            raise InputError(f"{bus} has a transformer of three windings, which is not scaled; choose another bus")
+        in_mva = any(isinstance(value, str) for value in vary.limits or vary.values)
+        ratings = [sum(S for at, S in ShortCircuit.of(s).converters.values() if at == bus) for s in scenarios]
+        if not in_mva and not max(ratings):
+            raise InputError(f"no converter stands at {bus}, whose rating an SCR is of; give the short-circuit power, "
+                             f"such as '{bus}=3000 MVA:800 MVA:5'")  # fmt: skip
+        members: dict[str, float] = {}
+        for line in one.network.lines if one.network else ():
+            for quantity in ("X", "R", "X_C")[: 3 if line.X_C else 2] if bus in (line.from_bus, line.to_bus) else ():
+                members |= _of_line(vary, scenarios, line.variable(quantity))
+        info = VariableInfo(_SCR, 0, "Real", "parameter", "fixed", "MVA" if in_mva else "", None, 1e-3, None, vary.key)
+        axis = _axis(vary, info)
+        unit = 1.0 if in_mva else max(ratings)
+        scale = partial(_factor, found, bus, unit)
+        for value in axis.values:
+            scale(float(value))  # one that cannot be had is refused before anything is computed
+    except InputError as error:
+        raise InputError(f"--scr {error}") from error
+    return replace(axis, members=tuple(members.items()), scale=scale)
+
+
+def _factor(network: ShortCircuit, bus: str, unit: float, value: float) -> float:
+    return network.factor_for(bus, value * unit)
+
+
 def _of_line(vary: Vary, scenarios: Sequence[PreparedScenario], variable: str) -> dict[str, float]:
     """A value of a line, which all scenarios have."""
     grid = scenarios[0].grid
@@ -202,7 +247,7 @@ def _of_line(vary: Vary, scenarios: Sequence[PreparedScenario], variable: str) -
 def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) -> None:
     """Refuse two axes that vary one variable."""
     names = [*dict.fromkeys(name for s in scenarios for name in s.system.components)]
-    single = [replace(axis, key=key) for axis in axes for key in axis.sets(0.0)]
+    single = [replace(axis, key=key) for axis in axes for key, _ in axis.members or ((axis.key, 1.0),)]
     for one, other in itertools.combinations(single, 2):
         (pattern, _, variable), (second, _, same) = one.key.partition("."), other.key.partition(".")
         if variable != same:

@@ -125,13 +125,13 @@ class ParameterLimit:
     mode, who
         The mode behind it, and who takes part.
     tried
-        Values of the coarse grid, each with its kind, its least damping [%] and its largest growth rate [1/s].
+        Values of the coarse grid: what each comes to, least damping [%], largest growth rate [1/s].
     again
         Values of it beyond the limit that hold again.
     why
         The failure's text, or what the verdict is not known for.
-    whole, worst_at
-        The range, and where in it, of the coarse grid, the least damped mode is.
+    worst_at
+        Where the least damped mode of the coarse grid is.
     """
 
     key: str
@@ -142,13 +142,12 @@ class ParameterLimit:
     kind: Ending
     holds_at: float | None
     beyond: float | None
-    mode: dict[str, Any] | None = None
-    who: str = ""
-    tried: tuple[dict[str, Any], ...] = ()
-    again: tuple[float, ...] = ()
-    why: str = ""
-    whole: tuple[float, float] = (0.0, 0.0)
-    worst_at: float | None = None
+    mode: dict[str, Any] | None
+    who: str
+    tried: tuple[dict[str, Any], ...]
+    again: tuple[float, ...]
+    why: str
+    worst_at: float
 
     @property
     def limit(self) -> float | None:
@@ -158,96 +157,70 @@ class ParameterLimit:
     @property
     def sentence(self) -> str:
         """The answer, with the figures of both sides."""
-        start, stop = (self._value(value) for value in self.whole)
-        mode = f": {self._mode()}" if self.mode else ""
+        start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
+        mode, why = f": {self._mode(self.mode)}" if self.mode else "", f": {self.why}" if self.why else ""
+        at, holding = self._value(self.beyond), self.until.holding
         if self.kind is Ending.HOLDS:
             worst = f"; least damped at {self._value(self.worst_at)}{mode}"
-            return f"{self.until.holding} over the whole range, {self.key} from {start} to {stop}{worst}"
-        at = self._value(self.beyond)
+            return f"{holding} over the whole range, {self.key} from {start} to {stop}{worst}"
+        what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
-            what = {Ending.FAILS: f"{self.until.failing} already at the start", Ending.NO_POINT: "no operating point at the"
-                    " start", Ending.NOT_KNOWN: "not known already at the start"}[self.kind]  # fmt: skip
-            return f"{what}, {self.key} = {at}{mode}{self._why}"
-        up_to = f"{self.until.holding} up to {self.key} = {self._value(self.holds_at)}"
+            return f"{what} already at the start, {self.key} = {at}{mode}{why}"
+        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}"
         if self.kind is Ending.FAILS:
-            return f"{up_to}, {self.until.failing} at {at}{mode}"
-        what = "no operating point" if self.kind is Ending.NO_POINT else "no verdict"
-        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{self._why}"
+            return f"{up_to}, {what} at {at}{mode}"
+        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{why}"
 
     @property
     def remarks(self) -> list[str]:
         """What else is to be known."""
-        texts = []
-        if self.again:
-            shown = ", ".join(self._value(value) for value in self.again)
-            texts.append(f"{self.title}: {self.until.holding} again at {shown}: the range is not of one piece")
-        texts.append(
+        shown = ", ".join(self._value(value) for value in self.again)
+        again = [f"{self.title}: {self.until.holding} again at {shown}: the range is not of one piece"]
+        return again * bool(self.again) + [
             f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower piece between two of "
             "them that does not hold would not be seen: COUNT in --vary tries more"
-        )
-        return texts
-
-    @property
-    def _why(self) -> str:
-        return f": {self.why}" if self.why else ""
+        ]
 
     def _value(self, value: float | None) -> str:
         return f"{value:.5g} {self.unit}".rstrip() if value is not None else "–"
 
-    def _mode(self) -> str:
-        mode = self.mode or {}
-        hertz = mode["frequency_hz"]
-        named = f"{mode['name']!r}, " if mode["name"] else ""
+    def _mode(self, mode: dict[str, Any]) -> str:
+        named, hertz = f"{mode['name']!r}, " if mode["name"] else "", mode["frequency_hz"]
         where = f"{hertz:.3f} Hz, {mode['damping_percent']:.2f} %" if hertz else f"{mode['real']:+.3g} 1/s, no swing"
         return f"{named}{where} ({self.who})"
 
     def as_json(self) -> dict[str, Any]:
-        """The answer as JSON's types."""
         return {
-            "scenario": self.scenario,
-            "parameter": self.key,
-            "unit": self.unit,
+            "scenario": self.scenario, "parameter": self.key, "unit": self.unit,
             "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
-            "limit": self.limit,
-            "reason": None if self.limit is not None else self.sentence,
-            "holds_at": self.holds_at,
-            "beyond": self.beyond,
-            "ends_with": str(self.kind),
-            "mode": self.mode,
-            "holds_again_at": list(self.again),
-            "tried": list(self.tried),
-            "sentence": self.sentence,
-        }
+            "limit": self.limit, "reason": None if self.limit is not None else self.sentence,
+            "holds_at": self.holds_at, "beyond": self.beyond, "ends_with": str(self.kind), "mode": self.mode,
+            "holds_again_at": list(self.again), "tried": list(self.tried), "sentence": self.sentence,
+        }  # fmt: skip
 
 
-def mode_behind(record: PointRecord, until: Until, speeds: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
+def mode_behind(record: PointRecord, speeds: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
     """The mode that decides on a point, and who takes part in it.
 
     Of an unstable point this is the one that grows fastest, at any frequency; else the least damped one of the range.
     """
     modes, verdict = record.modes, record.stability
-    rate, hertz = verdict.get("largest_growth_rate"), verdict.get("frequency_hz")
-    if modes is None:
+    grows = verdict.get("stable") is False
+    if modes is None or not (grows or len(modes.eigenvalues)):
         return None, ""
-    values = modes.eigenvalues
-    if verdict.get("stable") is False and rate is not None:
-        value = complex(rate, 2 * np.pi * (hertz or 0.0))  # of the system where the step map alone is stable
-        near = np.abs(values - value)
-        place = int(near.argmin()) if len(near) else 0
-        if not len(near) or near[place] > _SAME * abs(
-            value
-        ):  # outside of the range, where the verdict knows its states
-            shares: dict[str, float] = {}
-            for entry in verdict["participation"]:
-                component = entry["state"].partition(".")[0]
-                shares[component] = shares.get(component, 0.0) + entry["factor"]
-            who = ", ".join(e["state"] for e in verdict["participation"][:_PARTS])
-            return _mode_json("", value, shares), who
-    elif not len(values):
-        return None, ""
+    if grows:
+        value = complex(verdict["largest_growth_rate"], 2 * np.pi * verdict["frequency_hz"])
+        near = np.abs(modes.eigenvalues - value)  # the step map may be stable where the system is not
+        place = int(near.argmin()) if len(near) and near.min() <= _SAME * abs(value) else None
     else:
-        place = min(range(len(values)), key=lambda k: damping_percent(complex(values[k])))
-        value = complex(values[place])
+        place = min(range(len(modes.eigenvalues)), key=lambda k: damping_percent(complex(modes.eigenvalues[k])))
+        value = complex(modes.eigenvalues[place])
+    if place is None:  # outside of the range: the verdict knows the states
+        shares: dict[str, float] = {}
+        for entry in verdict["participation"]:
+            component = entry["state"].partition(".")[0]
+            shares[component] = shares.get(component, 0.0) + entry["factor"]
+        return _mode_json("", value, shares), ", ".join(e["state"] for e in verdict["participation"][:_PARTS])
     mode = make_mode(value, modes.left[place], modes.right[place], modes.names)
     name = next((name for name, k in record.named.items() if k == place), "")
     return _mode_json(name, value, mode.by_component), _who(mode, speeds)

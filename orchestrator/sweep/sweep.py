@@ -303,7 +303,7 @@ def _limit(
     end = Ending.HOLDS if found.beyond is None else kind_at(found.beyond)
     worst = min(range(count), key=lambda k: _margin(sweep.points[(k,)]))
     shown = sweep.points[(float(worst) if found.beyond is None else found.beyond,)]
-    mode, who = mode_behind(shown, until, plan.case.table.analysis.swing)
+    mode, who = mode_behind(shown, plan.case.table.analysis.swing)
     value = {place: float(_value_at(axis, place)) for place in (found.holds, found.beyond) if place is not None}
     tried = [
         {"value": float(axis.values[k]), "kind": str(kinds[k]), "damping_percent": least_damping(sweep.points[(k,)]),
@@ -316,7 +316,7 @@ def _limit(
         None if found.holds is None else value[found.holds], None if found.beyond is None else value[found.beyond],
         mode, who, tuple(tried), tuple(float(axis.values[k]) for k in found.again),
         shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else ""),
-        (float(axis.values[0]), float(axis.values[-1])), float(axis.values[worst]),
+        float(axis.values[worst]),
     )  # fmt: skip
 
 

@@ -1,0 +1,43 @@
+"""``gfor scr``: short-circuit power of every bus, and the short-circuit ratio of the converters there."""
+
+import argparse
+import json
+
+from rich.markup import escape
+
+from orchestrator.cases.short_circuit import CONVENTION, weakest_first
+from orchestrator.cli.arguments import positive
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.cli.terminal import make_console
+from orchestrator.report.tables import make_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+    parser.add_argument("--rating", type=positive, metavar="MVA", help="SCR of every bus for a converter of so much "
+                        "(default: at the converters' buses, for theirs)")  # fmt: skip
+    parser.add_argument("--converter-current", type=positive, default=0.0, metavar="PU", help="that a converter feeds "
+                        "into a short circuit, of its rating (default: none)")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute from the power flow's network, and print the weakest bus first."""
+    convention, console = CONVENTION.format(options.converter_current), make_console()
+    found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
+    if options.json:
+        told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
+        print(json.dumps({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told},
+                         indent=1, ensure_ascii=False))  # fmt: skip
+        return 0
+    for scenario, buses in found.items():
+        table = make_table(scenario.title, "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters")
+        for x in buses:
+            figures = [
+                "–" if v is None else f"{v:{form}}"
+                for v, form in ((x.scr, ".2f"), (x.rating_mva, ".5g"), (x.x_r, ".1f"))
+            ]
+            table.add_row(x.bus, f"{x.s_sc_mva:.0f}", *figures, ", ".join(x.converters))
+        console.print(table, "")
+    console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
+    return 0
