@@ -5,10 +5,9 @@ import os
 import re
 import textwrap
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.case import Case, case_of_text
@@ -20,7 +19,7 @@ from orchestrator.errors import InputError, Problem
 from orchestrator.units import to_unit
 
 _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
-_EMT, _PHASOR = "100 us", "2 ms"
+_EMT_STEP = 1e-4
 _MOST_CURVES = 12
 
 
@@ -36,18 +35,8 @@ class WantedConverter:
 
 @dataclass(frozen=True)
 class WantedCase:
-    """What `gfor new` is asked for.
-
-    Attributes
-    ----------
-    files
-        Network, and perhaps dynamics data.
-    device, binding, is_dll
-        A vendor's file in place of our converter.
-    models
-        ``emt`` or ``phasor``; None chooses.
-    command
-        As it was typed, for the first line of the file.
+    """What `gfor new` is asked for: a vendor's ``device`` stands in place of our converter, ``models`` (emt, phasor) is
+    chosen where None, ``command`` is as it was typed.
     """
 
     files: tuple[Path, ...]
@@ -118,7 +107,7 @@ def write_case(wanted: WantedCase) -> NewCase:
     InputError
         If a file, a bus or a machine cannot be used; as a case of these files would be refused.
     """
-    sources = _sources(wanted.files)
+    sources = sources_of(wanted.files)
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
     place = None if wanted.converter is None else _placed(wanted.converter, base)
     draft = _Text(wanted, sources, base, place)
@@ -133,7 +122,7 @@ def _prepared(text: str, wanted: WantedCase, names: Sequence[str]) -> list[Prepa
     return case.prepare(names)
 
 
-def _sources(files: Sequence[Path]) -> dict[str, Path]:
+def sources_of(files: Sequence[Path]) -> dict[str, Path]:
     """Key of the case file that names it → file."""
     found: dict[str, Path] = {}
     for path in files:
@@ -205,54 +194,69 @@ def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
     return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
 
 
+_TEMPLATE = """\
+# Written by: {command}
+# Change what you like. What the keys mean: orchestrator/cases/README.md
+name = {name}
+title = {title}
+source = {source}
+{models}
+[solver]
+step_size = "{step}"
+stop_time = "10 s"
+record_interval = "10 ms"
+record = ["*.omega", "grid.*.v"{record}]
+{other}
+[power_flow]
+grid = "grid"
+
+[components.grid]
+model = "{grid}"
+
+[network]
+{network}
+load_model = {{ active = "power", reactive = "power" }}    # or "current", "impedance"
+{more}
+[units]
+{units}
+generator = "synchronous_generator{generator}{suffix}"
+converter = "gfor{suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share
+{converter}
+{scenarios}"""
+
+
 class _Text:
-    """The lines of a case, without and with what the network's first power flow says."""
+    """The text of a case, without and with what the network's first power flow says."""
 
     def __init__(
-        self,
-        wanted: WantedCase,
-        sources: dict[str, Path],
-        base: PreparedScenario | None = None,
+        self, wanted: WantedCase, sources: dict[str, Path], base: PreparedScenario | None = None,
         place: _Place | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
-        self._suffix = "" if wanted.kind == "emt" else "_phasor"
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
-        self._changed = place.changed if place else {}
-        loads = self._network.loads if self._network else ()
-        largest = max(loads, key=lambda load: load.p_mw, default=None)
-        self._fault_bus = place.bus if place else largest.bus if largest else next(iter(self._buses), "")
-
-    @property
-    def _buses(self) -> tuple[str, ...]:
-        return self._network.buses if self._network else ()
-
-    @property
-    def text(self) -> str:
-        blocks = [self._head(), self._solver(), self._grid(), self._units(), self._converter(), *self._scenarios()]
-        return "\n".join("\n".join([*block, ""]) for block in [*blocks, *self._plots()] if block)
+        largest = max(self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None)
+        buses = self._network.buses if self._network else ("",)
+        self._fault_bus = place.bus if place else largest.bus if largest else buses[0]
 
     def assumed(self, questions: int) -> list[str]:
         """What was assumed, a line each."""
-        ours, lines = self._wanted.device is None, []
+        lines, device = [], self._wanted.device
         if self._place is not None:
             p, w = self._place, self._place.wanted
             dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
             if p.less:
                 dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
-            what = "ours, with the POD gains of the paper's system (`gfor design` finds others)" if ours else (
-                self._wanted.device or Path()).name  # fmt: skip
+            ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
+            what = ours if device is None else device.name
             lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
         if "dyr" not in self._sources:
             lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
         lines.append("loads: constant power, as in the file's own power flow; [network] load_model changes it")
         lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
-        return [
-            *lines,
-            f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file",
-        ]
+        asked = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
+        return [*lines, asked] if questions else lines
 
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""
@@ -261,95 +265,78 @@ class _Text:
         except ValueError:  # on another drive
             return _quoted(path.absolute().as_posix())
 
-    def _head(self) -> list[str]:
-        network = next(path for key, path in self._sources.items() if key != "dyr")
-        other = "phasor" if self._wanted.kind == "emt" else "emt"
-        both = f'models = "{self._wanted.kind}"              # the same with the others: --set models={other}'
-        return [
-            f"# Written by: {self._wanted.command}",
-            "# Change what you like. What the keys mean: orchestrator/cases/README.md",
-            f"name = {_quoted(re.sub(r'[^0-9A-Za-z_]+', '_', self._wanted.out.stem).strip('_') or 'case')}",
-            f"title = {_quoted(network.name + (f' with a converter at {self._place.bus}' if self._place else ''))}",
-            f"source = {_quoted(', '.join(path.name for path in self._sources.values()))}",
-            *([both] if self._wanted.device is None else []),
-        ]
-
-    def _solver(self) -> list[str]:
-        lines = any(x.name.startswith("line_") for x in self._network.lines) if self._network else False
-        record = ["*.omega", "grid.*.v", *(["grid.line_*.p"] if lines else []), *(["gfor.*"] if self._place else [])]
-        own, of_kind = ["[solver]"], {"emt": (_EMT, self._stray), "phasor": (_PHASOR, 0.0)}
-        own += [f'step_size = "{of_kind[self._wanted.kind][0]}"', 'stop_time = "10 s"', 'record_interval = "10 ms"',
-                f"record = [{', '.join(map(_quoted, record))}]"]  # fmt: skip
-        if self._wanted.device is None:
-            for kind in {"emt", "phasor"} - {self._wanted.kind}:
-                step, stray = of_kind[kind]
-                own += ["", f"[{kind}]                       # what --set models={kind} takes instead",
-                        f'step_size = "{step}"', f"stray_B = {stray:g}{self._why_stray(kind)}"]  # fmt: skip
-        return own
-
-    def _why_stray(self, kind: str) -> str:
-        return f"             # pu on 100 MVA{self._stray_why}" if kind == "emt" else "             # no bus needs any"
-
-    def _grid(self) -> list[str]:
+    @property
+    def text(self) -> str:
+        w, place = self._wanted, self._place
         (key,) = (key for key in self._sources if key != "dyr")
-        w, kept = (
-            self._wanted,
-            "keep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances",
-        )
-        return [
-            "[power_flow]", 'grid = "grid"', "", "[components.grid]",
-            f'model = "{"grid" if w.kind == "emt" else "phasor_grid"}"', "",
-            "[network]", f"{key} = {self._path(self._sources[key])}", *([kept] if key == "raw" else []),
-            'load_model = { active = "power", reactive = "power" }    # or "current", "impedance"',
-            *([f"frequency = {_quoted(w.frequency)}"] if w.frequency else []),
-            *([f"stray_B = {self._stray:g}{self._why_stray('emt')}"] if w.kind == "emt" else []),
-            *([f"leave_out = [{', '.join(map(_quoted, w.leave_out))}]"] if w.leave_out else []),
-        ]  # fmt: skip
+        kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
+        steps = {"emt": "100 us", "phasor": "2 ms"}
+        stray = {"emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
+                 "phasor": "stray_B = 0                 # no bus needs any\n"}  # fmt: skip
+        both = f'models = "{kind}"           # the same with the others: --set models={other}\n'
+        rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
+        rest += f'step_size = "{steps[other]}"\n'
+        kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
+        dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
+        dyr = f"dyr = {self._path(self._sources['dyr'])}" if "dyr" in self._sources else dyr
+        lines = self._network is not None and any(x.name.startswith("line_") for x in self._network.lines)
+        return _TEMPLATE.format(
+            command=w.command,
+            name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
+            title=_quoted(self._sources[key].name + (f" with a converter at {place.bus}" if place else "")),
+            source=_quoted(", ".join(path.name for path in self._sources.values())),
+            models=both if w.device is None else "",
+            step=steps[kind],
+            record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
+            other=rest + stray[other] if w.device is None else "",
+            grid="grid" if kind == "emt" else "phasor_grid",
+            network=f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")
+            + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
+            units=dyr + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
+            generator="" if "dyr" in self._sources else "_st1",
+            suffix="" if kind == "emt" else "_phasor",
+            converter=self._converter(),
+            scenarios="\n".join("\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]),
+        )  # fmt: skip
 
-    def _units(self) -> list[str]:
-        dyr, left = self._sources.get("dyr"), ", ".join(map(_quoted, self._wanted.dyr_leave_out))
-        no_transformer = (
-            "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
-        )
-        return [
-            "[units]", *([f"dyr = {self._path(dyr)}"] if dyr else [no_transformer]),
-            *([f"dyr_leave_out = [{left}]"] if left else []),
-            f'generator = "synchronous_generator{"" if dyr else "_st1"}{self._suffix}"',
-            f'converter = "gfor{self._suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share',
-        ]  # fmt: skip
-
-    def _converter(self) -> list[str]:
+    def _converter(self) -> str:
         if self._place is None:
-            return []
-        w, device = self._place.wanted, self._wanted.device
-        what = [f'model = "gfor{self._suffix}"']
+            return ""
+        w, device, place = self._wanted, self._wanted.device, self._place.wanted
+        what = 'model = "gfor"' if w.kind == "emt" else 'model = "gfor_phasor"'
         if device is not None:
-            what = [f"{'dll' if self._wanted.is_dll else 'fmu'} = {self._path(device)}"]
-            what += [f"binding = {self._path(self._wanted.binding)}"] if self._wanted.binding else []
-        values = f'S_n = "{w.rating_mva:g} MVA", P_0 = {w.p_mw / w.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
-        return ["[components.gfor]", *what, f'bus = "{self._place.bus}"',
-                f"parameters = {{ {values} }}    # P_0 in parts of S_n: {w.p_mw:g} MW"]  # fmt: skip
+            what = f"{'dll' if w.is_dll else 'fmu'} = {self._path(device)}"
+            what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
+        values = (
+            f'S_n = "{place.rating_mva:g} MVA", P_0 = {place.p_mw / place.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
+        )
+        return (
+            f'\n[components.gfor]\n{what}\nbus = "{self._place.bus}"\n'
+            f"parameters = {{ {values} }}    # P_0 in parts of S_n: {place.p_mw:g} MW\n"
+        )
 
     def _scenarios(self) -> list[list[str]]:
         found = [["[scenarios.base]", 'title = "As in the files"', *(['remove = ["gfor"]'] if self._place else [])]]
-        if self._base is None:
+        if self._base is None or self._network is None:
             return found
         if self._place is not None:
             found.append(self._scenario("converter", "Converter"))
-        if self._place is not None and self._wanted.device is None:
-            found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", {f"gfor.pod_{x}.enabled": "true"}) for x in "pq"]
+            if self._wanted.device is None:
+                found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in "pq"]
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
-        lines = [x.name for x in self._network.lines if not x.has_ratio] if self._network else []
-        near = [x.name for x in self._network.lines if self._fault_bus in (x.from_bus, x.to_bus)] if lines else []
-        example = next((name for name in near if name in lines), next(iter(lines), "line_1_2"))
-        events = f'events = [{{ {fault} }}]    # cleared_by = "{example}" would open that line with it'
+        lines = sorted(self._network.lines, key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)))
+        opening = f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
+        events = f"events = [{{ {fault} }}]{opening}"
         return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}"), events]]
 
-    def _scenario(self, name: str, title: str, more: Mapping[str, str] = MappingProxyType({})) -> list[str]:
-        values = ", ".join(f'"{key}" = {value}' for key, value in {**self._changed, **more}.items())
+    def _scenario(self, name: str, title: str, enabled: str = "") -> list[str]:
         p = self._place
+        values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
+        values += [f'"{enabled}" = true'] if enabled else []
         less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.less else ""
-        return [f"[scenarios.{name}]", f'title = "{title}"', *([f"set = {{ {values} }}{less}"] if values else [])]
+        settings = [f"set = {{ {', '.join(values)} }}{less}"] if values else []
+        return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
 
     def _plots(self) -> list[list[str]]:
         if self._base is None or self._network is None:
@@ -357,7 +344,7 @@ class _Text:
         plans = self._base.system.components
         speeds = [f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs]
         with_units = {port.bus for port in self._network.ports}
-        buses = [self._fault_bus, *(bus for bus in self._buses if bus not in {*with_units, self._fault_bus})]
+        buses = [self._fault_bus, *(x for x in self._network.buses if x not in {*with_units, self._fault_bus})]
         found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
         found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
         if self._place is not None:
@@ -368,12 +355,15 @@ class _Text:
 
 
 def _plot(name: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
-    def panel(signals: Sequence[str], label: str) -> str:
-        also = f", also = [{', '.join(map(_quoted, signals[1:_MOST_CURVES]))}]" if signals[1:] else ""
-        return f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},"
+    lines = ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = ["]
+    for signals, label in panels:
+        also = f", also = {_listed(signals[1:_MOST_CURVES])}" if signals[1:] else ""
+        lines.append(f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},")
+    return [*lines, "]"]
 
-    return ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = [",
-            *(panel(signals, label) for signals, label in panels), "]"]  # fmt: skip
+
+def _listed(names: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quoted, names))}]"
 
 
 def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
@@ -392,7 +382,7 @@ def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
         plan, z = plans[port.name], source_impedance(plans[port.name])
         X = abs(z) if z is not None else 0.15 * SYSTEM_BASE_MVA / plan.number("S_n")
         f_n = plan.number("f_n") if "f_n" in plan.description.variables else 50.0
-        needed[port.name] = (2 * math.pi * f_n * to_unit(_EMT, "s")) ** 2 / X
+        needed[port.name] = (2 * math.pi * f_n * _EMT_STEP) ** 2 / X
     if not needed:
         return 0.0, ", as every bus of a unit has a capacitance of its own"
     name = max(needed, key=needed.__getitem__)

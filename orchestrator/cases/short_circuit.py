@@ -8,7 +8,7 @@ others' without regard to its angle, as converters do in IEC 60909-0:2016.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,26 +48,13 @@ class BusStrength:
         return self.s_sc_mva / self.rating_mva if self.rating_mva else None
 
     def as_json(self) -> dict[str, Any]:
-        return {
-            "bus": self.bus,
-            "s_sc_mva": self.s_sc_mva,
-            "x_r": self.x_r,
-            "scr": self.scr,
-            "rating_mva": self.rating_mva,
-            "converters": list(self.converters),
-        }
+        return {**asdict(self), "scr": self.scr}
 
 
 @dataclass(frozen=True)
 class ShortCircuit:
-    """A network as a short circuit sees it.
-
-    Attributes
-    ----------
-    sources
-        Admittance of what feeds each bus [pu, 100 MVA].
-    converters
-        Bus and rating [MVA] of every converter that is connected.
+    """A network as a short circuit sees it: ``sources`` are admittances [pu, 100 MVA] at buses, ``converters`` buses
+    and ratings [MVA].
     """
 
     buses: tuple[str, ...]
@@ -128,24 +115,20 @@ class ShortCircuit:
     def power_at(self, bus: str, factor: float = 1.0) -> float:
         """Short-circuit power of a bus [MVA] with the impedances of all branches that end there times a factor."""
         lines = [replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x for x in self.lines]
-        unit = np.zeros(len(self.buses), dtype=complex)
-        unit[self.buses.index(bus)] = 1.0
-        v = np.linalg.solve(replace(self, lines=tuple(lines))._admittances(), unit)
-        return float(SYSTEM_BASE_MVA / abs(v[self.buses.index(bus)]))
+        return replace(self, lines=tuple(lines)).strengths()[self.buses.index(bus)].s_sc_mva
 
     def factor_for(self, bus: str, power: float) -> float:
         """The factor on the impedances of the branches at a bus that gives it a short-circuit power [MVA]."""
-        low, high = math.log(1 / _FARTHEST), math.log(_FARTHEST)
-        most, least = self.power_at(bus, math.exp(low)), self.power_at(bus, math.exp(high))
+        from scipy.optimize import brentq  # noqa: PLC0415 - half a second to import
+
+        ends = -math.log(_FARTHEST), math.log(_FARTHEST)
+        most, least = (self.power_at(bus, math.exp(end)) for end in ends)
         if not least < power < most:
             raise InputError(
                 f"{bus}: a short-circuit power of {power:.5g} MVA cannot be had by the impedances of the branches "
                 f"there, which give {least:.4g} to {most:.4g} MVA"
             )
-        for _ in range(60):
-            middle = (low + high) / 2
-            low, high = (middle, high) if self.power_at(bus, math.exp(middle)) > power else (low, middle)
-        return math.exp((low + high) / 2)
+        return math.exp(brentq(lambda x: math.log(self.power_at(bus, math.exp(x)) / power), *ends, xtol=1e-12))
 
     def known(self, bus: str) -> str:
         """A bus by its name, which has to be one of the network."""

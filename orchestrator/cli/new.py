@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.cases.new_case import WantedCase, read_converter, write_case
+from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.safe_files import write_text
@@ -40,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
     if not options.files:
         _ask(options)
     wanted = _wanted(options)
+    sources_of(wanted.files)
     if wanted.out.exists() and not options.force:
         raise InputError(f"{wanted.out}: the file is there already; choose another with --out, or --force")
     made = write_case(wanted)

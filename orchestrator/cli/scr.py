@@ -30,14 +30,15 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told},
                          indent=1, ensure_ascii=False))  # fmt: skip
         return 0
+    alike: dict[str, list[str]] = {}
     for scenario, buses in found.items():
-        table = make_table(scenario.title, "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters")
-        for x in buses:
-            figures = [
-                "–" if v is None else f"{v:{form}}"
-                for v, form in ((x.scr, ".2f"), (x.rating_mva, ".5g"), (x.x_r, ".1f"))
-            ]
-            table.add_row(x.bus, f"{x.s_sc_mva:.0f}", *figures, ", ".join(x.converters))
+        alike.setdefault(json.dumps([bus.as_json() for bus in buses]), []).append(scenario.title)
+    for rows, titles in alike.items():
+        table = make_table(", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters")
+        for x in json.loads(rows):
+            numbers = (x["s_sc_mva"], ".0f"), (x["scr"], ".2f"), (x["rating_mva"], ".5g"), (x["x_r"], ".1f")
+            figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
+            table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
         console.print(table, "")
     console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
     return 0

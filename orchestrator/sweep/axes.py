@@ -227,7 +227,7 @@ def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Ax
         for value in axis.values:
             scale(float(value))  # one that cannot be had is refused before anything is computed
     except InputError as error:
-        raise InputError(f"--scr {error}") from error
+        raise InputError(f"--vary {vary.key}: {error}") from error
     return replace(axis, members=tuple(members.items()), scale=scale)
 
 

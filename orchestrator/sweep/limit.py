@@ -72,19 +72,11 @@ def least_damping(record: PointRecord) -> float | None:
     return min(damping_percent(complex(value)) for value in record.modes.eigenvalues)
 
 
-@dataclass(frozen=True)
-class Bracket:
-    """What the search came to, in places along the range: the last value that holds, the first that does not, and
-    the places of the coarse grid beyond that hold again.
-    """
-
-    holds: float | None
-    beyond: float | None
-    again: tuple[int, ...] = ()
-
-
-def search(kinds: Sequence[Ending], at: Callable[[float], Ending], between: Callable[[float, float], bool]) -> Bracket:
-    """The first change along the grid, bisected.
+def search(
+    kinds: Sequence[Ending], at: Callable[[float], Ending], between: Callable[[float, float], bool]
+) -> tuple[float | None, float | None, list[int]]:
+    """The first change along a grid, bisected: the last place that holds, the first that does not, and the places of
+    the grid beyond that hold again.
 
     Parameters
     ----------
@@ -97,17 +89,14 @@ def search(kinds: Sequence[Ending], at: Callable[[float], Ending], between: Call
     """
     first = next((k for k, kind in enumerate(kinds) if kind is not Ending.HOLDS), None)
     if first is None:
-        return Bracket(float(len(kinds) - 1), None)
-    again = tuple(k for k in range(first + 1, len(kinds)) if kinds[k] is Ending.HOLDS)
-    if first == 0:
-        return Bracket(None, 0.0, again)
+        return float(len(kinds) - 1), None, []
+    again = [k for k in range(first + 1, len(kinds)) if kinds[k] is Ending.HOLDS]
     low, high = float(first - 1), float(first)
-    for _ in range(HALVINGS):
-        if not between(low, high):
-            break
+    for _ in range(HALVINGS if first else 0):
         middle = (low + high) / 2
-        low, high = (middle, high) if at(middle) is Ending.HOLDS else (low, middle)
-    return Bracket(low, high, again)
+        if between(low, high):
+            low, high = (middle, high) if at(middle) is Ending.HOLDS else (low, middle)
+    return low if first else None, high, again
 
 
 @dataclass(frozen=True)
@@ -158,7 +147,10 @@ class ParameterLimit:
     def sentence(self) -> str:
         """The answer, with the figures of both sides."""
         start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
-        mode, why = f": {self._mode(self.mode)}" if self.mode else "", f": {self.why}" if self.why else ""
+        mode, why = (
+            f": {self._mode(self.mode)}" if self.mode else "",
+            f": {self.why.split('. ')[0]}" if self.why else "",
+        )
         at, holding = self._value(self.beyond), self.until.holding
         if self.kind is Ending.HOLDS:
             worst = f"; least damped at {self._value(self.worst_at)}{mode}"
@@ -195,7 +187,7 @@ class ParameterLimit:
             "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
             "limit": self.limit, "reason": None if self.limit is not None else self.sentence,
             "holds_at": self.holds_at, "beyond": self.beyond, "ends_with": str(self.kind), "mode": self.mode,
-            "holds_again_at": list(self.again), "tried": list(self.tried), "sentence": self.sentence,
+            "why": self.why, "holds_again_at": list(self.again), "tried": list(self.tried), "sentence": self.sentence,
         }  # fmt: skip
 
 

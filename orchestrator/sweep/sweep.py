@@ -298,25 +298,24 @@ def _limit(
     def between(low: float, high: float) -> bool:
         return _value_at(axis, (low + high) / 2) not in (_value_at(axis, low), _value_at(axis, high))
 
-    kinds = [kind_at(float(k)) for k in range(count)]
-    found = search(kinds, kind_at, between)
-    end = Ending.HOLDS if found.beyond is None else kind_at(found.beyond)
-    worst = min(range(count), key=lambda k: _margin(sweep.points[(k,)]))
-    shown = sweep.points[(float(worst) if found.beyond is None else found.beyond,)]
+    def value(place: float | None) -> float | None:
+        return None if place is None else float(_value_at(axis, place))
+
+    grid = [sweep.points[(k,)] for k in range(count)]
+    holds, beyond, again = search([until.kind(record) for record in grid], kind_at, between)
+    end = Ending.HOLDS if beyond is None else kind_at(beyond)
+    worst = min(range(count), key=lambda k: _margin(grid[k]))
+    shown = sweep.points[(float(worst) if beyond is None else beyond,)]
     mode, who = mode_behind(shown, plan.case.table.analysis.swing)
-    value = {place: float(_value_at(axis, place)) for place in (found.holds, found.beyond) if place is not None}
     tried = [
-        {"value": float(axis.values[k]), "kind": str(kinds[k]), "damping_percent": least_damping(sweep.points[(k,)]),
-         "largest_growth_rate": sweep.points[(k,)].stability.get("largest_growth_rate"),
-         "error": sweep.points[(k,)].error}
-        for k in range(count)
+        {"value": float(axis.values[k]), "kind": str(until.kind(record)), "damping_percent": least_damping(record),
+         "largest_growth_rate": record.stability.get("largest_growth_rate"), "error": record.error}
+        for k, record in enumerate(grid)
     ]  # fmt: skip
+    why = shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else "")
     return ParameterLimit(
-        axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end,
-        None if found.holds is None else value[found.holds], None if found.beyond is None else value[found.beyond],
-        mode, who, tuple(tried), tuple(float(axis.values[k]) for k in found.again),
-        shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else ""),
-        float(axis.values[worst]),
+        axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end, value(holds), value(beyond), mode,
+        who, tuple(tried), tuple(float(axis.values[k]) for k in again), why, float(axis.values[worst]),
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ ANYWHERE = (
     "how-to/grid-forming-among-grid-following",
     "how-to/faults-and-outages",
     "how-to/several-vendors",
+    "how-to/own-network",
 )
 SECONDS = 1800.0
 
