@@ -32,6 +32,8 @@ class CaseDefinition:
     exchanged
         Devices that take the place of the file's own, by component. Of parameter files, scenarios and the command line
         no value reaches them: those were meant for the device that was there.
+    injections
+        Whether the grid takes a current besides at every bus; see `Network.injections`.
     """
 
     table: CaseTable
@@ -44,6 +46,7 @@ class CaseDefinition:
     home: Path = field(default_factory=Path.cwd)
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
     exchanged: Mapping[str, ComponentTable] = field(default_factory=dict)
+    injections: bool = False
 
     @property
     def name(self) -> str:

@@ -76,6 +76,8 @@ class Draft:
         Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     dispatch
         What the units fed before an outage that they share; None without one.
+    injections
+        As in `CaseDefinition`.
     """
 
     source: str
@@ -103,6 +105,7 @@ class Draft:
     exchanged: frozenset[str] = frozenset()
     whole: bool = True
     dispatch: Dispatch | None = None
+    injections: bool = False
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:

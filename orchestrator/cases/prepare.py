@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from fmus.grid.network import Network
-from fmus.toolchain.catalogue import model_names, parts_of
+from fmus.toolchain.catalogue import model_names, network_of, parts_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
@@ -138,6 +138,7 @@ class Preparer:
         self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
         draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
+        draft.injections = case.injections
         draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters))
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
@@ -305,9 +306,9 @@ class Preparer:
             directory = self.draft.directory
             return bound_fmu(directory / table.file, directory / table.binding if table.binding else None)
         own = takes_network(table)
-        faulted = self.draft.network is not None and bool(self.draft.network.faults)
-        if faulted and table is self.draft.tables.get(self.draft.grid or ""):
-            own = True  # a model with a network of its own is built anew, with that network's faults
+        if not own and self.draft.network is not None and table is self.draft.tables.get(self.draft.grid or ""):
+            # A model with a network of its own is built anew, with the faults and ports that this one has besides.
+            own = self.draft.network != network_of(table.model or "")
         if own and self.draft.network is None:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
