@@ -26,7 +26,7 @@ FLOORS = (
     ("orchestrator.study",),
     ("orchestrator.black_box", "orchestrator.pod_design", "orchestrator.sweep"),
     ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions"),
-    ("orchestrator.certification", "orchestrator.coordinated_design"),
+    ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting"),
     ("orchestrator.api",),
     ("orchestrator.cli",),
 )

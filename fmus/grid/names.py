@@ -1,4 +1,4 @@
-"""Names of the variables of a grid's lines and buses, for the models and for programs that set and read the variables."""
+"""Names of the variables of a grid's lines and buses, for the models and for programs that set and read them."""
 
 from collections.abc import Iterable
 

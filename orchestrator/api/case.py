@@ -24,6 +24,7 @@ from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
 from orchestrator.api.screening import Screening
 from orchestrator.api.screening import compute as screened
 from orchestrator.api.show import page
+from orchestrator.api.siting import Siting
 from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
 from orchestrator.api.values import (
     Names,
@@ -52,6 +53,7 @@ from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening
+from orchestrator.siting.study import SiteRequest, find_sites
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -355,6 +357,69 @@ class Case:
         )  # fmt: skip
         question([planned.prepared])
         return _computed(screened, planned, executor, folder, "Points", shown=progress)
+
+    def site(
+        self,
+        device: str | Path = "pod_p",
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        binding: str | Path | None = None,
+        step: Time | None = None,
+        parameters: Paths = (),
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        below: float = 10,
+        outages: str | Sequence[str] | None = None,
+        confirm: int = 3,
+        rating: float = 100,
+        gain: float = 200,
+    ) -> Siting:
+        """Where to put a converter: how far support at each bus moves each poorly damped mode.
+
+        Residues of the whole linear model between the frequency of a bus and P or Q injected there; the operating
+        point stays. The best buses are confirmed: a converter at rest is put there as an FMU, its POD is tuned, and
+        the coupled system's mode is compared.
+
+        Parameters
+        ----------
+        device
+            ``"pod_p"``, ``"pod_q"``, ``"droop"``, or the path of an FMU.
+        scenario
+            Its name; the first one where None.
+        values, step, parameters
+            As for `scenario`.
+        binding
+            Of the FMU.
+        frequencies
+            Modes from the first to the second are looked at [Hz] …
+        below
+            … where they are damped less than this [%]; the least damped one where none is.
+        outages
+            Rank for these too: ``"n-1"``, ``"lines"``, ``"units"``, or names; the least of all counts.
+        confirm
+            How many of the best buses are confirmed.
+        rating
+            Of the converter that confirms [MVA].
+        gain
+            Largest of its POD [pu of its rating].
+
+        Raises
+        ------
+        InputError
+            If the case has no network, no oscillation is in the range, or the device cannot be used.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> places = gfor.load("two_area_rms").site("pod_p", scenario="gfor", confirm=1)
+        >>> places.ranking, places.agrees
+        (('bus_2', 'bus_3'), True)
+        """
+        return Siting(find_sites(self.file, SiteRequest(
+            str(device), None if binding is None else path_of(binding, "binding", "file"), scenario, below,
+            frequency_range(frequencies), None if outages is None else ",".join(names_given(outages, "outages")),
+            confirm, rating, gain, case_values(values), parameter_files(parameters), in_seconds(step, "step"),
+        )))  # fmt: skip
 
     def interactions(
         self,

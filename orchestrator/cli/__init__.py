@@ -27,6 +27,7 @@ COMMANDS = {
     "sweep": "modes over a grid of parameters, followed from point to point",
     "sensitivities": "how each parameter of each FMU moves a mode",
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
+    "site": "where a converter helps: the shift of each mode by support at each bus",
     "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
     "identify": "the modes in a recorded signal (matrix pencil)",
@@ -55,6 +56,7 @@ examples:
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
   gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
+  gfor site ieee39 --device pod_p --outages lines        at which bus a converter helps most
   gfor interactions my_case.toml                 which vendors' converters do not agree with each other
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor steps two_area --error 0.001:0.1          the largest step for 1 mHz and 0.1 points of damping
@@ -91,6 +93,7 @@ What makes it better or worse?
   gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter
   gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage
+  gfor site ieee39 --device pod_p                     where to put a converter
 
 Can this converter's FMU be trusted, and does it meet the grid code?
   gfor info vendor.fmu                                what it declares

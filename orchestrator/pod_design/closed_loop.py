@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.continuation import Eigenpair, follow_along
 from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
@@ -79,6 +80,10 @@ class PodLoop:
         if setting.gain == 0:
             return self._off
         return self._model(setting)
+
+    def block(self, name: str) -> ComponentLinearization:
+        """One component as it was linearised last."""
+        return self._blocks.components[name]
 
     def examine(self, setting: PodSetting) -> Examination:
         """The verdict on the whole system with this setting, at any frequency, with its warnings."""
