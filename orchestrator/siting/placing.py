@@ -35,8 +35,8 @@ def foreign(fmu: Path, binding: Path | None) -> ComponentTable:
     for path in (fmu, *([binding] if binding else [])):
         if not path.is_file():
             raise InputError(f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU")
-    own = {"binding": str(binding.absolute())} if binding else {}
-    return ComponentTable(fmu=str(fmu.absolute()), parameters={"P_0": 0.0, "Q_0": 0.0}, **own)
+    own = str(binding.absolute()) if binding else None
+    return ComponentTable(fmu=str(fmu.absolute()), binding=own, parameters={"P_0": 0.0, "Q_0": 0.0})
 
 
 def name_at(bus: str) -> str:

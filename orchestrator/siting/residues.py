@@ -36,9 +36,9 @@ class SeenMode:
     mode: Mode
     drive: Mapping[str, Vector]
     shown: Mapping[str, Vector]
-    impedance: Mapping[str, Matrix]
+    impedance: Mapping[str, Vector]
 
-    def shift(self, bus: str, response: Matrix) -> complex:
+    def shift(self, bus: str, response: Vector) -> complex:
         """Δλ [rad/s] by a device at a bus, as long as it is small; what it does to its own bus is taken in.
 
         Parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.arrays import Matrix
+from orchestrator.arrays import Vector
 from orchestrator.cases.case import Case
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
@@ -97,7 +97,7 @@ class Shift:
 
 
 ByMode = Mapping[str, Mapping[str, Shift]]
-Response = Callable[[Situation, str, SeenMode], Matrix]
+Response = Callable[[Situation, str, SeenMode], Vector]
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def _of_foreign(
         modes = [seen.mode.eigenvalue for at in situations for seen in at.modes]
         answers = {eigenvalue: response_of(master, model, eigenvalue) for eigenvalue in modes}
 
-    def response(at: Situation, other: str, seen: SeenMode) -> Matrix:
+    def response(at: Situation, other: str, seen: SeenMode) -> Vector:
         ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
         return turned(answers[seen.mode.eigenvalue], ahead)
 

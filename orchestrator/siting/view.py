@@ -215,8 +215,8 @@ def _page(result: SiteResult) -> str:
     if outages := [at for at in result.worst_first if at.name != result.intact.name]:
         best = []
         for at in outages:
-            there = ", ".join(f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, at.modes[0].label).items())
             mode = at.modes[0]
+            there = ", ".join(f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items())
             best.append([escape(at.name), escape(mode.label), damping(mode.mode.damping_percent), escape(there)])
         content.append(("After outages", table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2)))
     return document(title, f"{result.prepared.title}; code {code_hash()[:12]}", findings, content)
