@@ -156,6 +156,9 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
     """
     if request.is_foreign and not request.device.lower().endswith(".fmu"):
         raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
+    for option in ("rating", "gain", "below", "confirm"):
+        if not (value := getattr(request, option)) > (-1 if option == "confirm" else 0):
+            raise InputError(f"--{option} {value:g}: it must be positive")
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
     layers = (*request.parameters, *([OptionValues.of(request.overrides)] if request.overrides else []))

@@ -54,7 +54,7 @@ def _places(buses: Sequence[str], branches: Sequence[tuple[str, str]]) -> Matrix
     """Points whose distances are like the numbers of branches between buses, by stress majorisation from a circle."""
     n, row = len(buses), {bus: k for k, bus in enumerate(buses)}
     ends = np.array([[row[a], row[b]] for a, b in branches], dtype=int).reshape(-1, 2)
-    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n))
+    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(n, n)).tocsr()
     wanted = shortest_path(links, directed=False, unweighted=True)
     finite = wanted[np.isfinite(wanted)].max(initial=1.0)
     wanted = np.where(np.isfinite(wanted), wanted, finite + 1)
