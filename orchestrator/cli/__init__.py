@@ -2,6 +2,7 @@
 
 import argparse
 import codecs
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -12,6 +13,7 @@ from fmus.toolchain.extras import SetupError
 from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.results import origin
 
 _ESCAPE = "gfor_escape"
 
@@ -31,7 +33,7 @@ COMMANDS = {
     "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
     "identify": "the modes in a recorded signal (matrix pencil)",
-    "report": "one self-contained HTML page from the folder of a run",
+    "report": "one self-contained HTML page from results of any study",
     "design": "design a POD controller by eigenvalue sensitivity",
     "admittance": "measure a device's admittance, and fit a model to it",
     "black-box": "modes of a case with a component known by its port alone",
@@ -148,11 +150,19 @@ def _done(words: Sequence[str]) -> int:
         with calls:  # libraries take an interrupt in their import for an error of their own
             parser = _parser(next((word for word in words if not word.startswith("-")), None))
         options = parser.parse_args(words)
+        origin.said[:] = [lambda: _origin(words)]
         return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):
             raise
         return _failed(error)
+
+
+def _origin(words: Sequence[str]) -> dict[str, str]:
+    """What results say of where they come from."""
+    from orchestrator.points.key import code_hash  # noqa: PLC0415 - only where results are written
+
+    return {"command": shlex.join(["gfor", *words]), "code": code_hash()}
 
 
 def _failed(error: CosimError | SetupError | OSError) -> int:

@@ -5,9 +5,11 @@ import json
 import warnings
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.results import origin
 from orchestrator.results.storage import save_json, versions_of
 
 MANIFEST = "manifest.json"
@@ -93,7 +95,8 @@ def write_manifest(
     beside = dict.fromkeys(scenarios, run) or (before.scenarios if before else {})
     entries = {name: asdict(listed[name]) for name in sorted(listed)}
     content = {"format": _FORMAT, "run": run, "made_by": versions_of(["gfor-cosim"]), "files": entries}
-    save_json(content | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
+    made = {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", **(origin.said[-1]() if origin.said else {})}
+    save_json(content | made | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
 
 
 def read_manifest(folder: Path) -> Manifest | None:
