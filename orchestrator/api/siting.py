@@ -53,18 +53,7 @@ class Siting:
         return view.as_json(self.result)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-        """
+        """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map, into a folder."""
         place = made_folder(Path(folder), "folder")
         with held(place):
             return view.save(self.result, place)

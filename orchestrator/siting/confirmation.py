@@ -46,21 +46,8 @@ _SAME = 0.5
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What the coupled FMUs say of one bus.
-
-    Attributes
-    ----------
-    predicted, coupled
-        Δλ [rad/s] by a small gain of the tuned POD, or by the device as it is: from the residues, and of the coupled
-        system.
-    with_device
-        λ [rad/s] with the device at rest, its POD off.
-    setting, tuned
-        Of the tuned POD, and λ with it; None for a device without a POD.
-    least
-        Damping of the least damped oscillation of the range with it [%].
-    failure
-        Why there are no figures; "" where there are.
+    """What the coupled FMUs say of one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without one, as
+    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damping then.
     """
 
     bus: str
@@ -103,9 +90,7 @@ def confirmed(
     prepared
         With the device at the bus.
     controller
-        ``pod_p`` or ``pod_q``; None for a device as it is.
-    gain
-        The largest of the tuned POD [pu of its rating].
+        ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is.
     """
     try:
         with running(prepared) as master:

@@ -14,14 +14,8 @@ STAGES = 3
 
 
 def converter(prepared: PreparedScenario, rating: float, controller: str | None) -> ComponentTable:
-    """The catalogue's grid-forming converter, of the kind that the network takes.
-
-    Parameters
-    ----------
-    rating
-        [MVA]
-    controller
-        ``pod_p`` or ``pod_q``, which is going to be tuned; None for neither.
+    """The catalogue's grid-forming converter of a rating [MVA], of the kind that the network takes; one of its PODs is
+    going to be tuned.
     """
     grid = prepared.case.table.power_flow
     taken = prepared.system.components[grid.grid].description.inputs if grid else ()

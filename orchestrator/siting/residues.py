@@ -20,16 +20,8 @@ from orchestrator.study.modes import ModesResult, modes_from, running
 
 @dataclass(frozen=True)
 class SeenMode:
-    """A mode, and by bus its residues with a device of one bus.
-
-    Attributes
-    ----------
-    drive
-        By bus, what a current into it does to the eigenvalue [rad/s per pu], real and imaginary part of the current.
-    shown
-        By bus, the voltage in the mode's shape [pu], real and imaginary part.
-    impedance
-        By bus, how a current there moves the voltage there through all other modes [pu], shape (2, 2).
+    """A mode, and by bus: what a current into it does to the eigenvalue [rad/s per pu], the voltage in the mode's shape
+    [pu], both by real and imaginary part, and how a current there moves the voltage through all other modes [pu].
     """
 
     label: str
@@ -39,12 +31,8 @@ class SeenMode:
     impedance: Mapping[str, Vector]
 
     def shift(self, bus: str, response: Vector) -> complex:
-        """Δλ [rad/s] by a device at a bus, as long as it is small; what it does to its own bus is taken in.
-
-        Parameters
-        ----------
-        response
-            Of the device's current [pu, 100 MVA] to the bus voltage [pu] at the mode, shape (2, 2).
+        """Δλ [rad/s] by a device whose current [pu, 100 MVA] answers the bus voltage [pu] so at the mode, as long as it
+        moves the mode little; what it does to its own bus is taken in.
         """
         at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
         return complex(self.drive[bus] @ at_mode @ self.shown[bus])
@@ -63,13 +51,7 @@ class Situation:
 def situation_of(
     prepared: PreparedScenario, name: str, frequency_range: tuple[float, float], below: float
 ) -> Situation:
-    """The modes with less damping than ``below`` [%], or the least damped one where none has.
-
-    Parameters
-    ----------
-    prepared
-        Of a case with `injections`.
-    """
+    """The modes with less damping than ``below`` [%], or the least damped one, of a case with `injections`."""
     network, table = prepared.network, prepared.case.table.power_flow
     if network is None or table is None or prepared.schedule.is_second_order:
         raise InputError(

@@ -14,14 +14,8 @@ ACTIVE, REACTIVE = "P", "Q"
 
 
 def ideal_support(kind: str, voltage: complex, eigenvalue: complex) -> Vector:
-    """1 MW less, or 1 Mvar more, for each Hz that the bus's frequency is high.
-
-    Parameters
-    ----------
-    voltage
-        At the bus, network frame [pu]; a power S is the current conj(S/v).
-    eigenvalue
-        λ [rad/s]: the bus's frequency is λ/2π times its angle.
+    """1 MW less, or 1 Mvar more, for each Hz that the bus's frequency is high, which is λ/2π times its angle. A power S
+    is the current conj(S/v).
     """
     power = {ACTIVE: -1.0 + 0j, REACTIVE: 1j}[kind] / SYSTEM_BASE_MVA
     current = (power / voltage).conjugate()

@@ -34,20 +34,9 @@ HARDLY = 0.02
 
 @dataclass(frozen=True)
 class SiteRequest:
-    """What is asked.
-
-    Attributes
-    ----------
-    device
-        ``pod_p``, ``pod_q``, ``droop``, or the path of an FMU with its ``binding``.
-    below
-        Damping below which a mode is poorly damped [%].
-    outages
-        As `read_outages` takes them.
-    confirm
-        How many of the best buses are confirmed.
-    rating, gain
-        Of the converter that is put there for that [MVA], and of its POD [pu of the rating].
+    """What is asked: a ``device`` (``pod_p``, ``pod_q``, ``droop`` or the path of an FMU), for modes with less damping
+    than ``below`` [%], the best ``confirm`` buses confirmed by a converter of a ``rating`` [MVA] with a POD of at most
+    a ``gain``.
     """
 
     device: str
@@ -75,16 +64,8 @@ class SiteRequest:
 
 @dataclass(frozen=True)
 class Shift:
-    """What a device at a bus does to a mode.
-
-    Attributes
-    ----------
-    change
-        Δλ [rad/s] of 1 MW/Hz or 1 Mvar/Hz without a phase shift, or of the foreign device.
-    damping
-        Change of the damping ratio [points]: with the phase that a tuned POD gives, or of the device as it is.
-    part
-        Of what the best bus does to this mode.
+    """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
+    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's.
     """
 
     change: complex
@@ -96,30 +77,21 @@ class Shift:
         return self.part < HARDLY
 
 
+DEVICE = "device"
 ByMode = Mapping[str, Mapping[str, Shift]]
 Response = Callable[[Situation, str, SeenMode], Vector]
 
 
 @dataclass(frozen=True)
 class SiteResult:
-    """Shifts by situation, mode and bus; buses in the order of the ranking.
-
-    Attributes
-    ----------
-    device, active, reactive
-        Shifts by name of the situation, label of the mode and bus, of the device and of 1 MW/Hz and 1 Mvar/Hz.
-    ranking
-        All buses, best first: by what they do for the least damped mode of each situation, where they do least.
-    not_judged
-        Outages without modes, with the reason.
+    """Shifts of `DEVICE`, of 1 MW/Hz (`ACTIVE`) and of 1 Mvar/Hz (`REACTIVE`), by name of the situation, label of the
+    mode, and bus; all buses, best first; and the outages without modes, with the reason.
     """
 
     case: Case
     request: SiteRequest
     situations: tuple[Situation, ...]
-    device: Mapping[str, ByMode]
-    active: Mapping[str, ByMode]
-    reactive: Mapping[str, ByMode]
+    shifts: Mapping[str, Mapping[str, ByMode]]
     ranking: tuple[str, ...]
     not_judged: Mapping[str, str]
     confirmations: tuple[Confirmation, ...] = ()
@@ -139,7 +111,7 @@ class SiteResult:
 
     def least(self, bus: str) -> tuple[float, str]:
         """What the device does there for the least damped mode where it does least [points], and in which situation."""
-        return min((self.device[s.name][s.modes[0].label][bus].damping, s.name) for s in self.situations)
+        return min((self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name) for s in self.situations)
 
     @property
     def agrees(self) -> bool:
@@ -147,13 +119,7 @@ class SiteResult:
 
 
 def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None) -> SiteResult:
-    """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best.
-
-    Raises
-    ------
-    InputError
-        If there is no network with buses, no oscillation in the range, or the device is none.
-    """
+    """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
     if request.is_foreign and not request.device.lower().endswith(".fmu"):
         raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
     for option in ("rating", "gain", "below", "confirm"):
@@ -191,14 +157,14 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
 def _shifted(
     case: Case, request: SiteRequest, situations: list[Situation], not_judged: dict[str, str], scenario: str
 ) -> SiteResult:
-    active, reactive = (_all_shifts(situations, _ideal(kind), tuned=True) for kind in (ACTIVE, REACTIVE))
+    shifts = {kind: _all_shifts(situations, _ideal(kind), tuned=True) for kind in (ACTIVE, REACTIVE)}
     if request.is_foreign:
-        device = _of_foreign(case, request, situations, active, scenario)
+        shifts[DEVICE] = _of_foreign(case, request, situations, shifts[ACTIVE], scenario)
     elif request.device == DROOP:
-        device = _all_shifts(situations, _ideal(ACTIVE), tuned=False)
+        shifts[DEVICE] = _all_shifts(situations, _ideal(ACTIVE), tuned=False)
     else:
-        device = {ACTIVE: active, REACTIVE: reactive}[PODS[request.device]]
-    found = SiteResult(case, request, tuple(situations), device, active, reactive, (), not_judged)
+        shifts[DEVICE] = shifts[PODS[request.device]]
+    found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
     buses = [bus for bus in situations[0].voltages if all(bus in s.voltages for s in situations)]
     return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
 

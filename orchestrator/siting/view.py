@@ -20,7 +20,8 @@ from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import write_text
 from orchestrator.siting.confirmation import Confirmation
 from orchestrator.siting.residues import SeenMode
-from orchestrator.siting.study import DROOP, Shift, SiteResult
+from orchestrator.siting.responses import ACTIVE, REACTIVE
+from orchestrator.siting.study import DEVICE, DROOP, Shift, SiteResult
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 _NONE = 1e-5
@@ -90,9 +91,9 @@ def remarks(result: SiteResult) -> list[str]:
     """Modes that the best bus, or no bus, reaches; what was not judged."""
     said, best = [], result.ranking[0]
     for seen in result.intact.modes:
-        shifts = result.device[result.intact.name][seen.label]
+        shifts = result.shifts[DEVICE][result.intact.name][seen.label]
         top = max(shifts, key=lambda bus: abs(shifts[bus].change))
-        reach = max(abs(s.damping) for s in result.active[result.intact.name][seen.label].values())
+        reach = max(abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values())
         if reach < _NONE:
             said.append(f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network")
         elif shifts[best].hardly:
@@ -122,9 +123,9 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "buses": [
             {
                 "bus": bus, "rank": k + 1,
-                "shift": {m: _shift(by[bus]) for m, by in result.device[here].items()},
-                "p": {m: _shift(by[bus]) for m, by in result.active[here].items()},
-                "q": {m: _shift(by[bus]) for m, by in result.reactive[here].items()},
+                "shift": {m: _shift(by[bus]) for m, by in result.shifts[DEVICE][here].items()},
+                "p": {m: _shift(by[bus]) for m, by in result.shifts[ACTIVE][here].items()},
+                "q": {m: _shift(by[bus]) for m, by in result.shifts[REACTIVE][here].items()},
                 "least": dict(zip(("damping_points", "situation"), result.least(bus), strict=True)),
             }
             for k, bus in enumerate(result.ranking)
@@ -152,7 +153,7 @@ def _shift(shift: Shift) -> dict[str, Any]:
 
 
 def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
-    shifts = result.device[situation][mode]
+    shifts = result.shifts[DEVICE][situation][mode]
     return {bus: shifts[bus].damping for bus in sorted(shifts, key=lambda bus: -shifts[bus].damping)[:3]}
 
 
@@ -190,7 +191,7 @@ def ranking_table(result: SiteResult) -> Table:
 
 
 def _cells(result: SiteResult, bus: str) -> list[str]:
-    shifts = (result.device[result.intact.name][seen.label][bus] for seen in result.intact.modes)
+    shifts = (result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes)
     return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
 
 
@@ -223,7 +224,7 @@ def _page(result: SiteResult) -> str:
 
 
 def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
-    shifts: Mapping[str, Shift] = result.device[result.intact.name][seen.label]
+    shifts: Mapping[str, Shift] = result.shifts[DEVICE][result.intact.name][seen.label]
     network = result.prepared.network
     assert network is not None
     branches = [(line.from_bus, line.to_bus) for line in network.lines]

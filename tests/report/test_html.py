@@ -85,12 +85,12 @@ def test_a_browser_shows_it_without_errors_answers_the_pointer_and_prints(page, 
 
 
 def test_what_is_no_folder_of_a_run_is_said(tmp_path, page):
-    with pytest.raises(InputError, match="not the folder of a run"):
+    with pytest.raises(InputError, match="nothing in it can be used for a report"):
         write_report(tmp_path)
     with pytest.raises(InputError, match="no such file or folder"):
         write_report(page.parent, [tmp_path / "nowhere"])
     (tmp_path / "screening.html").write_text("a page")
-    with pytest.raises(InputError, match=r"nothing in it belongs into a run's report.*own: screening.html"):
+    with pytest.raises(InputError, match=r"nothing in it can be used for a report.*own: screening.html"):
         write_report(page.parent, [tmp_path])
 
 

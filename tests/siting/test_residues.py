@@ -38,7 +38,7 @@ def test_a_droop_helps_without_tuning():
 def test_phasor_and_emt_models_say_the_same():
     emt, phasor = (sites(case, "pod_p", confirm=0) for case in ("two_area", "two_area_rms"))
     for bus in ("bus_2", "bus_3"):
-        changes = [one.device["intact"]["electromechanical"][bus].change for one in (emt, phasor)]
+        changes = [one.shifts["device"]["intact"]["electromechanical"][bus].change for one in (emt, phasor)]
         assert abs(changes[0] - changes[1]) < 0.02 * abs(changes[0])
 
 

@@ -24,16 +24,8 @@ _SHOWN, _OPEN, _LONGEST = 8, 4, 110
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one result says.
-
-    Attributes
-    ----------
-    good
-        Whether the answer is good; None where it is not known, or neither.
-    page
-        Name of the result's own page, whose sections are the chapter; "" where ``content`` is.
-    title
-        Heading of the chapter; the question where it is "".
+    """What one result says; ``page`` is the name of its own page, whose sections are the chapter, in the place of
+    ``content``; ``title`` is its heading, in the place of the question.
     """
 
     source: Path
@@ -51,13 +43,7 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
-    """The chapters of a folder, or of one JSON file, of any study but runs and sweeps.
-
-    Raises
-    ------
-    InputError
-        If a file of ours was changed since it was written, or cannot be read.
-    """
+    """The chapters of a folder, or of one JSON file, of any study but runs and sweeps."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
     if place.is_dir() and (manifest := read_manifest(place)) is not None:
         manifest.check(file.name for file in files)
@@ -156,13 +142,10 @@ def _design(file: Path, c: Content) -> Chapter:
 
 
 def _coordinated(file: Path, c: Content) -> Chapter:
-    rows = [[escape(s["controller"]), escape(", ".join(s["components"][:6])), f"{s['K']:.4g}", f"{s['T_S1']:.4f}",
-             f"{s['T_S2']:.4f}", str(s["N_S"])] for s in c["settings"]]  # fmt: skip
     lost = [f"{f['point']}, {f['outage']}: {f['why']}" for f in c["failed"]]
     return Chapter(
         file, "Do damping controllers help at all operating points?", c["verdict"], bool(c["met"]),
         f"checked at {c['items']} points and outages", lost,
-        table("Settings", ["Controller", "Converters", "K", "T_S1 [s]", "T_S2 [s]", "Stages"], rows, left=2),
     )  # fmt: skip
 
 
@@ -196,28 +179,6 @@ def _check(file: Path, c: Content) -> Chapter:
     )  # fmt: skip
 
 
-def _interactions(file: Path, c: Content) -> Chapter:
-    worst = next((p["sentence"] for p in c["pairs"] if p["vendors"] == c["worst_pair"]), "no pair disagrees")
-    open_ = [*(" and ".join(pair) for pair in c["unknown_pairs"]), *c["warnings"]]
-    good = True if c["worst_pair"] is None and not open_ else None
-    return Chapter(file, "Do several vendors' converters agree?", worst, good,
-                   f"{len(c['interaction_modes'])} shared modes", open_, page="interactions.html")  # fmt: skip
-
-
-def _sensitivities(file: Path, c: Content) -> Chapter:
-    rows = [row for row in c["sensitivities"] if row["damping_points_per_percent"] is not None]
-    top = ", ".join(f"{r['parameter']} ({r['damping_points_per_percent']:+.3g} points by 1 %)" for r in rows[:3])
-    cells = [[escape(r["parameter"]), f"{r['value']:.5g} {escape(r['unit'])}",
-              f"{r['damping_points_per_percent']:+.3g}", escape(r["doubts"])] for r in rows[:_SHOWN]]  # fmt: skip
-    doubted = sum(bool(row["doubts"]) for row in rows)
-    lost = [f"{row['parameter']}: {row['reason']}" for row in c["sensitivities"] if row["reason"]]
-    return Chapter(
-        file, f"What moves the {c['mode']['frequency_hz']:.3f} Hz mode?", top or "no parameter", None,
-        f"{doubted} of {len(rows)} figures are in doubt", lost,
-        table("Largest effects", ["Parameter", "Value", "Points by 1 %", "Doubts"], cells),
-    )  # fmt: skip
-
-
 def _comparison(file: Path, signals: Any) -> Chapter:
     rows = [[escape(s["expression"]), escape(s["unit"]), f"{s['largest']:.4g}", f"{s['at']:.3f}", f"{s['rms']:.4g}"]
             for s in signals]  # fmt: skip
@@ -236,8 +197,6 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"cells", "codes", "sentence"}, _matrix),
     ({"sentence", "verdict", "files", "seal"}, _certificate),
     ({"trusted", "checks", "faults"}, _check),
-    ({"interaction_modes", "pairs", "worst_pair"}, _interactions),
-    ({"sensitivities", "mode", "derivative"}, _sensitivities),
     ({"scenarios", "facts", "step_size_s"}, _modes),
     ({"expression", "deviations", "rms"}, _comparison),
 )

@@ -18,16 +18,8 @@ _LABELS = 60
 def network_map(
     name: str, branches: Sequence[tuple[str, str]], heat: Mapping[str, float], texts: Mapping[str, str]
 ) -> str:
-    """The picture as SVG.
-
-    Parameters
-    ----------
-    branches
-        The two buses of each.
-    heat
-        By bus, from 0 (pale) to 1 (red).
-    texts
-        By bus, what the pointer shows.
+    """The picture as SVG: branches by their two buses; by bus its heat from 0 (pale) to 1 (red), and what the pointer
+    shows.
     """
     buses = list(heat)
     places = dict(zip(buses, _places(buses, branches).tolist(), strict=True))

@@ -22,7 +22,7 @@ from orchestrator.report.html.elements import Figures, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.safe_files import write_text
 
-_USED = "run, modes, screen, sweep, site, design, certify, check, interactions, sensitivities and compare (as JSON)"
+_USED = "run, modes, screen, sweep, site, design, certify, check and compare (both as JSON)"
 
 Sections = list[tuple[str, str]]
 
@@ -30,16 +30,8 @@ Sections = list[tuple[str, str]]
 def write_report(
     folder: Path, others: Sequence[Path] = (), path: Path | None = None, against: Path | None = None
 ) -> Path:
-    """Write one file that needs no network and no other file.
-
-    Parameters
-    ----------
-    folder, others
-        Folders or files with results of any study; each is a chapter or several.
-    path
-        By default ``report.html`` in the folder.
-    against
-        An older page, to say what changed since.
+    """Write one file that needs no network and no other file, by default ``report.html`` in the first folder; each
+    folder or file with results is a chapter or several. Of an older page it says what changed since.
     """
     target = path or (folder if folder.is_dir() else folder.parent) / "report.html"
     write_text(target, page(list(dict.fromkeys([folder, *others])), against))
