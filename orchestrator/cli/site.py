@@ -21,32 +21,22 @@ from orchestrator.siting.study import SiteRequest, find_sites
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    default = SiteRequest("pod_p")
     add_case_arguments(parser)
-    parser.add_argument(
-        "--device", default=default.device, metavar="DEVICE", help="pod_p (default), pod_q, droop, or a vendor's .fmu"
-    )
-    parser.add_argument("--binding", type=Path, metavar="FILE", help="binding of the vendor's FMU")
-    parser.add_argument(
-        "--below", type=float, default=default.below, metavar="PERCENT", help="damping of poorly damped modes (10)"
-    )
-    parser.add_argument(
-        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
-    )
-    parser.add_argument(
-        "--outages", action=Joined, metavar="WHICH", help="rank for these as well: n-1, lines, units, or names"
-    )
-    parser.add_argument(
-        "--confirm", type=int, default=default.confirm, metavar="N", help="confirm the best N by coupled FMUs (3)"
-    )
-    parser.add_argument(
-        "--rating", type=float, default=default.rating, metavar="MVA", help="of the converter that confirms (100)"
-    )
-    parser.add_argument(
-        "--gain", type=float, default=default.gain, metavar="K", help="largest of its POD [pu of its rating] (200)"
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write site.json, buses.csv and site.html with a map")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    default, add = SiteRequest("pod_p"), parser.add_argument
+    add("--device", default=default.device, metavar="DEVICE", help="pod_p (default), pod_q, droop, or a vendor's .fmu")
+    add("--binding", type=Path, metavar="FILE", help="binding of the vendor's FMU")
+    add("--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)")
+    add("--outages", action=Joined, metavar="WHICH", help="rank for these as well: n-1, lines, units, or names")
+    for name, kind, metavar, text in (
+        ("below", float, "PERCENT", "damping of poorly damped modes"),
+        ("confirm", int, "N", "confirm the best N by coupled FMUs"),
+        ("rating", float, "MVA", "of the converter that confirms"),
+        ("gain", float, "K", "largest of its POD [pu of its rating]"),
+    ):
+        value = getattr(default, name)
+        add(f"--{name}", type=kind, default=value, metavar=metavar, help=f"{text} (default: {value:g})")
+    add("--out", type=Path, metavar="DIR", help="write site.json, buses.csv and site.html with a map")
+    add("--json", action="store_true", help="print JSON")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -54,7 +54,9 @@ def answer(result: SiteResult) -> str:
     most, at = result.least(best[0])
     mode = next(one for one in result.situations if one.name == at).modes[0]
     after = f" after the outage {at}" if at != result.intact.name else ""
-    others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:]) if most > 0 else ""
+    if most < (0 if result.request.is_foreign else _NONE):
+        return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
+    others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
         f"{best[0]} is the best place for {device_title(result)}: {shown(result, most)} {unit(result, '100')}, for the "
         f"least damped mode{after} ({_called(mode)})" + (f"; of that {others}" if others else "")

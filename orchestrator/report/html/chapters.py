@@ -150,10 +150,11 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 
 def _certificate(file: Path, c: Content) -> Chapter:
-    open_ = [str(text) for text in (*c.get("missing", ()), *c.get("departures", ()))]
-    sure = f"judged: {c['judged']}" if c.get("judged") else ""
-    return Chapter(file, "Does the converter pass the grid code's test?", c["sentence"], bool(c.get("passed")), sure,
-                   open_, page="certificate.html")  # fmt: skip
+    open_ = [str(text) for text in (*c["missing"], *c["departures"])]
+    good = {"passes": True, "fails": False}.get(c["verdict"])
+    sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
+    question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
+    return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
 
 
 def _matrix(file: Path, c: Content) -> Chapter:
