@@ -151,7 +151,8 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 def _certificate(file: Path, c: Content) -> Chapter:
     open_ = [str(text) for text in (*c["missing"], *c["departures"])]
-    good = {"passes": True, "fails": False}.get(c["verdict"])
+    trusted = (c.get("acceptance") or {}).get("trusted") is not False
+    good = {"passes": trusted, "fails": False}.get(c["verdict"])
     sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
     return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
