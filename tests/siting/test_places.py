@@ -31,16 +31,16 @@ def test_every_bus_of_ieee39_agrees_with_the_coupled_fmus(controller):
         errors = {}
         for bus in buses:
             name = name_at(bus)
-            master.components[name].set({f"{controller}.enabled": True, f"{controller}.K": 5.0})
+            master.components[name].set({f"{controller}.enabled": True, f"{controller}.K": 100.0})
             on = off.with_component(master, name)
             master.components[name].set({f"{controller}.enabled": False})
             change = [response_of(master, blocks.components[name], seen.mode.eigenvalue) for blocks in (on, off)]
             predicted = seen.shift(bus, change[0] - change[1])
             model = compose(on, master.schedule)
             coupled = nearest(pairs_near(model, pair.eigenvalue), pair) - pair.eigenvalue
-            if abs(coupled) > 1e-6:  # below, the eigenvalues' own rounding counts
+            if abs(coupled) > 1e-7:  # below, the eigenvalues' own rounding counts
                 errors[bus] = abs(predicted - coupled) / abs(coupled)
-    assert len(errors) > 20
+    assert len(errors) > 25, sorted(errors)
     assert max(errors.values()) < 0.05, errors
 
 
@@ -64,7 +64,7 @@ def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
         load_case("ieee39"), SiteRequest("pod_p", scenario="base", confirm=1, outages="line_16_17,sg36,line_19_20")
     )
     assert {at.name for at in found.situations} >= {"intact", "line_16_17", "sg36"}
-    assert any("not controllable at bus_38" in text for text in remarks(found))
+    assert any(f"not controllable at {found.ranking[0]}" in text for text in remarks(found))
     least = [found.least(bus)[0] for bus in found.ranking]
     assert least == sorted(least, reverse=True)
     assert found.agrees
