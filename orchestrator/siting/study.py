@@ -63,7 +63,7 @@ class SiteRequest:
 
 
 @dataclass(frozen=True)
-class Shift:
+class SupportShift:
     """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
     [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's.
     """
@@ -78,7 +78,7 @@ class Shift:
 
 
 DEVICE = "device"
-ByMode = Mapping[str, Mapping[str, Shift]]
+ByMode = Mapping[str, Mapping[str, SupportShift]]
 Response = Callable[[Situation, str, SeenMode], Vector]
 
 
@@ -176,13 +176,13 @@ def _ideal(kind: str) -> Response:
 def _all_shifts(situations: Sequence[Situation], response: Response, *, tuned: bool) -> dict[str, ByMode]:
     found: dict[str, ByMode] = {}
     for at in situations:
-        by_mode = dict[str, Mapping[str, Shift]]()
+        by_mode = dict[str, Mapping[str, SupportShift]]()
         for seen in at.modes:
             changes = {bus: seen.shift(bus, response(at, bus, seen)) for bus in at.voltages}
             most = max(map(abs, changes.values())) or 1.0
             eigenvalue = seen.mode.eigenvalue
             by_mode[seen.label] = {
-                bus: Shift(c, 100 * damping_change(eigenvalue, -abs(c) if tuned else c), abs(c) / most)
+                bus: SupportShift(c, 100 * damping_change(eigenvalue, -abs(c) if tuned else c), abs(c) / most)
                 for bus, c in changes.items()
             }
         found[at.name] = by_mode

@@ -21,7 +21,7 @@ from orchestrator.safe_files import write_text
 from orchestrator.siting.confirmation import Confirmation
 from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.responses import ACTIVE, REACTIVE
-from orchestrator.siting.study import DEVICE, DROOP, Shift, SiteResult
+from orchestrator.siting.study import DEVICE, DROOP, SupportShift, SiteResult
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 _NONE = 1e-5
@@ -149,7 +149,7 @@ def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _shift(shift: Shift) -> dict[str, Any]:
+def _shift(shift: SupportShift) -> dict[str, Any]:
     return {"damping_points": shift.damping, "real": shift.change.real, "imag": shift.change.imag,
             "part_of_best": shift.part, "controllable": not shift.hardly}  # fmt: skip
 
@@ -226,7 +226,7 @@ def _page(result: SiteResult) -> str:
 
 
 def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
-    shifts: Mapping[str, Shift] = result.shifts[DEVICE][result.intact.name][seen.label]
+    shifts: Mapping[str, SupportShift] = result.shifts[DEVICE][result.intact.name][seen.label]
     network = result.prepared.network
     assert network is not None
     branches = [(line.from_bus, line.to_bus) for line in network.lines]

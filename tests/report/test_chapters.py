@@ -21,7 +21,7 @@ SCREENING = {
     "failures": [{"point": "mon", "outage": "sg3", "status": "no power flow", "why": "sg5 would need 129 %"}],
 }  # fmt: skip
 CHECK = {
-    "fmu": "/home/x/vendor.fmu", "trusted": False, "faults": ["wrong rated frequency"], "not_supported": [],
+    "fmu": "vendor.fmu", "trusted": False, "faults": ["wrong rated frequency"], "not_supported": [],
     "checks": [{"question": "Is it at rest?", "verdict": "fail", "evidence": "omega is 0.8333", "remedy": "set f_n",
                 "figures": {"not_judged": "anything after it"}}],
 }  # fmt: skip

@@ -22,6 +22,9 @@ _SHOWN, _OPEN, _LONGEST = 8, 4, 110
 """Rows of a short table; what was not judged on the first page, and the characters of each."""
 
 
+_STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "not known whether stable"}
+
+
 @dataclass(frozen=True)
 class Chapter:
     """What one result says; ``page`` is the name of its own page, whose sections are the chapter, in the place of
@@ -72,11 +75,13 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "") -> Cha
     """Of a run's summary, or the same of `gfor modes`."""
     said, open_, sure = [], [], []
     for s in scenarios:
-        answer, stability = s.get("answer") or {}, s.get("stability") or {}
+        answer: Content = s.get("answer") or {}
+        stability: Content = s.get("stability") or {}
+        listed: Any = s.get("modes")
         stable = answer.get("stable", stability.get("stable", s.get("stable")))
-        word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(stable, "not known whether stable")
+        word = answer.get("verdict") or _STABLE[stable]
         title = s.get("title", s["name"])
-        modes = [m for m in (s.get("modes") if isinstance(s.get("modes"), list) else [answer]) if m]
+        modes = [m for m in (listed if isinstance(listed, list) else [answer]) if m]
         least = min((m for m in modes if m.get("damping_percent") is not None), key=lambda m: m["damping_percent"],
                     default=None)  # fmt: skip
         figures = f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %" if least else ""
@@ -108,8 +113,7 @@ def _modes(file: Path, content: Content) -> Chapter:
 
 
 def _screening(file: Path, c: Content) -> Chapter:
-    word = {True: "stable everywhere", False: "UNSTABLE somewhere", None: "not known whether stable everywhere"}
-    answer = f"{word[c['stable']]}: {c['points']} operating points with {c['outages']} outages"
+    answer = f"{_STABLE[c['stable']]} {'somewhere' if c['stable'] is False else 'everywhere'}: {c['points']} operating points with {c['outages']} outages"
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
         answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, at "
                    f"{worst['point']}, {worst['outage']}")  # fmt: skip
