@@ -21,7 +21,7 @@ from orchestrator.safe_files import write_text
 from orchestrator.siting.confirmation import Confirmation
 from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.responses import ACTIVE, REACTIVE
-from orchestrator.siting.study import DEVICE, DROOP, SupportShift, SiteResult
+from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 _NONE = 1e-5

@@ -113,7 +113,8 @@ def _modes(file: Path, content: Content) -> Chapter:
 
 
 def _screening(file: Path, c: Content) -> Chapter:
-    answer = f"{_STABLE[c['stable']]} {'somewhere' if c['stable'] is False else 'everywhere'}: {c['points']} operating points with {c['outages']} outages"
+    where = "somewhere" if c["stable"] is False else "everywhere"
+    answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points with {c['outages']} outages"
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
         answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, at "
                    f"{worst['point']}, {worst['outage']}")  # fmt: skip
