@@ -155,7 +155,7 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 
 def _certificate(file: Path, c: Content) -> Chapter:
-    open_ = [str(text) for text in (*c["missing"], *c["departures"])]
+    open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["missing"], *c["departures"])]
     trusted = (c.get("acceptance") or {}).get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
     sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
