@@ -42,6 +42,7 @@ from orchestrator.api.values import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
+from orchestrator.cases.forcing import forced
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
@@ -134,6 +135,7 @@ class Case:
         parameters: Paths = (),
         schedule: ScheduleName | None = None,
         tolerance: float | None = None,
+        force: Names = (),
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
@@ -155,6 +157,8 @@ class Case:
         tolerance
             Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
             0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
+        force
+            References that swing, in the place of the case's events: ``"sg1 0.8 Hz 2 %"``, as with ``gfor run --force``.
 
         Raises
         ------
@@ -175,7 +179,13 @@ class Case:
             )
         names = [name] if name else []
         (chosen,) = choose(
-            self.file, names, values, step=step, parameters=parameters, schedule=schedule, tolerance=tolerance
+            forced(self.file, names_given(force, "force")),
+            names,
+            values,
+            step=step,
+            parameters=parameters,
+            schedule=schedule,
+            tolerance=tolerance,
         )
         question([chosen.prepared])
         return chosen

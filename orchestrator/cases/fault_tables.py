@@ -17,6 +17,7 @@ from orchestrator.cases.schema import (
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     Event,
+    Forcing,
     NotANumber,
     ParameterChange,
     Silence,
@@ -147,6 +148,8 @@ def _set_by(event: Event) -> Iterator[str]:
             yield f"{_kind(event)} of {event.connection}"
         case WireRecovery():
             return
+        case Forcing():
+            yield f"{event.component}.{event.variable}"
         case NotANumber():
             yield f"the outputs of {event.component}"
         case _:

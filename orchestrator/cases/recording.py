@@ -4,8 +4,12 @@ import fnmatch
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import variables_of
+from orchestrator.cases.schema import ForcingTable
 from orchestrator.coupling.clock import Clock
 from orchestrator.errors import InputError, Problem
+
+NEEDED_FOR_SOURCES = ("*.i_re", "*.i_im", "*.v_re", "*.v_im", "*.p", "*.q")
+"""Recorded besides where something is forced: what tells where an oscillation comes from."""
 
 _EQUAL = 1e-6
 """An interval is a multiple of the step if it is one to this part of a step."""
@@ -40,7 +44,10 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     questions: list[Problem] = []
     plans = {name: plan.description for name, plan in draft.system.components.items()}
     outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
-    wanted = {name for pattern in draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
+    events = draft.case.events if draft.scenario.events is None else draft.scenario.events
+    forced = any(isinstance(event, ForcingTable) for event in events)
+    patterns = [*draft.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
+    wanted = {name for pattern in patterns for name in fnmatch.filter(outputs, pattern)}
     if outputs and not wanted and draft.case.solver.record:
         text = f"nothing is recorded in scenario {draft.name!r}: none of its outputs fits a pattern"
         questions.append(Problem(draft.place("solver", "record"), text))

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
 from orchestrator.cases.names import file_name
+from orchestrator.coupling.events import ForcingShape
 from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
 from orchestrator.toml_files import Table
 from orchestrator.units import to_unit
@@ -25,6 +26,13 @@ def _in(unit: str) -> Callable[[Any], Any]:
         return to_unit(value, unit) if isinstance(value, str) else _no_truth_value(value)
 
     return convert
+
+
+def _share(value: Any) -> Any:
+    """``"2 %"`` as 0.02; else per unit."""
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        return to_unit(value.rstrip().removesuffix("%"), "pu") / 100
+    return _in("pu")(value)
 
 
 Number = Annotated[float, BeforeValidator(_no_truth_value)]
@@ -434,6 +442,29 @@ class ParameterChangeTable(EventBase):
     value: Value
 
 
+class ForcingTable(EventBase):
+    """A reference swings: by a share of its base, or in per unit; without a reference it is the unit's power."""
+
+    type: Literal["forcing"]
+    component: str
+    reference: str | None = None
+    frequency: Hertz = Field(gt=0)
+    amplitude: Annotated[float, BeforeValidator(_share), Field(gt=0, allow_inf_nan=False)]
+    shape: ForcingShape = "sine"
+    end: Seconds | None = None
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def place(self) -> str:
+        """Where it was asked for, if not in the file."""
+        return f"--force {self._text!r}" if self._text else ""
+
+    def asked_as(self, text: str) -> Self:
+        """The same with the words of the command."""
+        self._text = text
+        return self
+
+
 SettingEventTable = (
     LoadChangeTable
     | LoadTripTable
@@ -459,7 +490,9 @@ WireEventTable = (
 ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable
 """Faults of whole components."""
 
-EventTable = Annotated[SettingEventTable | WireEventTable | ComponentFaultTable, Field(discriminator="type")]
+EventTable = Annotated[
+    SettingEventTable | WireEventTable | ComponentFaultTable | ForcingTable, Field(discriminator="type")
+]
 
 
 class ScenarioTable(Table):

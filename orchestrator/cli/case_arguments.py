@@ -5,6 +5,7 @@ from pathlib import Path
 
 from orchestrator.api.scenario import Scenario, choose
 from orchestrator.cases.case import load_case
+from orchestrator.cases.forcing import forced
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -74,7 +75,8 @@ def add_trust_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
-    file, stop = load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "stop", None)
+    file = forced(load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "force", ()))
+    stop = getattr(options, "stop", None)
     scenarios = choose(
         file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
         schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),

@@ -49,6 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="take steps as long as this error of a coupled output allows, from 1e-8 to 0.1, such as 1e-4; needs FMUs "
         "that save their state (default: fixed steps, or the case's tolerance)",
     )
+    parser.add_argument(
+        "--force",
+        action="append",
+        default=[],
+        metavar="'UNIT FREQUENCY AMPLITUDE'",
+        help="let a unit's power reference swing, in the place of the case's events: 'sg35 0.8 Hz 2 %%', or with "
+        "more words 'sg35.exciter.V_ref 0.8 Hz 2 %% square from 2 s' (repeatable)",
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
     parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
     parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")

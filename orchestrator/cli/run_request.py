@@ -18,7 +18,7 @@ from orchestrator.study.checkpoints import EVERY
 _REQUEST = "request.json"
 _OF_THE_RUN: Mapping[str, Any] = {
     "case": None, "scenario": [], "set": [], "parameters": [], "step": None, "schedule": None, "stop": None,
-    "tolerance": None, "linear": False, "csv": True, "require_checkpoint": False, "checkpoint": None,
+    "tolerance": None, "force": [], "linear": False, "csv": True, "require_checkpoint": False, "checkpoint": None,
 }  # fmt: skip
 """Options as they are where nothing is said; a resumed run keeps those that it had."""
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from orchestrator.coupling.coupled import open_plan
-from orchestrator.coupling.events import Event
+from orchestrator.coupling.events import Event, Forcing
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.run import Run
 from orchestrator.coupling.run_state import NOT_KEPT, Keeper
@@ -84,5 +84,10 @@ class Master(Stepper):
         stop = self.clock.index(stop_time, "the stop")
         due: dict[int, list[Event]] = {}
         for event in events:
-            due.setdefault(self.clock.index(event.time, "an event"), []).append(event)
+            index = self.clock.index(event.time, "an event")
+            if isinstance(event, Forcing):
+                for change in event.values(self.clock.step_size, stop_time):
+                    due.setdefault(round(change.time / self.clock.step_size), []).append(change)
+            else:
+                due.setdefault(index, []).append(event)
         return Run(self, observers, keeper).until(stop, due)

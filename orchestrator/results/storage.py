@@ -62,7 +62,21 @@ def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
         "record_interval_s": prepared.record_every * prepared.step_size,
         "record_every_steps": prepared.record_every,
         "record_filter": how,
+        "places": json.dumps(measuring_places(prepared)),
     }
+
+
+def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
+    """At which bus each unit feeds in and each line begins, as names of the recording without their last part."""
+    found = {
+        wire.target.component: str(wire.source).removesuffix(".v_re")
+        for wire in prepared.system.connections
+        if wire.target.variable == "v_re" and str(wire.source).endswith(".v_re")
+    }
+    network, grid = prepared.network, prepared.case.table.power_flow
+    if network is not None and grid is not None:
+        found |= {f"{grid.grid}.{line.name}": f"{grid.grid}.{line.from_bus}" for line in network.lines}
+    return found
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:

@@ -138,6 +138,7 @@ class _Responses:
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
         found = unsettled_response(self._seen, self._system, part, self._units, noisy=bool(acting))
+        found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
             self.masked[part] = acting
         if not is_short(part):
