@@ -28,6 +28,7 @@ _HOMES = {
     "load": "api.case",
     "open_fmu": "api.fmu",
     "read_linear_model": "api.linear",
+    "source": "api.source",
 }
 """Name → module of this package that defines it."""
 

@@ -12,4 +12,5 @@ from orchestrator.api.models import build as build
 from orchestrator.api.results import Modes as Modes
 from orchestrator.api.results import Run as Run
 from orchestrator.api.scenario import Scenario as Scenario
+from orchestrator.api.source import source as source
 from orchestrator.errors import CosimError as CosimError

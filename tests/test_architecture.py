@@ -24,7 +24,7 @@ FLOORS = (
     ("orchestrator.results", "orchestrator.points", "orchestrator.interop", "orchestrator.watch"),
     ("orchestrator.report",),
     ("orchestrator.study",),
-    ("orchestrator.black_box", "orchestrator.pod_design", "orchestrator.sweep"),
+    ("orchestrator.black_box", "orchestrator.oscillations", "orchestrator.pod_design", "orchestrator.sweep"),
     ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions"),
     ("orchestrator.certification", "orchestrator.coordinated_design"),
     ("orchestrator.api",),

@@ -158,7 +158,7 @@ class Case:
             Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
             0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
         force
-            References that swing, in the place of the case's events: ``"sg1 0.8 Hz 2 %"``, as with ``gfor run --force``.
+            References that swing, in the place of the case's events: ``"sg1 0.8 Hz 2 %"``, as ``gfor run --force``.
 
         Raises
         ------

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from orchestrator.analysis.stability import Stability
+    from orchestrator.api.source import Sources
+    from orchestrator.api.values import Time
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
     from orchestrator.watch.finding import Finding
@@ -266,6 +268,18 @@ class Run:
     def table(self) -> pd.DataFrame:
         """All recorded signals over the time [s]."""
         return self.dataset.to_dataframe()
+
+    def source(self, start: Time | None = None, stop: Time | None = None) -> Sources:
+        """Where the run's oscillations come from; see `orchestrator.source`.
+
+        Parameters
+        ----------
+        start, stop
+            The part of the run that is used [s]; by default all of it.
+        """
+        from orchestrator.api.source import source  # noqa: PLC0415 - needs this module
+
+        return source(self, start, stop)
 
     def summary(self) -> dict[str, Any]:
         """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""

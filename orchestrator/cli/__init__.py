@@ -29,6 +29,7 @@ COMMANDS = {
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
     "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
+    "source": "where the oscillations of a run or recording come from: which unit drives them",
     "identify": "the modes in a recorded signal (matrix pencil)",
     "report": "one self-contained HTML page from the folder of a run",
     "design": "design a POD controller by eigenvalue sensitivity",
@@ -102,6 +103,7 @@ Can this converter's FMU be trusted, and does it meet the grid code?
 What does a recording say?
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
   gfor compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
+  gfor source results/two_area/gfor                   which unit drives an oscillation
 
 How do I take the models elsewhere?
   gfor build gfor --dest fmus                         an FMU for any FMI tool

@@ -67,7 +67,7 @@ def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
 
 
 def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
-    """At which bus each unit feeds in and each line begins, as names of the recording without their last part."""
+    """The bus of each unit, and the first and last one of each line, as names of the recording without their last part."""
     found = {
         wire.target.component: str(wire.source).removesuffix(".v_re")
         for wire in prepared.system.connections
@@ -75,7 +75,10 @@ def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
     }
     network, grid = prepared.network, prepared.case.table.power_flow
     if network is not None and grid is not None:
-        found |= {f"{grid.grid}.{line.name}": f"{grid.grid}.{line.from_bus}" for line in network.lines}
+        found |= {
+            f"{grid.grid}.{line.name}": f"{grid.grid}.{line.from_bus} {grid.grid}.{line.to_bus}"
+            for line in network.lines
+        }
     return found
 
 

@@ -1,6 +1,6 @@
 """Records whose source is known: a case's linear model, forced at any reference, with noise of loads and of measuring.
 
-The model is kept with its slow eigenvalues alone (tests/source/models); `python -m tests.benchmarks.sources --models`
+The model is kept with its slow eigenvalues alone (tests/oscillations/models); `python -m tests.benchmarks.sources --models`
 makes them anew.
 """
 
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import orchestrator as gfor
-from orchestrator.source.measurements import Place, made_ready
+from orchestrator.oscillations.measurements import Place, made_ready
 
-MODELS = Path(__file__).parents[1] / "source" / "models"
+MODELS = Path(__file__).parents[1] / "oscillations" / "models"
 FASTEST = 80.0
 """Largest size of an eigenvalue that is kept [1/s]; of the others their gain at rest."""
 
@@ -102,7 +102,9 @@ def model(name):
     with np.load(MODELS / f"{name}.npz") as kept:
         found = dict(kept)
     texts = {key: tuple(map(str, found.pop(key))) for key in ("units", "buses", "inputs")}
-    return Model(**texts, **{key: value.astype(complex if value.dtype.kind == "c" else float) for key, value in found.items()})
+    return Model(
+        **texts, **{key: value.astype(complex if value.dtype.kind == "c" else float) for key, value in found.items()}
+    )
 
 
 def sine(times, frequency, amplitude, begin=10.0, shape="sine"):

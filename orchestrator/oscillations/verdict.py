@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.source.detection import Oscillation, find_oscillations, signals_of
-from orchestrator.source.kind import Evidence, evidence_of
-from orchestrator.source.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
-from orchestrator.source.measurements import Measurements
+from orchestrator.oscillations.detection import Oscillation, find_oscillations, signals_of
+from orchestrator.oscillations.kind import Evidence, evidence_of
+from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
+from orchestrator.oscillations.measurements import Measurements
 
 _SHOWN = 8
 _FEWEST_PERIODS = 5
@@ -84,7 +84,9 @@ def locate(measured: Measurements) -> list[Located]:
 def _verdict(evidence: Evidence, said: tuple[Opinion, ...]) -> tuple[str | None, str]:
     """A source where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
-        what = "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
+        what = (
+            "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
+        )
         return None, f"{what}: {evidence.reasons[0]}"
     by_method = {o.method: o for o in said}
     flow, phase, mode = by_method[DEF], by_method[QV_PHASE], by_method[DYNAMIC_MODE]

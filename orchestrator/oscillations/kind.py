@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from orchestrator.source.detection import Oscillation, Signals, envelope, phasors
+from orchestrator.oscillations.detection import Oscillation, Signals, envelope, phasors
 
 OscillationKind = Literal["forced", "mode", "not known"]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.source.detection import Oscillation, phasors
-from orchestrator.source.measurements import Measurements, Place
+from orchestrator.oscillations.detection import Oscillation, phasors
+from orchestrator.oscillations.measurements import Measurements, Place
 
 DEF, DYNAMIC_MODE, QV_PHASE = "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
 
@@ -120,9 +120,7 @@ def _opinions(
     return [flow, dynamic_mode(places, measured.times, found), phase]
 
 
-def works(
-    places: Sequence[Place], times: Numbers, found: Oscillation, others: Sequence[float]
-) -> tuple[_Work, _Work]:
+def works(places: Sequence[Place], times: Numbers, found: Oscillation, others: Sequence[float]) -> tuple[_Work, _Work]:
     """Dissipating work Re(ΔP* jΔθ + ΔQ* jΔln V)/2 and reactive work Re(Δln V* ΔQ)/2 of each place.
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are

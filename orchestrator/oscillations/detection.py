@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.source.measurements import Measurements
+from orchestrator.oscillations.measurements import Measurements
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
 _ABOVE = 30.0
