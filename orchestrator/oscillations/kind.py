@@ -1,10 +1,11 @@
 """Whether an oscillation is forced or a poorly damped mode of the system, with the evidence."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from orchestrator.arrays import Numbers
 from orchestrator.oscillations.detection import Oscillation, Signals, envelope, phasors
 
 OscillationKind = Literal["forced", "mode", "not known"]
@@ -19,6 +20,13 @@ _TREND = 0.7
 
 _SINE = 1.85
 """Fourth moment beside the square of the second: 1.5 of a sine, 3 of noise."""
+
+_LEAST_PART = 0.2
+"""Amplitude, as a part of the largest of its kind of signal, from which a signal is looked at for disturbances."""
+
+_CLEAN, _SKIRT = 0.04, 5.0
+"""Spread of the envelope up to which nothing else is asked; beyond it what is left beside the line, near it and further
+off, must not fall by more than the factor, as it does beside a mode with next to no damping that noise shakes."""
 
 _SHOCK = 6.0
 """Deviation at the begin, in amplitudes, that a forcing's own transient does not reach."""
@@ -42,6 +50,8 @@ class Evidence:
         1.5 of a sine, 3 of noise.
     coherence
         Length of the mean phasor beside the phasors' mean length: 1 where the phase stays.
+    skirt
+        Power beside the line as a multiple of that further off.
     disturbed
         Whether it begins with a step or a shock in the signals.
     reasons
@@ -53,6 +63,7 @@ class Evidence:
     envelope_spread: float
     kurtosis: float
     coherence: float
+    skirt: float
     periods: float
     disturbed: bool
     reasons: tuple[str, ...]
@@ -68,7 +79,7 @@ def evidence_of(signals: Signals, found: Oscillation) -> Evidence:
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
-        return Evidence("not known", 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
+        return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
     spreads, kurtoses, coherences, slopes, changes = [], [], [], [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
@@ -82,34 +93,54 @@ def evidence_of(signals: Signals, found: Oscillation) -> Evidence:
         coherences.append(float(abs(z.mean()) / size.mean()))
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtoses.append(float((wave**4).mean() / (wave**2).mean() ** 2))
+    skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
     middle = [float(np.median(x)) for x in (spreads, kurtoses, coherences, slopes, changes)]
     spread, kurtosis, coherence, slope, change = middle
     disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
-    kind, reasons = _judged(spread, kurtosis, coherence, change, disturbed, found, periods)
-    return Evidence(kind, damping, spread, kurtosis, coherence, periods, disturbed, tuple(reasons))
+    figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
+    kind, reasons = _judged(figures, change, found)
+    return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
-def _judged(
-    spread: float, kurtosis: float, coherence: float, change: float, disturbed: bool, found: Oscillation, periods: float
-) -> tuple[OscillationKind, list[str]]:
+def _judged(seen: Evidence, change: float, found: Oscillation) -> tuple[OscillationKind, list[str]]:
     harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
-    steady = spread < _STEADY and kurtosis < _SINE and coherence > _COHERENT
-    figures = f"envelope ± {100 * spread:.0f} %, kurtosis {kurtosis:.2f}, phase coherence {coherence:.2f}"
-    if abs(change) > _CHANGE and coherence > 0.8 and not found.harmonics:
+    sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
+    steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
+    figures = (
+        f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
+        f"{seen.coherence:.2f}"
+    )
+    if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
         way = "decays" if change < 0 else "grows"
-        return "mode", [f"its amplitude {way}, by {100 * abs(change):.0f} % over {periods:.0f} periods ({figures})"]
-    if steady and disturbed and not found.harmonics:
-        return "not known", [
-            f"it is steady ({figures}), but begins with a disturbance, after which a mode without damping would ring alike"
+        return "mode", [
+            f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
         ]
+    if steady and seen.disturbed and not harmonics:
+        after = "a mode without damping would ring alike after the disturbance with which it begins"
+        return "not known", [f"it is steady ({figures}), but {after}"]
+    if steady and not sharp:
+        return "not known", [f"it is steady ({figures}), but its line widens as that of a mode that noise shakes"]
     if steady:
-        said = [f"it is steady over {periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"]
+        said = [f"it is steady over {seen.periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"]
         said += [f"multiples of its frequency: {harmonics}, as of a limit or a switch"] if harmonics else []
         return "forced", said
-    if spread > _RESTLESS and kurtosis > _SINE and coherence < 0.9:
+    if seen.envelope_spread > _RESTLESS and seen.kurtosis > _SINE and seen.coherence < 0.9:
         return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
     return "not known", [f"neither steady nor restless: {figures}"]
+
+
+def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:
+    """Mean power beside a line that is taken away, within five widths of it, as a multiple of that further off."""
+    amplitude = phasors(times, values[:, None], [frequency])[0]
+    rest = values - np.real(amplitude * np.exp(2j * np.pi * frequency * times))
+    line = np.polyfit(times - times.mean(), rest, 2)
+    rest = (rest - np.polyval(line, times - times.mean())) * np.hanning(len(rest))
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    length = len(times) * float(times[1] - times[0])
+    apart = np.abs(np.fft.rfftfreq(len(rest), length / len(times)) - frequency) * length
+    near, far = (apart > 1.5) & (apart < 5), (apart > 8) & (apart < min(25.0, 0.5 * frequency * length))
+    return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
 
 
 def _disturbed(signals: Signals, found: Oscillation) -> bool:
@@ -121,7 +152,10 @@ def _disturbed(signals: Signals, found: Oscillation) -> bool:
     at, end = found.first, found.last
     around = slice(max(0, at - 2 * period), at + 2 * period)
     before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice(at + period, min(end, at + 5 * period))
-    for name in list(found.amplitudes)[:_STRONGEST]:
+    for name, amplitude in found.amplitudes.items():
+        alike = (a for other, a in found.amplitudes.items() if other.rpartition(".")[2] == name.rpartition(".")[2])
+        if amplitude < _LEAST_PART * max(alike):
+            continue
         x = signals.values[:, signals.names.index(name)]
         size = float(np.abs(phasors(signals.times[at:end], x[at:end, None], [found.frequency]))[0])
         noise = float(x[before].std())

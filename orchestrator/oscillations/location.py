@@ -113,8 +113,8 @@ def _opinions(
         phase = replace(phase, applies=False, place=None, reason=why)
     elif ratio >= _VOLTAGE:
         why = (
-            f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is known "
-            f"to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
+            f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
+            f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
         )
         flow = replace(flow, applies=False, place=None, reason=why)
     return [flow, dynamic_mode(places, measured.times, found), phase]

@@ -1,7 +1,8 @@
-"""Phasors and powers at places of a grid over the time, made ready: evenly spaced, without gaps, angles without wraps."""
+"""Phasors and powers at places of a grid over the time, made ready: even, without gaps, angles without wraps."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -78,8 +79,8 @@ def made_ready(label: str, times: Numbers, places: Sequence[Place], remarks: Seq
     places = [whole for place in places if (whole := _filled(place, times, said)) is not None]
     if len(times) < _FEWEST or not places:
         raise InputError(
-            f"{label}: {len(times)} samples at {len(places)} places without longer gaps; an oscillation is looked for in "
-            f"at least {_FEWEST} samples of voltage, angle, P and Q at one place"
+            f"{label}: {len(times)} samples at {len(places)} places without longer gaps; an oscillation is looked for "
+            f"in at least {_FEWEST} samples of voltage, angle, P and Q at one place"
         )
     return _thinned(label, times, [_unwrapped(place) for place in places], said)
 
@@ -107,7 +108,7 @@ def _longest_stretch(times: Numbers, places: list[Place], said: list[str]) -> tu
     cuts = np.flatnonzero(np.diff(times) > max(_LONGEST_GAP, 1.5 * step))
     if len(cuts):
         edges = [0, *(int(c) + 1 for c in cuts), len(times)]
-        a, b = max(zip(edges, edges[1:], strict=False), key=lambda e: e[1] - e[0])
+        a, b = max(pairwise(edges), key=lambda e: e[1] - e[0])
         said.append(f"rows are missing: only the part from {times[a]:g} to {times[b - 1]:g} s is used")
         times, places = times[a:b], [_each(place, lambda x: x[a:b]) for place in places]
     even = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)

@@ -1,4 +1,4 @@
-"""Records as `Measurements`: runs of ours, tables of phasors with named columns, folders of the source-location contest."""
+"""Records as `Measurements`: runs of ours, tables of phasors with named columns, folders of the contest."""
 
 from __future__ import annotations
 

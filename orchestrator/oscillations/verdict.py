@@ -50,6 +50,7 @@ class Located:
                 "envelope_spread": evidence.envelope_spread,
                 "kurtosis": evidence.kurtosis,
                 "coherence": evidence.coherence,
+                "skirt": evidence.skirt,
                 "begins_with_a_disturbance": evidence.disturbed,
                 "reasons": list(evidence.reasons),
             },

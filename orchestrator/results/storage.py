@@ -67,7 +67,7 @@ def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
 
 
 def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
-    """The bus of each unit, and the first and last one of each line, as names of the recording without their last part."""
+    """The bus of each unit, and both of each line, as names of the recording without their last part."""
     found = {
         wire.target.component: str(wire.source).removesuffix(".v_re")
         for wire in prepared.system.connections

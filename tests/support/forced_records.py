@@ -1,7 +1,7 @@
 """Records whose source is known: a case's linear model, forced at any reference, with noise of loads and of measuring.
 
-The model is kept with its slow eigenvalues alone (tests/oscillations/models); `python -m tests.benchmarks.sources --models`
-makes them anew.
+The model is kept with its slow eigenvalues alone (tests/oscillations/models); `python -m tests.benchmarks.sources
+--models` makes them anew.
 """
 
 from dataclasses import dataclass
