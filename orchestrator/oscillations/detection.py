@@ -78,7 +78,7 @@ def find_oscillations(signals: Signals) -> list[Oscillation]:
     low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
     inside = np.flatnonzero((grid >= low) & (grid <= high))
     lines: list[tuple[float, float]] = []
-    for k in inside:
+    for k in map(int, inside):
         if power[k] == power[max(0, k - 12) : k + 13].max() and power[k] > _ABOVE * _background(power, k):
             lines.append((float(power[k]), refined(signals, float(grid[k]))))
     lines.sort(reverse=True)
@@ -103,7 +103,9 @@ def _spectrum(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
     window = np.hanning(len(values))[:, None]
     power = np.abs(np.fft.rfft(values * window, 4 * len(values), axis=0)) ** 2
     share = power / np.maximum(power.sum(axis=0), 1e-300)
-    return np.fft.rfftfreq(4 * len(values), step), np.asarray(share.mean(axis=1), dtype=np.float64)
+    return np.asarray(np.fft.rfftfreq(4 * len(values), step), dtype=np.float64), np.asarray(
+        share.mean(axis=1), dtype=np.float64
+    )
 
 
 def _background(power: Numbers, k: int) -> float:

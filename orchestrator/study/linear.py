@@ -98,7 +98,7 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         if any(isinstance(value, bool) for value in settings.values())
     ]
     if faults := faults_among(prepared.events):
-        raise InputError(f"a linear model cannot follow a fault ({faults[0]}); leave --linear out")
+        raise InputError(f"a linear model cannot follow a fault or a forcing ({faults[0]}); leave --linear out")
     if switching:
         raise InputError(f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out")
     inputs = default_inputs(prepared)

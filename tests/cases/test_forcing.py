@@ -79,11 +79,11 @@ def test_two_forcings_of_one_reference_are_refused():
 
 @pytest.fixture(scope="module")
 def run():
-    return gfor.load("two_area_rms").scenario("gfor", force="sg1.governor.P_ref 0.8 Hz 2 %").run(stop=12.0)
+    return gfor.load("two_area_rms").scenario("gfor", force="sg1.governor.P_ref 0.8 Hz 2 %").run(stop=20.0)
 
 
 def test_the_unit_swings_at_that_frequency_alone(run):
-    late = run.dataset.sel(time=slice(7.0, 12.0 - 1e-6))
+    late = run.dataset.sel(time=slice(15.0, 20.0 - 1e-6))
     spectrum = np.abs(np.fft.rfft(late["sg1.p"].values - late["sg1.p"].values.mean()))
     assert int(spectrum.argmax()) == 4  # of five seconds
 
@@ -102,3 +102,11 @@ def test_the_response_is_not_called_unstable(run):
 def test_a_linear_response_refuses_a_forcing():
     with pytest.raises(InputError, match="cannot follow"):
         gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %").run(stop=2.0, linear=True)
+
+
+def test_the_run_tells_who_was_forced(run):
+    found = run.source(start=0.5)
+    (one,) = found
+    assert one.source == "sg1"
+    assert found.table()["kind"][0] == "forced"
+    assert "grid.L" in found.places
