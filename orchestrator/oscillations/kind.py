@@ -151,10 +151,10 @@ def _disturbed(signals: Signals, found: Oscillation) -> bool:
     period = max(2, round(1 / (found.frequency * step)))
     at, end = found.first, found.last
     around = slice(max(0, at - 2 * period), at + 2 * period)
-    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice(at + period, min(end, at + 5 * period))
+    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice((at + end) // 2, end)
     for name, amplitude in found.amplitudes.items():
         alike = (a for other, a in found.amplitudes.items() if other.rpartition(".")[2] == name.rpartition(".")[2])
-        if amplitude < _LEAST_PART * max(alike):
+        if amplitude < _LEAST_PART * max(alike) or not name.endswith((".p", ".q")):
             continue
         x = signals.values[:, signals.names.index(name)]
         size = float(np.abs(phasors(signals.times[at:end], x[at:end, None], [found.frequency]))[0])

@@ -95,7 +95,7 @@ def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:
     values = np.asarray(curve.values, dtype=np.float64)
     if not unit and what not in ("va", "ia"):
         return values, "pu"
-    for base in _BASES[what]:
+    for base in _BASES[what] if unit else ():
         try:
             return values * to_unit(f"1 {unit}", base), base
         except ValueError:

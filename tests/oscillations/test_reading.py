@@ -20,9 +20,8 @@ def measured():
 def csv(path, measured, *, units=("pu", "deg", "MW", "Mvar"), scale=(1, 57.29577951308232, 100, 100)):
     columns = {"time [s]": measured.times}
     for place in measured.places:
-        for what, signal, unit, factor in zip(
-            ("vm", "va", "p", "q"), ["v", "angle", "p", "q"], units, scale, strict=True
-        ):
+        signals = {"vm": "v", "va": "angle", "p": "p", "q": "q"}
+        for (what, signal), unit, factor in zip(signals.items(), units, scale, strict=True):
             columns[f"{place.name}.{what} [{unit}]"] = factor * getattr(place, signal)
     np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="")
     return path
